@@ -15,7 +15,7 @@ from dhkit.planning.costs import cost_of
 from dhkit.planning.guess import leg_durations
 from dhkit.planning.joint_limits import Limit
 from dhkit.planning.program import Iterate, Program, Starts, row_bounds, worst_row
-from dhkit.planning.solver import ProgressCall, Stopped
+from dhkit.planning.solver import ProgressCall, Solution, Stopped
 from dhkit.planning.states import States
 from dhkit.planning.task import Margins, Task
 from dhkit.trajectories import Trajectory, quintic
@@ -106,17 +106,14 @@ class Search(Generic[Iterate]):
     progress: ProgressCall | None = None
     is_last: bool = True
     """Whether no other curve of accelerations is tried after this search."""
-    is_converged: bool = True
-    """Whether the last solution is optimal to the solver's tolerance."""
     tightened: list[str] = field(default_factory=list)
-    value: float = np.inf
-    """Value of the objective in the last solution."""
     found: Iterate | None = None
-    """The last solution."""
+    """The last motion that was certified."""
     failure: PlanningError | None = None
     """The first failure."""
     tried: int = 0
     """Number of solutions of this search."""
+    _last: Solution = field(init=False)
 
     def __call__(self, warm: Trajectory | None = None, starts: Starts[Iterate] | None = None) -> PlannedMotion:
         """Return the best certified motion.
@@ -127,7 +124,8 @@ class Search(Generic[Iterate]):
             No start converges, limits stay exceeded, or the time is over.
         """
         try:
-            for guess, found in self._solutions(starts or self.program.starts(self.task, warm)):
+            for guess, found, last in self._solutions(starts or self.program.starts(self.task, warm)):
+                self._last = last
                 try:
                     return self._certify(guess, found)
                 except PlanningError as error:
@@ -144,13 +142,12 @@ class Search(Generic[Iterate]):
             raise error
         self.failure = self.failure or error
 
-    def _solutions(self, starts: Starts[Iterate]) -> Iterator[tuple[Iterate, Iterate]]:
+    def _solutions(self, starts: Starts[Iterate]) -> Iterator[tuple[Iterate, Iterate, Solution]]:
         """Yield guesses with their solutions; those that are compared, by their cost."""
-        solved: list[tuple[float, Iterate, Iterate]] = []
+        solved: list[tuple[Iterate, Iterate, Solution]] = []
 
-        def compared() -> Iterator[tuple[Iterate, Iterate]]:
-            for _, guess, found in sorted(solved, key=lambda item: item[0]):
-                yield guess, found
+        def compared() -> Iterator[tuple[Iterate, Iterate, Solution]]:
+            yield from sorted(solved, key=lambda item: item[2].cost)
             solved.clear()
 
         for k, make in enumerate(starts.guesses):
@@ -165,9 +162,9 @@ class Search(Generic[Iterate]):
                 self.keep_first_failure(error)
                 continue
             if k < starts.compared:
-                solved.append((self.value, guess, found))
+                solved.append((guess, found, self._last))
             else:
-                yield guess, found
+                yield guess, found, self._last
         yield from compared()
 
     def _certify(self, guess: Iterate, found: Iterate) -> PlannedMotion:
@@ -178,12 +175,25 @@ class Search(Generic[Iterate]):
                 checked = self.checked(found, turn, is_last=self.is_last and turn == self._rounds - 1)
                 if isinstance(checked, PlannedMotion):
                     return checked
+                before = self.program
                 margins = self.widen_margins(margins, found, checked, turn)
+                if self.program is before and (again := self._solved_again(guess, margins)) is not None:
+                    found = again
+                    continue
                 guess = self.program.again(guess, found)
                 found = self.solution(guess, margins)
             raise self.stays_exceeded(checked.certificate)
         finally:
             self.program = program
+
+    def _solved_again(self, guess: Iterate, margins: Margins) -> Iterate | None:
+        """Return a solution with other margins from the last one and its multipliers; None if it did not converge."""
+        try:
+            return self.solution(guess, margins, warm=self._last)
+        except TimeLimitError:
+            raise
+        except PlanningError:
+            return None
 
     @property
     def _rounds(self) -> int:
@@ -204,7 +214,7 @@ class Search(Generic[Iterate]):
                 program.intervals,
                 c,
                 tuple(self.tightened),
-                is_converged=self.is_converged,
+                is_converged=self._last.converged,
             )
         exceeded = [check.what for check in certificate.checks if check.excess > 0]
         self.tightened += [what for what in exceeded if what not in self.tightened]
@@ -248,9 +258,13 @@ class Search(Generic[Iterate]):
         return margins
 
     def solution(
-        self, guess: Iterate, margins: Margins | None = None, program: Program[Iterate] | None = None
+        self,
+        guess: Iterate,
+        margins: Margins | None = None,
+        program: Program[Iterate] | None = None,
+        warm: Solution | None = None,
     ) -> Iterate:
-        """Return a solution from an initial guess.
+        """Return a solution from an initial guess, or from a solution from it with other margins, ``warm``.
 
         Raises
         ------
@@ -264,7 +278,7 @@ class Search(Generic[Iterate]):
         self.work.solves += 1
         try:
             solution = program.solver(
-                given.x, given.parameters, given.bounds, rows, self.deadline, self.progress, given.scaling
+                given.x, given.parameters, given.bounds, rows, self.deadline, self.progress, given.scaling, warm
             )
         except Stopped:
             raise TimeLimitError from None
@@ -272,7 +286,7 @@ class Search(Generic[Iterate]):
         # A feasible motion that is not optimal is better than none: friction and absolute powers have kinks.
         is_usable = solution.converged or (self.is_last and solution.infeasibility <= UNCONVERGED_TOLERANCE)
         if is_usable and solution.infeasibility <= FEASIBILITY_TOLERANCE:
-            self.is_converged, self.value = solution.converged, solution.cost
+            self._last = solution
             return program.iterate(solution.x)
         worst, which, interval, misses = worst_row(solution, program.blocks, rows)
         raise PlanningError(
