@@ -53,8 +53,28 @@ ROUNDING = 1e-6
 """Shortfall of a distance (m), or excess of a limit, that counts as none."""
 PATH_SPEED = 0.5
 """Share of the speed limits with which a path of OMPL is followed, as a start."""
-COUNTS = (3, 10)
-"""Smallest and largest number of obstacles."""
+
+
+@dataclass(frozen=True)
+class SceneKind:
+    """Which scenes are generated."""
+
+    robot: str
+    counts: tuple[int, int] = (3, 10)
+    """Smallest and largest number of obstacles."""
+    has_boxes: bool = True
+    """Whether half of the obstacles are boxes; else all are spheres."""
+    self_collision: bool = False
+    """Whether links keep the clearance from each other too."""
+
+    @property
+    def name(self) -> str:
+        """The robot, and what is special."""
+        return f"{self.robot}, ten spheres and itself" if self.self_collision else self.robot
+
+
+ITSELF = SceneKind("puma560", (10, 10), has_boxes=False, self_collision=True)
+KINDS = tuple(SceneKind(robot) for robot in ARMS)
 
 
 @dataclass(frozen=True)
@@ -66,23 +86,25 @@ class Scene:
     goal: Array
 
 
-def scenes(description: Description, seed: int) -> Iterator[Scene]:
+def scenes(kind: SceneKind, seed: int) -> Iterator[Scene]:
     """Yield random scenes without end."""
+    description = library_robot(kind.robot)
     rng, numbers = np.random.default_rng(seed), description.numbers
     lower, upper = np.maximum(numbers.lower, -RANGE), np.minimum(numbers.upper, RANGE)
     while True:
-        count, obstacles = int(rng.integers(COUNTS[0], COUNTS[1] + 1)), list[Obstacle]()
+        count, obstacles = int(rng.integers(kind.counts[0], kind.counts[1] + 1)), list[Obstacle]()
         while len(obstacles) < count:
             at = rng.uniform(-1, 1, 3) * description.reach
             at[2] = abs(at[2]) + 0.1
             if np.linalg.norm(at[:2]) < 0.25 * description.reach:
                 continue
-            if rng.uniform() < 0.5:
+            if kind.has_boxes and rng.uniform() < 0.5:
                 obstacles.append(Obstacle.box(rng.uniform(0.1, 0.3, 3), at))
             else:
                 obstacles.append(Obstacle.sphere(rng.uniform(0.05, 0.15), at))
         states = rng.uniform(lower, upper, (200, description.n))
-        clear = states[distance(description, states, obstacles).distance > END_CLEARANCE]
+        gaps = distance(description, states, obstacles, kind.self_collision).distance
+        clear = states[gaps > END_CLEARANCE]
         held = np.abs(gravity_torque(description, clear)) < MAX_HOLDING_SHARE * numbers.effort
         clear = clear[held.all(axis=1)]
         if len(clear) < 2:
@@ -208,7 +230,7 @@ class SceneReport:
 def compare_scenes(
     count: int = 200,
     *,
-    arms: Sequence[str] = ARMS,
+    kinds: Sequence[SceneKind] = KINDS,
     compared: int = 40,
     starts: int = 20,
     seed: int = 0,
@@ -220,8 +242,8 @@ def compare_scenes(
     ----------
     count
         Number of scenes of all arms.
-    arms
-        Robots of the library.
+    kinds
+        Kinds of scenes, taken in turn.
     compared
         Number of scenes whose motions are compared with those from other starts.
     starts
@@ -237,18 +259,18 @@ def compare_scenes(
         What was measured; when interrupted from the keyboard, what was measured until then.
     """
     tell = progress or (lambda line: None)
-    robots = [library_robot(name) for name in arms]
-    planners = [Planner(robot) for robot in robots]
-    sources = [scenes(robot, seed) for robot in robots]
-    for robot, planner in zip(robots, planners, strict=True):
-        first = next(scenes(robot, seed))
+    planners = [Planner(library_robot(kind.robot)) for kind in kinds]
+    sources = [scenes(kind, seed) for kind in kinds]
+    for kind, planner in zip(kinds, planners, strict=True):
+        first = next(scenes(kind, seed))
         planner.solve(first.start, first.goal)  # imports, and the program
     results: list[SceneResult] = []
     interrupted = False
     try:
         while len(results) < count:
-            which = len(results) % len(robots)
-            found = _scene(planners[which], next(sources[which]), starts if len(results) < compared else 0)
+            which = len(results) % len(kinds)
+            given = starts if len(results) < compared else 0
+            found = _scene(kinds[which], planners[which], next(sources[which]), given)
             if found is not None:
                 results.append(found)
                 ratio = "" if np.isinf(found.best) else f", {found.duration / found.best:.3f} of the best"
@@ -259,15 +281,20 @@ def compare_scenes(
     return SceneReport(tuple(results), starts, Machine.here(), interrupted)
 
 
-def _scene(planner: Planner, scene: Scene, starts: int) -> SceneResult | None:
+def _scene(kind: SceneKind, planner: Planner, scene: Scene, starts: int) -> SceneResult | None:
     """Return the result of one scene; None if OMPL does not solve it."""
     description = planner.description
-    sampled = SampledPaths(description, list(scene.obstacles), CLEARANCE)
+    sampled = SampledPaths(description, list(scene.obstacles), CLEARANCE, kind.self_collision)
     begin = perf_counter()
     if sampled.path(scene.start, scene.goal, PEER_SECONDS) is None:
         return None
     peer_seconds = perf_counter() - begin
-    options: dict[str, Any] = {"obstacles": scene.obstacles, "clearance": CLEARANCE, "time_limit": TIME_LIMIT}
+    options: dict[str, Any] = {
+        "obstacles": scene.obstacles,
+        "clearance": CLEARANCE,
+        "self_collision": kind.self_collision,
+        "time_limit": TIME_LIMIT,
+    }
     begin, motion, reason = perf_counter(), None, ""
     try:
         motion = planner.solve(scene.start, scene.goal, **options)
@@ -285,17 +312,17 @@ def _scene(planner: Planner, scene: Scene, starts: int) -> SceneResult | None:
             continue
     if motion is None:
         lost = (np.inf, best, -np.inf, -np.inf, reason)
-        return SceneResult(description.name, len(scene.obstacles), peer_seconds, seconds, *lost)
+        return SceneResult(kind.name, len(scene.obstacles), peer_seconds, seconds, *lost)
     if starts:
         best = min(best, motion.duration)
     return SceneResult(
-        description.name,
+        kind.name,
         len(scene.obstacles),
         peer_seconds,
         seconds,
         motion.duration,
         best,
-        *_certified(planner, motion, scene.obstacles),
+        *_certified(kind, planner, motion, scene.obstacles),
     )
 
 
@@ -312,14 +339,17 @@ def _along(description: Description, path: Array) -> Trajectory:
     return Trajectory.from_samples(description, times, q, qd)
 
 
-def _certified(planner: Planner, motion: Trajectory, obstacles: Sequence[Obstacle]) -> tuple[float, float]:
+def _certified(
+    kind: SceneKind, planner: Planner, motion: Trajectory, obstacles: Sequence[Obstacle]
+) -> tuple[float, float]:
     """Return what is missing of the clearance, m, and by what share a limit is exceeded, at 5 kHz."""
     arm = loaded(planner.description)
     t = np.append(np.arange(0.0, motion.duration, 1 / CHECK_RATE), motion.duration)
     states = States(arm, t, motion.q(t), motion.qd(t), motion.qdd(t))
     uses = Checker(arm, planner.limits).measured(states)
     over = max(float(use.max()) - 1 for limit, use in uses.items() if limit != Limit.POSITION)
-    gap = float(np.min(distance(planner.description, states.q, obstacles).distance))
+    gaps = distance(planner.description, states.q, obstacles, kind.self_collision)
+    gap = float(np.min(gaps.distance))
     return CLEARANCE - gap, over
 
 
@@ -328,12 +358,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description="Motions among obstacles in scenes that OMPL solves.")
     parser.add_argument("--scenes", type=int, default=200, help="number of scenes (default: 200)")
     parser.add_argument("--compared", type=int, default=40, help="scenes compared with other starts (default: 40)")
+    parser.add_argument("--itself", action="store_true", help="ten spheres and self-collision of the PUMA instead")
     parser.add_argument("--starts", type=int, default=20, help="number of other starts (default: 20)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--output", type=Path, default=RESULT, help="path of the results, without ending")
     chosen = parser.parse_args(arguments)
     report = compare_scenes(
         chosen.scenes,
+        kinds=(ITSELF,) if chosen.itself else KINDS,
         compared=chosen.compared,
         starts=chosen.starts,
         seed=chosen.seed,

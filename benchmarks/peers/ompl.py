@@ -23,14 +23,18 @@ class SampledPaths:
         What to avoid.
     clearance
         Distance to keep, m.
+    self_collision
+        Whether links keep it from each other too.
     """
 
-    def __init__(self, description: Description, obstacles: list[Obstacle], clearance: float) -> None:
+    def __init__(
+        self, description: Description, obstacles: list[Obstacle], clearance: float, self_collision: bool = False
+    ) -> None:
         self._base, self._geometric = import_peer("ompl.base"), import_peer("ompl.geometric")
         self._util = import_peer("ompl.util")
         self._util.setLogLevel(self._util.LOG_ERROR)
         self.description, self.obstacles, self.clearance = description, obstacles, clearance
-        self.checked = 0
+        self.self_collision, self.checked = self_collision, 0
 
     def path(self, start: Array, goal: Array, seconds: float) -> Array | None:
         """Return the configurations of a path, shape (k, n), rad and m; None if none is found within a time, s.
@@ -65,4 +69,5 @@ class SampledPaths:
     def _is_free(self, state: object) -> bool:
         self.checked += 1
         q = np.array([state[i] for i in range(self.description.n)])  # type: ignore[index]
-        return float(distance(self.description, q, self.obstacles).distance) >= self.clearance
+        found = distance(self.description, q, self.obstacles, self.self_collision)
+        return float(found.distance) >= self.clearance

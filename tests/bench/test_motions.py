@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 from benchmarks import planning as motions
 from benchmarks.planning import compare_motions, holdable_pairs
+from benchmarks.planning_cases import measure_cases
+from benchmarks.scenes import SceneKind, compare_scenes, scenes
 
 from acceptance import only_accepting
 from dhkit.bench.contenders import UnavailableError
 from dhkit.description import library_robot
 from dhkit.dynamics import gravity_torque
+from dhkit.planning import distance
 
 PUMA = library_robot("puma560")
 KEPT = 1e-4
@@ -78,3 +81,30 @@ def test_pairs_are_inside_the_limits_and_can_be_held():
     assert ((pairs >= numbers.lower) & (pairs <= numbers.upper)).all()
     assert (np.abs(gravity_torque(PUMA, pairs)) < numbers.effort).all()
     np.testing.assert_array_equal(pairs, holdable_pairs(PUMA, 20, seed=3))
+
+
+def test_hard_cases_are_measured_and_reported():
+    report = measure_cases(pairs=1, only="cobra600, jerk")
+    assert [row.case for row in report.rows] == ["cobra600, jerk", "cobra600, jerk, friction"]
+    assert all(row.met and row.found == row.motions == 1 for row in report.rows)
+    assert "none fails" in str(report) and report.json()["rows"][0]["wanted"] == "none fails"
+    assert "| cobra600, jerk |" in report.markdown()
+
+
+def test_scenes_are_the_same_again_and_their_straight_way_collides():
+    kind = SceneKind("ur5")
+    first, again = next(scenes(kind, 3)), next(scenes(kind, 3))
+    assert (first.start == again.start).all() and 3 <= len(first.obstacles) <= 10
+    arm = library_robot("ur5")
+    ends = distance(arm, np.stack([first.start, first.goal]), first.obstacles).distance
+    assert ends.min() > 0.03
+    way = first.start + np.linspace(0, 1, 200)[:, None] * (first.goal - first.start)
+    assert distance(arm, way, first.obstacles).distance.min() < 0.02
+
+
+@pytest.mark.slow
+def test_motions_in_scenes_that_ompl_solves():
+    pytest.importorskip("ompl")
+    report = compare_scenes(2, kinds=[SceneKind("ur5")], compared=1, starts=1)
+    assert all(np.isfinite(result.duration) and result.shortfall < 1e-6 > result.excess for result in report.results)
+    assert "2 of 2" in str(report)

@@ -180,7 +180,7 @@ def plan(
         return ExitStatus.NO
     if not json:
         _print(arm, motion, limits, line=line, only_time=sought.only_time, degrees=degrees)
-    caption = f"A planned motion of {motion.duration:.4g} s; its curves are under Motions, with the limits."
+    caption = _caption(motion.report)
     written = files.write(arm, motion, "planned", caption, scene)
     if json:
         ends = joint_entry(arm, "start", motion.q(0.0), degrees=degrees)
@@ -222,6 +222,19 @@ def _plan_along_line(arm: Arm, start: Array, goal: Array, between: Mapping[str, 
     T_goal = goal if goal.shape == (4, 4) else arm.fk(goal)
     path = joint_path(arm.description, tool_line(arm.fk(start), T_goal), start, options["limits"])
     return arm.plan_path(path, **around, **options)
+
+
+def _caption(report: PlanReport) -> str:
+    """Return what a page says about a motion: what it is, what it keeps, and what limits it."""
+    active = ", ".join(f"{name} ({100 * share:.0f} % of the time)" for name, share in report.active_limits()[:3])
+    sentences = [
+        f"A planned motion, least {report.objective}: {report.duration:.4g} s, certified by "
+        f"{report.certificate.reference}.",
+        f"At its limits: {active}." if active else "",
+        *(f"{note[0].upper()}{note[1:]}." for note in report.notes),
+        "The play bar below moves the arm along it; Motions plots joint values, rates and torques with their limits.",
+    ]
+    return " ".join(sentence for sentence in sentences if sentence)
 
 
 def _print(arm: Arm, motion: Trajectory, limits: Limits, *, line: bool, only_time: bool, degrees: bool) -> None:

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -81,6 +82,16 @@ class CollisionAvoidance:
         """Names of the obstacles, as text."""
         counted = Counter([item.name for item in self.obstacles] + ["itself"] * self.self_collision)
         return ", ".join(name if count == 1 else f"{count} x {name}" for name, count in counted.items())
+
+    def report(self, arm: Description, excess: float) -> dict[str, Any]:
+        """Return the fields of a :class:`dhkit.planning.PlanReport`; ``excess`` is the certificate's, of the reach."""
+        if not self:
+            return {}
+        return {
+            "clearance": self.clearance,
+            "spare_clearance": -excess * Clearance.unit(arm),
+            "reduced_clearances": tuple(str(reduced) for reduced in self.reduced),
+        }
 
     def between(self, description: Description, start: Array, goal: Array) -> CollisionAvoidance:
         """Return the settings for a motion between two configurations (n,), with the reduced clearances of its ends."""

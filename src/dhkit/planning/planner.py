@@ -27,6 +27,7 @@ from dhkit.planning.feasibility import (
 )
 from dhkit.planning.goals import Route, find_routes, parse_places
 from dhkit.planning.guess import leg_durations
+from dhkit.planning.joint_limits import Limit
 from dhkit.planning.many import ManyProgress, solve_many
 from dhkit.planning.mesh import MIN_LEG_INTERVALS, Curve, Mesh
 from dhkit.planning.motion_program import MAX_SMALL_JOINTS, MotionProgram, curves_for
@@ -235,8 +236,8 @@ class Planner:
             branches=branches,
             unlimited=request.limits.unlimited,
             is_resolved=best.is_resolved,
-            reduced_clearances=tuple(str(reduced) for reduced in task.avoidance.reduced),
             is_converged=best.is_converged,
+            **task.avoidance.report(self.description, best.certificate.excess_of(Limit.CLEARANCE)),
         )
         if compare and best.is_resolved:
             report = replace(report, classical=classical_durations(task), coarse=self._coarse(task, best, deadline))

@@ -61,10 +61,12 @@ class PlanReport:
     """Kinds of limits that the motion was planned without, such as ``acceleration``: these quantities may jump."""
     is_resolved: bool = True
     """Whether the motion was optimized; a move below 1e-10 rad or m is a quintic that keeps the limits."""
-
     is_converged: bool = True
     """Whether the motion is optimal to the solver's tolerance; with friction or energy it may be only feasible."""
-
+    clearance: float | None = None
+    """Distance that was asked for from obstacles, m; None without obstacles."""
+    spare_clearance: float = 0.0
+    """Smallest distance beyond that, m."""
     reduced_clearances: tuple[str, ...] = ()
     """Distances at the start or the goal that are below the clearance, which is reduced to them there."""
 
@@ -77,6 +79,9 @@ class PlanReport:
     def notes(self) -> list[str]:
         """What a reader of the motion has to know besides, a sentence each."""
         notes = []
+        if self.clearance is not None:
+            asked, spare = 1000 * self.clearance, 1000 * max(self.spare_clearance, 0.0)
+            notes.append(f"clearance: {asked:.3g} mm kept from obstacles, and at least {spare:.3g} mm more")
         if self.reduced_clearances:
             notes.append(f"clearance reduced near the ends: {', '.join(self.reduced_clearances)}")
         if not self.is_converged:
@@ -148,6 +153,8 @@ class PlanReport:
             "active": [{"limit": name, "share": share} for name, share in self.active_limits()],
             "any_active": certificate.any_active,
             "unlimited": list(self.unlimited),
+            "clearance_m": self.clearance,
+            "spare_clearance_m": None if self.clearance is None else self.spare_clearance,
             "reduced_clearances": list(self.reduced_clearances),
             "resolved": self.is_resolved,
             "converged": self.is_converged,

@@ -138,6 +138,13 @@ def draw_legend(figure: Figure, description: Description, others: tuple[Any, ...
     )
 
 
+def limit_handle() -> Any:
+    """Return a legend's handle for the dashed lines of limits."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], color=SHARED_COLOR, label="limit", **LIMIT_STYLE)
+
+
 def joint_color(i: int) -> str:
     """Return the colour of a joint, counted from 0."""
     return CURVE_COLORS[i % len(CURVE_COLORS)]

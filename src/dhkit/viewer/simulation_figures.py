@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from dhkit.control import Comparison, SimulationResult
 from dhkit.description import Array, Description
 from dhkit.viewer.diagrams import (
-    LIMIT_STYLE,
     LINE_STYLES,
     SHARED_COLOR,
     Diagram,
@@ -22,6 +21,7 @@ from dhkit.viewer.diagrams import (
     joint_color,
     joint_kinds,
     joint_style,
+    limit_handle,
     style_axes,
     torque_diagram,
 )
@@ -269,7 +269,7 @@ def _legend_handles(saturated: bool) -> tuple[Any, ...]:
     from matplotlib.lines import Line2D
 
     reference = Line2D([], [], color="#000000", label="reference", **REFERENCE_STYLE)
-    limit = Line2D([], [], color=SHARED_COLOR, label="limit", **LIMIT_STYLE)
+    limit = limit_handle()
     if not saturated:
         return (reference, limit)
     return (reference, limit, Line2D([], [], color=SHARED_COLOR, lw=SATURATED_STYLE["lw"], label="saturated"))

@@ -16,6 +16,7 @@ from dhkit.viewer.diagrams import (
     draw_diagram,
     draw_legend,
     joint_kinds,
+    limit_handle,
     percent_diagram,
     torque_diagram,
 )
@@ -61,8 +62,10 @@ def plot_trajectory(trajectory: Trajectory) -> Figure:
         axes.tick_params(labelbottom=row == len(diagrams) - 1)
         axes.set_xlim(0.0, trajectory.duration)
     axes.set_xlabel("time [s]")
-    draw_legend(figure, description)
-    draw_path(space_axes(figure, grid[:, 1]), description, samples.q)
+    draw_legend(figure, description, (limit_handle(),))
+    axes = space_axes(figure, grid[:, 1])
+    axes.set_title("the arm at both ends, and its tool's path [m]", fontsize=10, color=SHARED_COLOR)
+    draw_path(axes, description, samples.q)
     return figure
 
 
@@ -111,7 +114,7 @@ def plot_uses(motions: Mapping[str, Trajectory]) -> Figure:
     grid[0, 0].set_ylim(-MAX_PERCENT, MAX_PERCENT)
     for axes in grid[-1]:
         axes.set_xlabel("time [s]")
-    draw_legend(figure, description)
+    draw_legend(figure, description, (limit_handle(),))
     return figure
 
 

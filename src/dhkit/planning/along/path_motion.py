@@ -22,6 +22,7 @@ from dhkit.planning.along.timing import TimingProgram
 from dhkit.planning.certificate import Checker
 from dhkit.planning.collision_avoidance import CollisionAvoidance
 from dhkit.planning.constraints import Constraint
+from dhkit.planning.joint_limits import Limit
 from dhkit.planning.loaded import loaded
 from dhkit.planning.objectives import Objective, ObjectiveLike
 from dhkit.planning.obstacles import Scene
@@ -165,7 +166,7 @@ def along_path(
         tightened=found.tightened,
         unlimited=limits.unlimited,
         is_converged=found.is_converged,
-        reduced_clearances=tuple(str(reduced) for reduced in avoidance.reduced),
+        **avoidance.report(description, found.certificate.excess_of(Limit.CLEARANCE)),
     )
     return replace(found.trajectory, description=description, report=report, payload=payload, friction=chosen)
 
