@@ -7,7 +7,6 @@ look.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -15,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.command import publish, tell
 from benchmarks.peers.aba_loop import AbaLoop, default_swing
 from benchmarks.peers.fdyn import Fdyn, own_puma_accelerations
 from benchmarks.simulation_report import BatchRow, IntegrationRow, ModelCheck, SimulationReport, SingleRow, Timing
@@ -23,7 +23,6 @@ from dhkit.bench.contenders import Call, UnavailableError
 from dhkit.bench.machine import Machine
 from dhkit.bench.report import Missing, Requirement
 from dhkit.bench.rounds import calm, lasting, repeated, rounds
-from dhkit.cli.bench import write
 from dhkit.control import ComputedTorque, PDGravity, SimulationResult, Sine
 from dhkit.description import Array
 from dhkit.dynamics import kinetic_energy, potential_energy
@@ -377,11 +376,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         Arm.load(chosen.robot),
         SimulationSizes(single=chosen.single, arms=chosen.arms, repeats=chosen.repeats),
         seed=chosen.seed,
-        progress=lambda line: print(line, file=sys.stderr, flush=True),
+        progress=tell,
     )
-    for path in write(report, chosen.output):
-        print(f"wrote {path}", file=sys.stderr)
-    print(report)
+    publish(report, chosen.output)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import gc
 import os
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,13 +17,13 @@ from typing import Protocol
 
 import numpy as np
 
+from benchmarks.command import publish, tell
 from benchmarks.motion_report import MeshBuild, MotionReport, MotionRow
 from benchmarks.peers.toppra import StraightTiming
 from dhkit.bench.contenders import UnavailableError
 from dhkit.bench.machine import Machine
 from dhkit.bench.report import Missing
 from dhkit.bench.rounds import calm
-from dhkit.cli.bench import write
 from dhkit.description import Array, Description, library_robot
 from dhkit.dynamics import gravity_torque
 from dhkit.errors import PlanningError
@@ -284,11 +283,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         library_robot(chosen.robot),
         chosen.pairs,
         seed=chosen.seed,
-        progress=lambda line: print(line, file=sys.stderr, flush=True),
+        progress=tell,
     )
-    for path in write(report, chosen.output):
-        print(f"wrote {path}", file=sys.stderr)
-    print(report)
+    publish(report, chosen.output)
 
 
 if __name__ == "__main__":

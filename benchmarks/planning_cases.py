@@ -18,11 +18,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from benchmarks.command import publish, tell
 from benchmarks.planning import holdable_pairs
 from dhkit.bench.machine import Machine
 from dhkit.bench.report import Table, duration, report_html, report_markdown, report_text, with_lists
 from dhkit.bench.rounds import calm
-from dhkit.cli.bench import write
 from dhkit.description import Payload, library_robot
 from dhkit.description.frames import world_to_tool
 from dhkit.display import html_table, repr_line
@@ -301,11 +301,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         chosen.pairs,
         only=chosen.only,
         seed=chosen.seed,
-        progress=lambda line: print(line, file=sys.stderr, flush=True),
+        progress=tell,
     )
-    for path in write(report, chosen.output):
-        print(f"wrote {path}", file=sys.stderr)
-    print(report)
+    publish(report, chosen.output)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ motion is certified at 5 kHz, and compared with the best of motions that start f
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -16,10 +15,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from benchmarks.command import publish, tell
 from benchmarks.peers.ompl import SampledPaths
 from dhkit.bench.machine import Machine
 from dhkit.bench.report import Table, duration, report_html, report_markdown, report_text, with_lists
-from dhkit.cli.bench import write
 from dhkit.description import Array, Description, library_robot
 from dhkit.display import html_table, repr_line
 from dhkit.dynamics import gravity_torque
@@ -369,11 +368,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         compared=chosen.compared,
         starts=chosen.starts,
         seed=chosen.seed,
-        progress=lambda line: print(line, file=sys.stderr, flush=True),
+        progress=tell,
     )
-    for path in write(report, chosen.output):
-        print(f"wrote {path}", file=sys.stderr)
-    print(report)
+    publish(report, chosen.output)
 
 
 if __name__ == "__main__":

@@ -29,10 +29,21 @@ class Term:
 
     has_integrand: ClassVar[bool] = False
     """Whether the term is the integral of a function of the state; such functions depend on torques."""
+    is_time: ClassVar[bool] = False
+    """Whether the term is the duration."""
+    is_jerk: ClassVar[bool] = False
+    """Whether the term is the integral of the squared jerks."""
+    is_flat: ClassVar[bool] = False
+    """Whether motions of equal cost may differ, so that accelerations have to be smoothed."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.weight, Real) or not math.isfinite(self.weight) or self.weight <= 0:
             raise ValueError(f"{type(self).__name__}: weight is {self.weight!r}; expected a positive number")
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether torques of optimal motions do not jump where no limit is reached."""
+        return True
 
     def integrand(self, point: Point) -> casadi.SX:
         """Return the integrand over time, 1 x 1, unit of the term over s, of terms that have one."""
@@ -54,6 +65,13 @@ class Term:
 @dataclass(frozen=True)
 class Time(Term):
     """The duration, s."""
+
+    is_time = True
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether torques do not jump: they do."""
+        return False
 
     def measured(self, states: States) -> Array:
         """Return ones, shape (N,)."""
@@ -93,6 +111,8 @@ class Effort(Term):
 class Jerk(Term):
     """The integral of the squared jerks, rad^2/s^5 or m^2/s^5; such motions begin and end with zero acceleration."""
 
+    is_jerk = True
+
     def measured(self, states: States) -> Array:
         """Return the sum of the squared jerks, shape (N,)."""
         squares: Array = np.sum(states.jerk**2, axis=1)
@@ -111,11 +131,17 @@ class Energy(Term):
     """Motor constants k, N m per square root of W: one for all joints or one for each; empty for no losses."""
     regenerates: bool = False
     """Whether the drives feed the power of braking back."""
+    is_flat = True
     has_integrand = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "motor_constants", _numbers("Energy", "motor constants", self.motor_constants))
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether torques do not jump: losses in the windings prevent it."""
+        return bool(self.motor_constants)
 
     @property
     def constants(self) -> tuple[float, ...]:
@@ -211,29 +237,27 @@ class Objective:
     @property
     def has_time(self) -> bool:
         """Whether the duration is a term; otherwise it must be given."""
-        return any(isinstance(term, Time) for term in self.terms)
+        return any(term.is_time for term in self.terms)
 
     @property
     def has_jerk(self) -> bool:
         """Whether the jerk is a term."""
-        return any(isinstance(term, Jerk) for term in self.terms)
+        return any(term.is_jerk for term in self.terms)
 
     @property
     def only_time(self) -> bool:
         """Whether the duration is the only term."""
-        return all(isinstance(term, Time) for term in self.terms)
+        return all(term.is_time for term in self.terms)
 
     @property
     def needs_smoothing(self) -> bool:
         """Whether the optimum may not be unique, because joints have spare time or power is regenerated."""
-        return self.only_time or any(isinstance(term, Energy) for term in self.terms)
+        return self.only_time or any(term.is_flat for term in self.terms)
 
     @property
     def is_smooth(self) -> bool:
         """Whether torques of optimal motions do not jump where no limit is reached."""
-        return all(
-            isinstance(term, Effort | Jerk) or (isinstance(term, Energy) and term.constants) for term in self.terms
-        )
+        return all(term.is_smooth for term in self.terms)
 
     @property
     def has_integral(self) -> bool:
@@ -243,12 +267,12 @@ class Objective:
     @property
     def time_weight(self) -> float:
         """Weight of the duration."""
-        return sum(term.weight for term in self.terms if isinstance(term, Time))
+        return sum(term.weight for term in self.terms if term.is_time)
 
     @property
     def jerk_weight(self) -> float:
         """Weight of the squared jerks."""
-        return sum(term.weight for term in self.terms if isinstance(term, Jerk))
+        return sum(term.weight for term in self.terms if term.is_jerk)
 
     def integrand(self, point: Point) -> casadi.SX:
         """Return the sum of the integrands that are functions of the state, 1 x 1."""

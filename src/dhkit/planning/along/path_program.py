@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol, Self, TypeVar, cast
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.planning.along.path_point import PathPoint
 from dhkit.planning.along.path_states import PathStates
-from dhkit.planning.blocks import Indices, Rows
+from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows
 from dhkit.planning.costs import size_of
 from dhkit.planning.joint_limits import Limit
 from dhkit.planning.program import Program, limit_rows
@@ -98,6 +99,41 @@ class PathProgram(Program[Profile]):
         inputs = [point.sdd, point.b, point.speed, point.path, *given]
         results = [rows, self.task.objective.integrand(point)]
         return casadi.Function("at_state", inputs, results, {"cse": True}), [kind for kind, _ in limits]
+
+    def program(
+        self, interval: Callable[..., tuple[LocalFunction, tuple[Rows, ...]]], inner: Indices, variables: int
+    ) -> BlockProgram:
+        """Return the program of the intervals, and of the duration as its last row.
+
+        Parameters
+        ----------
+        interval
+            Returns the rows and the cost of an interval, with ``first=True`` or ``last=True`` of one at an end. Its
+            variables are its duration, and those of its knots that are inside the path.
+        inner
+            Indices of the variables at the inner knots, shape (k, K-1); those of the durations come before them.
+        variables
+            Number of variables.
+        """
+        import casadi
+
+        K = self.intervals
+        step = np.arange(K)
+        each, total = np.stack([step, step], axis=1), casadi.SX.sym("total", K)
+        of_first, of_last = np.vstack([step[None, :1], inner[:, :1]]), np.vstack([step[None, -1:], inner[:, -1:]])
+        between = np.vstack([step[None, 1:-1], inner[:, :-1], inner[:, 1:]])
+        blocks = [
+            Block(function, indices, self.parameters_at[:, part], rows, each[part])
+            for (function, rows), indices, part in (
+                (interval(first=True), of_first, slice(None, 1)),
+                (interval(), between, slice(1, -1)),
+                (interval(last=True), of_last, slice(-1, None)),
+            )
+        ]
+        duration = LocalFunction(total, casadi.SX(0, 1), casadi.sum1(total))
+        kinds = (Rows(RowKind.DURATION, "duration", 1),)
+        blocks.append(Block(duration, step[:, None], np.zeros((0, 1), dtype=int), kinds))
+        return BlockProgram(variables, self.parameter_count, tuple(blocks))
 
     def parameters(self, task: Task, guess: Profile) -> Array:
         """Return the parameters, shape (parameters,); the guess's cost is the unit of the cost."""

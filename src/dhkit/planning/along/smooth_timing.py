@@ -12,7 +12,7 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.planning.along.path_program import PathProgram
 from dhkit.planning.assembly import corrected
-from dhkit.planning.blocks import Block, BlockProgram, LocalFunction, RowKind, Rows
+from dhkit.planning.blocks import LocalFunction, RowKind, Rows
 from dhkit.planning.joint_limits import Limit
 from dhkit.planning.mesh import Curve
 from dhkit.planning.program import Arguments, Starts
@@ -70,28 +70,10 @@ class SmoothTimingProgram(PathProgram[SmoothProfile]):
     """
 
     def __init__(self, task: Task, s: Array) -> None:
-        import casadi
-
         super().__init__(task, s)
         K = self.intervals
-        step = np.arange(K)
         self._sd, self._sdd = K + np.arange(K - 1), 2 * K - 1 + np.arange(K - 1)
-        each, inner = np.stack([step, step], axis=1), np.stack([self._sd, self._sdd])
-        middle = np.vstack([step[None, 1:-1], inner[:, :-1], inner[:, 1:]])
-        first, last = np.vstack([step[None, :1], inner[:, :1]]), np.vstack([step[None, -1:], inner[:, -1:]])
-        blocks = [
-            Block(function, variables, self.parameters_at[:, part], rows, each[part])
-            for (function, rows), variables, part in (
-                (self._interval(first=True), first, slice(None, 1)),
-                (self._interval(), middle, slice(1, -1)),
-                (self._interval(last=True), last, slice(-1, None)),
-            )
-        ]
-        total = casadi.SX.sym("total", K)
-        duration = LocalFunction(total, casadi.SX(0, 1), casadi.sum1(total))
-        kinds = (Rows(RowKind.DURATION, "duration", 1),)
-        blocks.append(Block(duration, step[:, None], np.zeros((0, 1), dtype=int), kinds))
-        self.blocks = BlockProgram(3 * K - 2, self.parameter_count, tuple(blocks))
+        self.blocks = self.program(self._interval, np.stack([self._sd, self._sdd]), 3 * K - 2)
         self.solver = Solver(self.blocks, K, tolerance=TOLERANCE)
 
     def _interval(self, *, first: bool = False, last: bool = False) -> tuple[LocalFunction, tuple[Rows, ...]]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.planning.along.path_program import PathProgram
-from dhkit.planning.blocks import Block, BlockProgram, LocalFunction, RowKind, Rows
+from dhkit.planning.blocks import LocalFunction, RowKind, Rows
 from dhkit.planning.joint_limits import Limit
 from dhkit.planning.program import Arguments, Starts
 from dhkit.planning.solver import Solver
@@ -69,28 +69,10 @@ class TimingProgram(PathProgram[Profile]):
     """
 
     def __init__(self, task: Task, s: Array) -> None:
-        import casadi
-
         super().__init__(task, s)
         self._logarithmic = not task.objective.only_time
-        K, parameters = self.intervals, self.parameters_at
-        step = np.arange(K)
-        durations, inner = step[None], K + step[None, :-1]
-        total, each = casadi.SX.sym("total", K), np.stack([step, step], axis=1)
-        middle = np.vstack([durations[:, 1:-1], inner[:, :-1], inner[:, 1:]])
-        first, last = np.vstack([durations[:, :1], inner[:, :1]]), np.vstack([durations[:, -1:], inner[:, -1:]])
-        blocks = [
-            Block(function, variables, parameters[:, part], rows, each[part])
-            for (function, rows), variables, part in (
-                (self._interval(first=True), first, slice(None, 1)),
-                (self._interval(), middle, slice(1, -1)),
-                (self._interval(last=True), last, slice(-1, None)),
-            )
-        ]
-        duration = LocalFunction(total, casadi.SX(0, 1), casadi.sum1(total))
-        kinds = (Rows(RowKind.DURATION, "duration", 1),)
-        blocks.append(Block(duration, durations.T, np.zeros((0, 1), dtype=int), kinds))
-        self.blocks = BlockProgram(2 * K - 1, self.parameter_count, tuple(blocks))
+        K = self.intervals
+        self.blocks = self.program(self._interval, K + np.arange(K - 1)[None], 2 * K - 1)
         tolerance = TIME_TOLERANCE if task.objective.has_time else SMOOTH_TOLERANCE
         self.solver = Solver(self.blocks, K, tolerance=tolerance)
 
