@@ -50,8 +50,11 @@ PATHS, MAX_PATHS = 4, 24
 """Number of sampled paths that are improved, and of paths that are tried if none of them leads to a motion."""
 MAX_LENGTH_RATIO = 1.5
 """Largest length of a path that is improved, relative to the shortest one."""
-PATH_CLEARANCE = 5e-3
-"""Distance (m) that sampled paths keep beyond the clearance, where their ends do."""
+PATH_CLEARANCES = (5e-3, 1e-3)
+"""Distances (m) that sampled paths keep beyond the clearance, where their ends do, in turns: narrow ways are closed to
+the first."""
+FIRST_SAMPLES, MAX_SAMPLES = 500, 4000
+"""Number of samples of the first paths, which doubles whenever both distances have been tried, and the largest one."""
 LIKE_POINTS = 16
 """Number of points at which a path is compared with a motion, and of states between them."""
 PATH_SPEED = 0.6
@@ -189,14 +192,18 @@ class AvoidingSearch:
         ends = self.separation.gaps(task.points[:, None]).gap
         reduced = task.avoidance.at_ends(self.separation.pairs).min(axis=1)
         at_ends = np.minimum(ends.min(axis=0) - ROUNDING, reduced)
-        need = np.minimum(self.clearance + PATH_CLEARANCE, at_ends)
+        turn, which = divmod(seed, len(PATH_CLEARANCES))
+        need = np.minimum(self.clearance + PATH_CLEARANCES[which], at_ends)
+        samples = min(FIRST_SAMPLES * 2**turn, MAX_SAMPLES)
         most = float(need.max(initial=0.0))
 
         def is_free(q: Array) -> NDArray[np.bool_]:
             free: NDArray[np.bool_] = np.all(self.separation.gaps(q[:, None], most).gap >= need, axis=1)
             return free
 
-        sampler = PathSampler(is_free, lower, upper, self._speed / self._speed.mean(), seed, self.search.deadline)
+        sampler = PathSampler(
+            is_free, lower, upper, self._speed / self._speed.mean(), seed, self.search.deadline, samples
+        )
         path = []
         for start, goal in zip(task.points[:-1], task.points[1:], strict=True):
             leg = sampler.path(start, goal)

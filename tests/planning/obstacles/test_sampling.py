@@ -44,9 +44,8 @@ def test_a_free_way_is_straight():
     assert sampler().path(np.array([-0.8, 0.9]), np.array([0.8, 0.9])).shape == (2, 2)
 
 
-def test_where_there_is_no_path_it_ends(monkeypatch):
-    monkeypatch.setattr("dhkit.planning.obstacles.sampling.MAX_SAMPLES", 200)
-    closed = sampler(is_free=lambda q: np.abs(q[:, 0]) > 0.1)
+def test_where_there_is_no_path_it_ends():
+    closed = sampler(is_free=lambda q: np.abs(q[:, 0]) > 0.1, samples=200)
     assert closed.path(np.array([-0.8, 0.0]), np.array([0.8, 0.0])) is None
 
 

@@ -17,8 +17,6 @@ REACH = 1.0
 """Largest step towards a sample, as a share of the mean range of a joint."""
 RESOLUTION = 0.05
 """Largest change of a joint (rad or m) between two checked states of a path."""
-MAX_SAMPLES = 4000
-"""Largest number of samples before the search gives up."""
 SHORTCUTS = 60
 """Number of shortcuts that are tried."""
 
@@ -41,13 +39,22 @@ class PathSampler:
         Seed of the samples: other seeds find other paths.
     deadline
         Time at which to give up, on the clock of ``time.perf_counter``, s.
+    samples
+        Largest number of samples before the search gives up.
     """
 
     def __init__(
-        self, is_free: IsFree, lower: Array, upper: Array, scale: Array, seed: int, deadline: float = np.inf
+        self,
+        is_free: IsFree,
+        lower: Array,
+        upper: Array,
+        scale: Array,
+        seed: int,
+        deadline: float = np.inf,
+        samples: int = 4000,
     ) -> None:
         self.is_free, self.lower, self.upper, self.scale = is_free, lower, upper, scale
-        self.rng, self.deadline = np.random.default_rng(seed), deadline
+        self.rng, self.deadline, self.samples = np.random.default_rng(seed), deadline, samples
         self._step = REACH * float(np.mean((upper - lower) / scale))
 
     def path(self, start: Array, goal: Array) -> Array | None:
@@ -55,7 +62,7 @@ class PathSampler:
         if self.is_way_free(start, goal):
             return np.stack([start, goal])
         trees = _Tree(start, self.scale), _Tree(goal, self.scale)
-        for turn in range(MAX_SAMPLES):
+        for turn in range(self.samples):
             if time.perf_counter() > self.deadline:
                 return None
             grown, other = trees[turn % 2], trees[1 - turn % 2]
