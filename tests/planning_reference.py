@@ -63,6 +63,12 @@ def slide():
     return from_toml(SLIDE)
 
 
+def two_slides():
+    """Return two slides at right angles without gravity, 1 kg on each."""
+    link = SLIDE.split("[[joint]]")[1].strip()
+    return from_toml(SLIDE.replace("alpha = 0", 'alpha = "pi/2"') + "\n[[joint]]\n" + link)
+
+
 def pendulum():
     return from_toml(PENDULUM)
 

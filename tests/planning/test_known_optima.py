@@ -7,7 +7,7 @@ from dhkit.planning import Effort, Energy, Jerk, Planner, Time
 from dhkit.planning.costs import cost_of, size_of
 from dhkit.planning.objectives import Objective
 from dhkit.trajectories import Limits, cubic, quintic, trapezoidal
-from planning_reference import luus, pendulum, slide
+from planning_reference import luus, pendulum, slide, two_slides
 
 ODD = 161
 """Intervals whose knots are nowhere near the switches."""
@@ -108,3 +108,16 @@ def test_time_and_effort_together():
     w, d = 0.2, 0.7
     motion = Planner(slide(), Time() + w * Effort()).solve([0], [d])
     assert relative(motion.duration, (36 * w * d**2) ** 0.25) < 1e-3
+
+
+def test_weights_of_effort_choose_between_joints(law):
+    # Slides at right angles, 2 kg on the first and 1 kg on the second: each has its own cubic.
+    arm = two_slides()
+    limits = Limits.of(arm)
+    motion = Planner(arm, Effort(joint_weights=(3.0, 0.5)), limits).solve([0, 0], [0.7, 0.4], duration=1.3)
+    least = (3.0 * (2 * 0.7) ** 2 + 0.5 * 0.4**2) * 12 / 1.3**3
+    law.holds("weighed effort", relative(motion.report.cost, least), 1e-6)
+    with pytest.raises(ValueError, match="Effort: 3 joint weights; expected 1 or 2"):
+        Planner(arm, Effort(joint_weights=(1.0, 2.0, 3.0)), limits).solve([0, 0], [0.7, 0.4], duration=1.3)
+    with pytest.raises(TypeError, match="joint weights are 'abc'"):
+        Effort(joint_weights="abc")

@@ -104,7 +104,9 @@ class Effort(Term):
         squares: Array = states.tau**2 @ self._weights(states.n)
         return squares
 
-    __repr__ = value_line
+    def __repr__(self) -> str:
+        weights = f", joint_weights={self.joint_weights}" if self.joint_weights else ""
+        return f"Effort(weight={self.weight}{weights})"
 
 
 @dataclass(frozen=True)
@@ -186,6 +188,8 @@ class Energy(Term):
 
 def _numbers(name: str, what: str, given: float | tuple[float, ...]) -> tuple[float, ...]:
     """Return positive numbers as a tuple, empty if none are given."""
+    if isinstance(given, str):
+        raise TypeError(f"{name}: {what} are {given!r}; expected positive numbers")
     numbers = (float(given),) if isinstance(given, float | int) else tuple(float(k) for k in given)
     if any(not math.isfinite(k) or k <= 0 for k in numbers):
         raise ValueError(f"{name}: {what} are {numbers}; expected positive numbers")
