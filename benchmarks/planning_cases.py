@@ -27,7 +27,7 @@ from dhkit.description import Payload, library_robot
 from dhkit.description.frames import world_to_tool
 from dhkit.display import html_table, repr_line
 from dhkit.errors import PlanningError
-from dhkit.planning import Floor, Obstacle, Planner
+from dhkit.planning import Effort, Floor, Obstacle, Planner
 from dhkit.trajectories import Limits, Trajectory
 
 RESULT = Path(__file__).parent / "results" / "planning_cases"
@@ -37,6 +37,10 @@ TIME_LIMIT = 30.0
 """Time limit of a motion, s."""
 NEAR_LEAST = 1.03
 """Duration of smooth motions over the least one."""
+PUBLISHED_ENERGY = 20.4044
+"""Least integral of the squared voltages of the Manutec r3's motion of 0.53 s, V^2 s (von Stryk & Schlemmer 1994)."""
+VOLTAGE = 1 / np.array([126.0, 252.0, 72.0])
+"""V per N m of the Manutec r3's drives."""
 FIRST_MOTION = """
 from dhkit import Arm
 motion = Arm.load("puma560").plan([0, 0.8, -1.0, 0, 0.5, 0], [1.2, 0.3, -0.8, 0.5, -0.6, {last}])
@@ -187,6 +191,7 @@ def _cases(pairs: int, seed: int) -> Iterator[tuple[str, str, float, Iterator[Ca
     yield "box, table and payload, ur5, again", "1.5 s", 1.5, _beside_table(is_first=False)
     for objective in OBJECTIVES[1:]:
         yield f"planar2r, {objective} at 1.03 times the least time", "none fails", np.inf, _near_least(objective)
+    yield "manutec_r3, energy at 0.53 s, 24 to 81 intervals", "within 0.1 % of the published", np.inf, _manutec()
     yield "planar2r, moves of 1e-9 to 1e-2 rad", "0.2 s", 0.2, _small_moves()
     yield "panda, three times its speeds", "0.5 s", 0.5, _fast_panda(seed)
     yield "panda, goal a pose, first motion", "1 s", 1.0, _pose_goals(seed)
@@ -242,6 +247,20 @@ def _near_least(objective: str) -> Iterator[Case]:
     for start, goal in holdable_pairs(arm, 20, 1):
         least = quick.solve(start, goal).duration
         yield lambda a=start, b=goal, t=NEAR_LEAST * least: planner.solve(a, b, duration=t)  # type: ignore[misc]
+
+
+def _manutec() -> Iterator[Case]:
+    arm = library_robot("manutec_r3")
+    start, goal = (arm.numbers.configurations[name] for name in ("start", "goal"))
+
+    def solve(intervals: int) -> Trajectory:
+        motion = Planner(arm, Effort(joint_weights=VOLTAGE**2), intervals=intervals).solve(start, goal, duration=0.53)
+        if abs(motion.report.cost / PUBLISHED_ENERGY - 1) > 1e-3:
+            raise PlanningError(f"{intervals} intervals: {motion.report.cost:.5g} V^2 s")
+        return motion
+
+    for intervals in range(24, 84, 3):
+        yield lambda intervals=intervals: solve(intervals)  # type: ignore[misc]
 
 
 def _small_moves() -> Iterator[Case]:

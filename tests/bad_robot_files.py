@@ -101,6 +101,33 @@ BAD = {
     "zero effort": (GOOD + "effort = 0", "effort is 0; expected a positive"),
     "gear zero": (GOOD + "drive = { gear = 0 }", "drive.gear is 0"),
     "negative rotor": (GOOD + "drive = { rotor_inertia = -1 }", "drive.rotor_inertia is -1"),
+    "coupling of one joint": (
+        GOOD + "[[coupling]]\njoints = [1]\ninertia = 1",
+        r"coupling\[0\].joints: found 1 entries",
+    ),
+    "coupling of no joint": (
+        GOOD + "[[coupling]]\njoints = [1, 2]\ninertia = 1",
+        r"coupling\[0\]: joints \[1, 2\]; expected two joints of 1 to 1",
+    ),
+    "coupling of a joint with itself": (
+        GOOD + "[[coupling]]\njoints = [1, 1]\ninertia = 1",
+        r"coupling\[0\]: joints \[1, 1\]; expected two joints",
+    ),
+    "coupling by name": (
+        GOOD + "[[coupling]]\njoints = ['elbow', 1]\ninertia = 1",
+        r"coupling\[0\].joints\[0\]: found 'elbow'; expected .*integer",
+    ),
+    "coupling without inertia": (GOOD + "[[coupling]]\njoints = [1, 2]", r"coupling\[0\]: key 'inertia' is missing"),
+    "coupling with an unknown name": (
+        GOOD + "[[coupling]]\njoints = [1, 2]\ninertia = 'J'",
+        r"coupling\[0\].inertia: unknown name 'J'",
+    ),
+    "coupling twice": (
+        changed("elbow", "wrist")
+        + changed("elbow", "elbow", JOINT)
+        + "[[coupling]]\njoints = [1, 2]\ninertia = 1\n[[coupling]]\njoints = [2, 1]\ninertia = 1",
+        r"coupling\[1\]: joints 1 and 2 have a coupling already",
+    ),
     "coulomb signs": (GOOD + "drive = { coulomb = [-1, 1] }", r"drive.coulomb is \[-1, 1\]"),
     "unknown unit": (
         changed("format = 1", "format = 1\nunits = { length = 'ft' }"),

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pinocchio as pin
 from hypothesis import strategies as st
 
 from acceptance import ACCEPTING
+from dhkit.description import Coupling
 from dhkit.expressions import exact
 from dhkit.model import pinocchio_model
 from dhkit.verification import random_states
@@ -22,10 +24,21 @@ ARMS = 1000 if ACCEPTING else 20
 
 @st.composite
 def tilted_arms(draw, least=3, most=7):
-    """Draw an arm with bodies and drives in a field of gravity of any direction."""
-    arm = draw(arms(least, most))
+    """Draw an arm with bodies and drives, some of which two joints turn, in a field of gravity of any direction."""
+    arm = coupled(draw, draw(arms(least, most)))
     gravity = tuple(exact(round(draw(st.floats(-10, 10)), 3)) for _ in range(3))
     return replace(arm, gravity=gravity)
+
+
+def coupled(draw, arm):
+    """Return an arm with couplings of drives of any sign, below what rotors can have."""
+    couplings = []
+    for i, j in combinations(range(arm.n), 2):
+        most = float(np.sqrt(arm.numbers.armature[i] * arm.numbers.armature[j])) / arm.n
+        share = draw(st.sampled_from([0.0, 0.0, -0.9, 0.5]))
+        if share * most:
+            couplings.append(Coupling((i + 1, j + 1), exact(share * most)))
+    return replace(arm, couplings=tuple(couplings))
 
 
 def motions(arm, count, seed=0):
@@ -47,16 +60,22 @@ def reference(arm, q, qd, x):
     def each(function, *arrays):
         return np.array([np.array(function(model, data, *rows)) for rows in zip(*arrays, strict=True)])
 
+    # Pinocchio knows no couplings: B is written down from the description's own list.
+    B = np.zeros((n, n))
+    for coupling in arm.couplings:
+        i, j = (number - 1 for number in coupling.joints)
+        B[i, j] = B[j, i] = float(coupling.inertia)
+    M, bias = np.array([mass_matrix(state) + B for state in q]), each(pin.nonLinearEffects, q, qd)
     C = each(lambda m, d, *s: np.reshape(pin.computeCoriolisMatrix(m, d, *s), (n, n)), q, qd)
     return {
-        "M": np.array([mass_matrix(state) for state in q]),
+        "M": M,
         "C": C,
         "g": each(pin.computeGeneralizedGravity, q),
         "h": np.einsum("kij,kj->ki", C, qd),  # the bias less g would have lost digits
-        "bias": each(pin.nonLinearEffects, q, qd),
-        "tau": each(pin.rnea, q, qd, x),
-        "qdd": each(pin.aba, q, qd, x),
-        "K": each(pin.computeKineticEnergy, q, qd),
+        "bias": bias,
+        "tau": each(pin.rnea, q, qd, x) + x @ B,
+        "qdd": np.linalg.solve(M, (x - bias)[..., None])[..., 0] if B.any() else each(pin.aba, q, qd, x),
+        "K": each(pin.computeKineticEnergy, q, qd) + np.einsum("ki,ij,kj->k", qd, B, qd) / 2,
         "V": each(pin.computePotentialEnergy, q),
     }
 

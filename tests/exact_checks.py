@@ -26,16 +26,17 @@ def errors(lag, samples: int, quantities=("M", "C", "h", "g", "tau", "K", "V"), 
     data = model.createData()
     q, qd, qdd = states(description, samples, seed)
     n = description.n
+    B = description.numbers.coupling  # which Pinocchio does not know
     reference = {name: [] for name in ("M", "C", "h", "g", "tau", "K", "V")}
     for state in zip(q, qd, qdd, strict=True):
         M = np.reshape(pin.crba(model, data, state[0]), (n, n))
-        reference["M"].append(np.triu(M) + np.triu(M, 1).T)
+        reference["M"].append(np.triu(M) + np.triu(M, 1).T + B)
         C = np.reshape(pin.computeCoriolisMatrix(model, data, *state[:2]), (n, n)).copy()
         reference["C"].append(C)
         reference["h"].append(C @ state[1])
         reference["g"].append(np.array(pin.computeGeneralizedGravity(model, data, state[0])).reshape(n))
-        reference["tau"].append(np.array(pin.rnea(model, data, *state)).reshape(n))
-        reference["K"].append(pin.computeKineticEnergy(model, data, *state[:2]))
+        reference["tau"].append(np.array(pin.rnea(model, data, *state)).reshape(n) + B @ state[2])
+        reference["K"].append(pin.computeKineticEnergy(model, data, *state[:2]) + state[1] @ B @ state[1] / 2)
         reference["V"].append(pin.computePotentialEnergy(model, data, state[0]))
     reference = {name: np.array(values) for name, values in reference.items()}
     floors = Floors.of(description, reference["M"], qd, qdd, reference["tau"])

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
-from dhkit.description import from_dh, from_toml
+from dhkit.description import description_of, from_dh, from_toml
 from dhkit.model import pinocchio_model
 
 SLIDE = """
@@ -116,6 +116,7 @@ def worst_excess(arm, motion, limits):
     model = pinocchio_model(arm)
     data = model.createData()
     tau = np.array([np.ravel(pin.rnea(model, data, *row)) for row in zip(q, qd, qdd, strict=True)])
+    tau = tau + qdd @ description_of(arm).numbers.coupling
     size = np.maximum(np.abs(limits.lower), np.abs(limits.upper))
     with np.errstate(invalid="ignore"):
         position = np.maximum(limits.lower - q, q - limits.upper) / np.where(np.isfinite(size), size, 1.0)

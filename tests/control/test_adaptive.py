@@ -51,7 +51,7 @@ def gap_of_the_regressor(description, samples):
     qd_r = random_motions(description, samples, seed=1).qd
     theta = inertial_parameters(description)
     Y = velocity_regressor(description, q, qd, qd_r, qdd_r)
-    tau = Y @ theta + description.numbers.armature * qdd_r
+    tau = Y @ theta + qdd_r @ description.numbers.drive_inertia
     M, C = mass_matrix(description, q), coriolis_matrix(description, q, qd)
     expected = np.einsum("kij,kj->ki", M, qdd_r) + np.einsum("kij,kj->ki", C, qd_r) + gravity_torque(description, q)
     terms = np.einsum("kij,j->ki", np.abs(Y), np.abs(theta)).max() + np.abs(description.numbers.armature * qdd_r).max()

@@ -31,6 +31,7 @@ EXPECTED = [
     "jaco",
     "kr5",
     "kuka_kr30_3",
+    "manutec_r3",
     "pan_tilt",
     "panda",
     "planar2r",
@@ -45,7 +46,7 @@ EXPECTED = [
     "ur3",
     "ur5",
 ]
-PUBLISHED_BODIES = {"puma560", "puma560_akb", "ur10", "panda"}
+PUBLISHED_BODIES = {"manutec_r3", "puma560", "puma560_akb", "ur10", "panda"}
 ROUNDED = 1e-15  # of coordinates of about 1 m, a few roundings
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from dhkit.description import library_robot
 from dhkit.planning import Effort, Energy, Jerk, Planner, Time
 from dhkit.planning.costs import cost_of, size_of
 from dhkit.planning.objectives import Objective
@@ -121,3 +122,13 @@ def test_weights_of_effort_choose_between_joints(law):
         Planner(arm, Effort(joint_weights=(1.0, 2.0, 3.0)), limits).solve([0, 0], [0.7, 0.4], duration=1.3)
     with pytest.raises(TypeError, match="joint weights are 'abc'"):
         Effort(joint_weights="abc")
+
+
+@pytest.mark.parametrize("intervals", [None, 28, 40, 56, 72])
+def test_the_manutec_r3s_least_energy(law, intervals):
+    """The published optimal control problem of an arm with drives that two joints turn, on meshes of all sizes."""
+    arm = library_robot("manutec_r3")
+    voltage = 1 / np.array([126.0, 252.0, 72.0])  # V per N m
+    ends = (arm.numbers.configurations[name] for name in ("start", "goal"))
+    motion = Planner(arm, Effort(joint_weights=voltage**2), intervals=intervals).solve(*ends, duration=0.53)
+    law.holds("least energy of the Manutec r3: 20.4044 V^2 s", relative(motion.report.cost, 20.4044), 1e-3)

@@ -70,6 +70,13 @@ class RobotFile:
             drive = joint.get("drive", {})
             yield self.number(drive.get("gear", 1)) ** 2 * self.number(drive.get("rotor_inertia", 0))
 
+    def coupling(self):
+        B = np.zeros((len(self.joints()),) * 2)
+        for entry in self.data.get("coupling", []):
+            i, j = (number - 1 for number in entry["joints"])
+            B[i, j] = B[j, i] = self.number(entry["inertia"])
+        return B
+
 
 def about(axis, angle):
     """Return the rotation about axis 0 (x) or 2 (z), 4 x 4."""
@@ -105,7 +112,7 @@ def mass_matrix_and_gravity(file, q, gravity):
     """Return M and g by the Jacobians of every body's centre of mass; gravity in frame 0."""
     frames, axes = frames_and_axes(file, q)
     n = len(axes)
-    M, g = np.diag(list(file.armature())), np.zeros(n)
+    M, g = np.diag(list(file.armature())) + file.coupling(), np.zeros(n)
     revolute = [row[-1] for row in file.rows()]
     for i, joint in enumerate(file.joints()):
         R, origin = frames[i][:3, :3], frames[i][:3, 3]

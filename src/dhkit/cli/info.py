@@ -66,6 +66,9 @@ def info(robot: Robot, json: Json = False) -> None:
         if len(joint.bodies) > 1:
             bodies = (f"{b['name']} of {b['mass_kg']:.4g} kg at {_vector(b['com_m'])} m" for b in _bodies(joint, arm))
             say(f"link {i}: {', '.join(bodies)}")
+    for coupling in description.couplings:
+        i, j = coupling.joints
+        say(f"joints {i} and {j} both turn a drive: {numbers.coupling[i - 1, j - 1]:.4g} in M{i}{j} (SI)")
     base_mass = f" and {numbers.base_body[0]:.4g} kg of the base" if description.base.body else ""
     say(f"\ninverse kinematics: {arm.family}")
     mass = f"total mass {np.nansum(numbers.mass):.4g} kg" if np.isfinite(numbers.mass).any() else "no link masses"
@@ -189,6 +192,10 @@ def _facts(arm: Arm) -> dict[str, Any]:
         "gravity_m_s2": numbers.gravity.tolist(),
         "parameters": numbers.values,
         "joints": joints,
+        "couplings": [
+            {"joints": list(c.joints), "inertia": float(numbers.coupling[c.joints[0] - 1, c.joints[1] - 1])}
+            for c in description.couplings
+        ],
         "configurations_rad": {name: q.tolist() for name, q in numbers.configurations.items()},
         "warnings": list(description.warnings),
         "source": description.source,

@@ -21,18 +21,19 @@ RANDOM_STATES = 2000
 
 
 class Adaptive:
-    """tau = Y(q, qd, qd_r, qdd_r) p + armature qdd_r + K_D s, dp/dt = Gamma Y^T s.
+    """tau = Y(q, qd, qd_r, qdd_r) p + B qdd_r + K_D s, dp/dt = Gamma Y^T s.
 
     Slotine & Li, On the adaptive control of robot manipulators, 1987. With e = q_d - q: qd_r = qd_d + Lambda e,
     qdd_r = qdd_d + Lambda de/dt, s = qd_r - qd = de/dt + Lambda e (the opposite sign of theirs), and
-    Y p + armature qdd_r = M qdd_r + C qd_r + g with C of the Christoffel symbols. With the true parameters p*,
+    Y p + B qdd_r = M qdd_r + C qd_r + g with C of the Christoffel symbols. With the true parameters p*,
     V = (s^T M s + (p - p*)^T Gamma^-1 (p - p*)) / 2 falls by dV/dt = -s^T K_D s. So the error goes to 0; p goes to p*
     only in a motion that excites all parameters.
 
-    p are the base parameters of the links (:func:`dhkit.dynamics.parameter_grouping`). The drives' rotor inertia is not
-    estimated: it is the arm's own. Called by a sampled controller, p is integrated by the trapezoidal rule from call to
-    call; a continuous integrator takes :meth:`initial_state` and :meth:`continuous`. The estimate goes on changing as
-    long as there is an error: friction, noise or a saturated drive make it drift.
+    p are the base parameters of the links (:func:`dhkit.dynamics.parameter_grouping`). The drives' rotor inertia B
+    (``numbers.drive_inertia``) is not estimated: it is the arm's own. Called by a sampled controller, p is
+    integrated by the trapezoidal rule from call to call; a continuous integrator takes :meth:`initial_state` and
+    :meth:`continuous`. The estimate goes on changing as long as there is an error: friction, noise or a saturated
+    drive make it drift.
 
     Parameters
     ----------
@@ -198,7 +199,7 @@ class Adaptive:
         qd_r, s = self._reference(q, qd, setpoint)
         qdd_r = setpoint.qdd + self.decay * (setpoint.qd - qd)
         Y = velocity_regressor(self.description, q, qd, qd_r, qdd_r)[:, self._columns]
-        return Y, self.description.numbers.armature * qdd_r + self.kd * s, s
+        return Y, self.description.numbers.drive_inertia @ qdd_r + self.kd * s, s
 
 
 def _inverse_excitation(description: Description, kd: Array) -> Array:

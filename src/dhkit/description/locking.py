@@ -92,7 +92,8 @@ def lock(description: Description, joints: Mapping[int | str, Quantity]) -> Desc
     """Return the arm with some joints locked, their links joined to the link before, or to the base.
 
     Every remaining joint keeps its zero, limits and drive; configurations lose the locked entries. The drives of
-    locked joints are removed: their rotors stand still. If a link has no body, the joined link has none either.
+    locked joints are removed, and their couplings: their rotors add nothing to the torques of the others. If a link
+    has no body, the joined link has none either.
 
     Lengths and masses that are parameters stay parameters. Parameters that determine angles of the locked rows are
     replaced by their numbers, everywhere in the arm, since the new row's form depends on them; all parameters are,
@@ -207,6 +208,12 @@ def _lock_all(description: Description, locked: Mapping[int, Expression]) -> Des
             for joint, parts in zip(chain.joints, chain.bodies[1:], strict=True)
         ),
         tool=chain.tool,
+        couplings=tuple(
+            replace(coupling, joints=(moving.index(i) + 1, moving.index(j) + 1))
+            for coupling in description.couplings
+            for i, j in [(coupling.joints[0] - 1, coupling.joints[1] - 1)]
+            if i in moving and j in moving
+        ),
         configurations=Named({name: tuple(q[i] for i in moving) for name, q in description.configurations.items()}),
     )
 

@@ -59,6 +59,8 @@ class Numbers:
     """Shape (n, 3, 3), kg m^2, about the centre of mass in the axes of DH frame i."""
     armature: Array
     """Shape (n,), gear^2 rotor inertia, kg m^2 or kg; 0 without a drive."""
+    coupling: Array
+    """Shape (n, n), symmetric: inertias of drives that two joints turn, kg m^2, kg m and kg; 0 on the diagonal."""
     viscous: Array
     """Shape (n,), joint side, N m s/rad or N s/m."""
     coulomb: Array
@@ -75,6 +77,11 @@ class Numbers:
     """Joint vectors by name, shape (n,), rad and m."""
     reach: float
     """The sum of abs(a) + abs(d) + stroke, m."""
+
+    @property
+    def drive_inertia(self) -> Array:
+        """The drives' part of the mass matrix, shape (n, n), kg m^2, kg m and kg: armature and coupling."""
+        return np.diag(self.armature) + self.coupling
 
     @property
     def inertial_parameters(self) -> Array:
@@ -131,6 +138,7 @@ class Numbers:
             com=np.array(com),
             inertia=np.array(inertia),
             armature=array(drive.armature if drive else 0.0 for drive in drives),
+            coupling=_coupling_matrix(description, array),
             viscous=gear**2 * array(drive.viscous if drive else 0.0 for drive in drives),
             coulomb=np.abs(gear)[:, None] * np.array([array(x.coulomb) if x else np.zeros(2) for x in drives]),
             base_body=_body_arrays(description.base.body, array, 0.0),
@@ -160,6 +168,15 @@ def _cached_matrix(placement: Placement, values: tuple[tuple[str, Expression], .
     """Return :func:`matrix`; an exact pose costs 1 ms, and most placements stay while a user edits the table."""
     pose = pose_of(placement, dict(values))
     return np.array([[float(substitute(entry, dict(values))) for entry in row] for row in pose], dtype=float)
+
+
+def _coupling_matrix(description: RobotData, array: Callable[[Iterable[Expression]], Array]) -> Array:
+    matrix = np.zeros((description.n, description.n))
+    inertias = array(coupling.inertia for coupling in description.couplings)
+    for coupling, inertia in zip(description.couplings, inertias, strict=True):
+        i, j = (number - 1 for number in coupling.joints)
+        matrix[i, j] = matrix[j, i] = inertia
+    return matrix
 
 
 def _as_one(bodies: tuple[Body, ...], values: dict[str, Expression]) -> Body | None:

@@ -8,7 +8,7 @@ from typing import Protocol, TypeAlias
 
 from dhkit.description.bodies import Vector
 from dhkit.description.named import Named
-from dhkit.description.values import STANDARD_GRAVITY, Base, Convention, Joint, Tool, Units
+from dhkit.description.values import STANDARD_GRAVITY, Base, Convention, Coupling, Joint, Tool, Units
 from dhkit.expressions import Expression
 
 
@@ -26,6 +26,8 @@ class RobotData:
     tool: Tool = field(default=Tool())
     configurations: Named[tuple[Expression, ...]] = field(default_factory=Named)
     """Joint vectors by name, rad and m."""
+    couplings: tuple[Coupling, ...] = ()
+    """Inertias of drives that turn with two joints; at most one of each two joints."""
     source: str = ""
     notes: str = ""
     drawn: bool = True

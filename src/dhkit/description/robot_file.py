@@ -18,6 +18,7 @@ from dhkit.description.values import (
     Box,
     Capsule,
     Convention,
+    Coupling,
     Cylinder,
     Drive,
     Geometry,
@@ -34,7 +35,16 @@ from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import Budget, Expression, exact, exact_angle, parse
 
 if TYPE_CHECKING:
-    from dhkit.description.schema import BodyForm, DriveForm, Entry, JointForm, RobotForm, ShapeForm, ToolForm
+    from dhkit.description.schema import (
+        BodyForm,
+        CouplingForm,
+        DriveForm,
+        Entry,
+        JointForm,
+        RobotForm,
+        ShapeForm,
+        ToolForm,
+    )
 
 MAX_BYTES = 1_000_000
 """Largest robot file, in bytes."""
@@ -115,6 +125,7 @@ class _FormReader:
             ),
             tool=Tool(self.placement("tool", form.tool), self.shapes("tool", form.tool.shape)),
             configurations=Named({name: self.configuration(name, q) for name, q in form.configurations.items()}),
+            couplings=tuple(self.coupling(f"coupling[{k}]", entry) for k, entry in enumerate(form.coupling)),
             source=form.source,
             notes=form.notes,
             drawn=form.drawn,
@@ -192,6 +203,10 @@ class _FormReader:
             self.number(f"{where}.{key}", getattr(form, key)) for key in ("gear", "rotor_inertia", "viscous")
         )
         return Drive(gear, rotor_inertia, viscous, (positive, negative))
+
+    def coupling(self, where: str, form: CouplingForm) -> Coupling:
+        first, second = sorted(form.joints)
+        return Coupling((first, second), self.number(f"{where}.inertia", form.inertia))
 
     def shapes(self, where: str, forms: Iterable[ShapeForm]) -> tuple[Shape, ...]:
         return tuple(self.shape(f"{where}: shape", form) for form in forms)

@@ -230,6 +230,13 @@ class JointForm(Form):
         return self
 
 
+class CouplingForm(Form):
+    """Inertia of a drive that two joints turn, kg m^2, kg m or kg; joints by number, from 1."""
+
+    joints: Annotated[list[Annotated[int, Field(ge=1, le=MAX_JOINTS)]], Field(min_length=2, max_length=2)]
+    inertia: Number
+
+
 class ToolForm(Form):
     """The tool's frame in DH frame n."""
 
@@ -257,6 +264,12 @@ class RobotForm(Form):
     drawn: bool = True
     parameters: dict[str, Number] = Field(default={}, max_length=MAX_PARAMETERS)
     joint: list[JointForm] = Field(min_length=1, max_length=MAX_JOINTS)
+    coupling: Annotated[
+        list[CouplingForm],
+        BeforeValidator(_list_of_tables),
+        Field(max_length=MAX_JOINTS * (MAX_JOINTS - 1) // 2, default=[]),
+        _AlsoTakes(lambda several: several["items"]),
+    ]
     base: BaseForm = Field(default_factory=lambda: BaseForm.model_validate({}))
     tool: ToolForm = Field(default_factory=lambda: ToolForm.model_validate({}))
     configurations: dict[str, list[Number]] = Field(default={}, max_length=MAX_CONFIGURATIONS)

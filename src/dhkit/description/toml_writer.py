@@ -51,6 +51,12 @@ def toml_text(description: RobotData) -> str:
     for joint in description.joints:
         joints.append(_table(_joint(joint, units)))
     document["joint"] = joints
+    if description.couplings:
+        couplings = tomlkit.aot()
+        for coupling in description.couplings:
+            content = {"joints": _array(coupling.joints), "inertia": _entry(coupling.inertia)}
+            couplings.append(_table(content))
+        document["coupling"] = couplings
     base, tool = description.base, description.tool
     body = {"body": _body(base.body, units)} if base.body else {}
     if base_content := _placement(base.placement, units) | _shapes(base.shapes, units) | body:

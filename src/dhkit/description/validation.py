@@ -77,6 +77,7 @@ def check(description: RobotData) -> tuple[str, ...]:
     warnings: list[str] = []
     for number, joint in enumerate(description.joints, start=1):
         warnings += _check_joint(joint, f"joint {number} ({joint.name})", value)
+    warnings += _check_couplings(description, value)
     _check_names(description)
     for key in ("source", "notes"):
         if control := CONTROL_CHARACTER.search(getattr(description, key)):
@@ -169,6 +170,25 @@ def _check_drive(drive: Drive, where: str, value: Value) -> None:
         raise DescriptionError(
             f"{where}: drive.coulomb is [{positive:g}, {negative:g}] N m; expected [not negative, not positive]"
         )
+
+
+def _check_couplings(description: RobotData, value: Value) -> Iterator[str]:
+    pairs: set[tuple[int, int]] = set()
+    armature = [value("drive", joint.drive.armature) if joint.drive else 0.0 for joint in description.joints]
+    for k, coupling in enumerate(description.couplings):
+        where = f"coupling[{k}]"
+        i, j = coupling.joints
+        if not 1 <= i < j <= description.n:
+            raise DescriptionError(f"{where}: joints [{i}, {j}]; expected two joints of 1 to {description.n}")
+        if (i, j) in pairs:
+            raise DescriptionError(f"{where}: joints {i} and {j} have a coupling already")
+        pairs.add((i, j))
+        inertia = value(f"{where}: inertia", coupling.inertia)
+        if inertia**2 > armature[i - 1] * armature[j - 1]:
+            yield (
+                f"{where}: {inertia:g} is more than the root of the two joints' gear^2 rotor_inertia, "
+                f"{armature[i - 1]:g} and {armature[j - 1]:g}: rotors alone cannot have such a coupling"
+            )
 
 
 def _check_body(body: Body, where: str, value: Value) -> Iterator[str]:

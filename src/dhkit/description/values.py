@@ -80,6 +80,24 @@ class Drive:
 
 
 @dataclass(frozen=True)
+class Coupling:
+    """Inertia of a drive that two joints turn: it adds b qd_i qd_j to the kinetic energy, so M_ij and M_ji get b.
+
+    Where joint i carries the motor of joint j, or moves its gear, the rotor turns with both: by G qd_j + k qd_i, with k
+    given by the gear and by the rotor's axis. Its inertia J gives b = J G k; J G^2 is the drive's own and J k^2 belongs
+    to joint i (Sciavicco & Siciliano, Modelling and Control of Robot Manipulators, 2000, section 4.1).
+    """
+
+    joints: tuple[int, int]
+    """Numbers of the two joints, from 1, the lower one first."""
+    inertia: Expression
+    """b: kg m^2 of two revolute joints, kg m of a revolute and a prismatic one, kg of two prismatic ones; any sign."""
+
+    def __repr__(self) -> str:
+        return repr_line("Coupling", "", f"joints {self.joints[0]} and {self.joints[1]}, {self.inertia} in SI units")
+
+
+@dataclass(frozen=True)
 class Placement:
     """A pose as a robot file gives it: origin, m, and fixed-axis roll, pitch, yaw, rad (R = Rz Ry Rx)."""
 

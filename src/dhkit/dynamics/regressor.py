@@ -21,7 +21,7 @@ def inertial_parameters(description: Description) -> Array:
 
 @takes_robot
 def regressor(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
-    """Return Y with tau = Y theta + armature qdd, theta of :func:`inertial_parameters`.
+    """Return Y with tau = Y theta + B qdd, B ``numbers.drive_inertia``, theta of :func:`inertial_parameters`.
 
     The force and moment that a link needs are linear in its parameters (Atkeson, An & Hollerbach, 1986, eq. 8); the
     joints before it feel them by the principle of virtual work.

@@ -36,10 +36,11 @@ def velocity_regressor(
     out: Array | None = None,
     threads: int = 1,
 ) -> Array:
-    """Return Y with Y theta + armature qdd_r = M(q) qdd_r + C(q, qd) qd_r + g(q), theta of ``inertial_parameters``.
+    """Return Y with Y theta + B qdd_r = M(q) qdd_r + C(q, qd) qd_r + g(q), theta of ``inertial_parameters``.
 
-    C is that of :func:`dhkit.dynamics.coriolis_matrix`. With qd_r = qd and qdd_r = qdd it is the regressor of inverse
-    dynamics, :func:`dhkit.dynamics.regressor` (Slotine & Li, On the Adaptive Control of Robot Manipulators, 1987).
+    B is ``numbers.drive_inertia``, C that of :func:`dhkit.dynamics.coriolis_matrix`. With qd_r = qd and qdd_r = qdd
+    it is the regressor of inverse dynamics, :func:`dhkit.dynamics.regressor` (Slotine & Li, On the Adaptive Control
+    of Robot Manipulators, 1987).
 
     Parameters
     ----------

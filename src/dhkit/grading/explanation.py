@@ -99,7 +99,7 @@ class _Solution:
                 yield from self._body(name, i, f"{i}{k}" if several else f"{i}", body)
         yield self._step(
             "Energies of the arm",
-            "Sums over the links, and over the drives' rotors: G^2 J qd^2/2 each.",
+            self._energies_method(),
             [("K", element_array(self.textbook.K)), ("V", element_array(self.textbook.V))],
         )
         yield self._step("Mass matrix", "M_ij is the second derivative of K by qd_i and qd_j.", [("M", lag.M)])
@@ -112,6 +112,10 @@ class _Solution:
         yield self._step("Gravity torques", "g_i = dV/dq_i.", [("g", lag.g)])
         if n <= 3:
             yield self._step("Joint torques", "tau = M qdd + h + g.", [("tau", lag.tau)])
+
+    def _energies_method(self) -> str:
+        coupled = "; couplings of drives: b qd_i qd_j each" if self.lag.arm.couplings else ""
+        return f"Sums over the links, and over the drives' rotors: G^2 J qd^2/2 each{coupled}."
 
     def _body(self, name: str, i: int, number: str, body: BodyMotion) -> Iterator[Step]:
         """Yield the steps for a body of link i, from 1, whose quantities have this number."""

@@ -46,7 +46,9 @@ def pinocchio_model(description: Description) -> PinocchioModel:
 
     Values that a URDF lacks are set on the model: gravity, ``armature`` (gear^2 rotor inertia, which rnea, crba and aba
     use; setting rotorInertia and rotorGearRatio alone would change nothing), dry friction by direction, unlimited
-    effort and velocity as inf. Joint i of the table is joint i of the model; frames ``dh0`` ... ``dhn`` and ``tool``.
+    effort and velocity as inf. A drive's inertia that two joints
+    turn (``couplings``) has no place in a Pinocchio model: M lacks ``numbers.coupling``, tau ``numbers.coupling`` qdd.
+    Joint i of the table is joint i of the model; frames ``dh0`` ... ``dhn`` and ``tool``.
 
     Raises
     ------

@@ -147,6 +147,10 @@ def _comment(description: Description) -> str:
         f"A URDF cannot carry: gravity ({_texts(description.numbers.gravity)}) m/s^2 in the world frame; reflected "
         f"rotor inertia, joint 1 to {description.n}: {_texts(description.numbers.armature)}.",
     ]
+    for coupling in description.couplings:
+        i, j = coupling.joints
+        inertia = description.numbers.coupling[i - 1, j - 1]
+        lines.append(f"Nor the inertia of a drive that joints {i} and {j} both turn: {inertia:.9g}.")
     if description.source:
         lines.append(f"Source: {description.source}")
     # Two hyphens would end an XML comment.

@@ -135,7 +135,8 @@ class States:
 
         data = model.createData()
         states = zip(self.q, self.qd, self.qdd, strict=True)
-        return self._gathered([pin.rnea(model, data, *state).copy() for state in states])
+        tau = self._gathered([pin.rnea(model, data, *state).copy() for state in states])
+        return tau + self.qdd @ self.description.numbers.coupling
 
     def _friction_torque(self, qd: Array) -> Array | float:
         return 0.0 if self.friction is None else dynamics.friction_torque(self.description, qd, self.friction)

@@ -105,7 +105,7 @@ class TextbookDerivation:
 
     @cached_property
     def rotors(self) -> Element:
-        """Kinetic energy of the rotors, the sum of Jm (G qd)^2 / 2, J."""
+        """Kinetic energy of the rotors, the sum of Jm (G qd)^2 / 2, and that of couplings, b qd_i qd_j each, J."""
         arm, energies = self.arm, []
         for i, (gear, rotor) in enumerate(zip(arm.gear, arm.rotor, strict=True)):
             if not self._has("rotor_forgotten", i):
@@ -113,6 +113,7 @@ class TextbookDerivation:
                 if self._has("rotor_without_gear", i):
                     ratio = arm.ring.one
                 energies.append(rotor * ratio * arm.ring.rate(i) * arm.ring.rate(i) * HALF)
+        energies += [inertia * arm.ring.rate(i) * arm.ring.rate(j) for i, j, inertia in arm.couplings]
         return arm.ring.sum(energies)
 
     @cached_property

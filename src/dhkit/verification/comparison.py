@@ -38,7 +38,7 @@ def verify(description: Description, samples: int = 1000, seed: int = 0) -> Veri
 
     Compared are frames, Jacobians, M, C, C qd, g, inverse and forward dynamics, energies and the regressor at random
     states inside the limits. Dynamics need a body on every link, forward dynamics a regular M. Both sides start from
-    ``description.numbers``: an error in the rounding of the table, in a link's body or in the armature gear^2 J is the
+    ``description.numbers``: an error in the rounding of the table, in a link's body or in the drives' inertia is the
     same on both sides and is not found here; the tests compare those with the robot files.
 
     Parameters
@@ -61,7 +61,7 @@ def verify(description: Description, samples: int = 1000, seed: int = 0) -> Veri
         ``samples`` is below 1.
     """
     motion = random_motions(description, samples, seed)
-    reference = PinocchioResults(pinocchio_model(description), motion)
+    reference = PinocchioResults(pinocchio_model(description), motion, description.numbers.coupling)
     comparisons = list(_kinematics(description, reference))
     notes: list[str] = []
     missing = [joint.name for joint in description.joints if not joint.bodies]

@@ -99,7 +99,7 @@ def verify_urdf(
     model.gravity.linear = np.array(description.numbers.gravity)
     model.armature = np.array(description.numbers.armature)
     motion = random_motions(description, samples, seed)
-    reference = PinocchioResults(model, motion)
+    reference = PinocchioResults(model, motion, description.numbers.coupling)
     notes = [f"joints in order: {', '.join(chain.names)}; tool: {chain.tip}", *chain.notes]
     notes += _limits(description, chain)
     comparisons, offsets = _tool(description, reference, tolerance)

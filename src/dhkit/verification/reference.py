@@ -12,11 +12,16 @@ from dhkit.verification.states import JointStates
 
 
 class PinocchioResults:
-    """Pinocchio's results for a model at N joint states; N is the first axis of every array."""
+    """Pinocchio's results for a model at N joint states; N is the first axis of every array.
 
-    def __init__(self, model: PinocchioModel, motion: JointStates) -> None:
+    ``coupling``, shape (n, n), is the inertia of drives that two joints turn, which Pinocchio does not know: it is
+    added to M, and to what follows from M.
+    """
+
+    def __init__(self, model: PinocchioModel, motion: JointStates, coupling: Array | None = None) -> None:
         self.model = model
         self.motion = motion
+        self.coupling = np.zeros((model.nv, model.nv)) if coupling is None else coupling
         self._data = model.createData()
 
     def frames(self, names: Sequence[str]) -> Array:
@@ -47,7 +52,7 @@ class PinocchioResults:
 
         M = self._each(lambda q, qd, qdd: pin.crba(self.model, self._data, q), (self.n, self.n))
         upper = np.triu(M)
-        return upper + np.swapaxes(np.triu(M, 1), 1, 2)  # old versions fill only the upper triangle
+        return upper + np.swapaxes(np.triu(M, 1), 1, 2) + self.coupling  # old versions fill only the upper triangle
 
     def coriolis_matrix(self) -> Array:
         """Return Coriolis matrices C(q, qd) of Christoffel symbols, shape (N, n, n); C qd is in N m and N."""
@@ -65,12 +70,16 @@ class PinocchioResults:
         """Return joint torques of the states' accelerations, without friction, shape (N, n), N m and N."""
         import pinocchio as pin
 
-        return self._each(lambda q, qd, qdd: pin.rnea(self.model, self._data, q, qd, qdd), (self.n,))
+        tau = self._each(lambda q, qd, qdd: pin.rnea(self.model, self._data, q, qd, qdd), (self.n,))
+        return np.asarray(tau + self.motion.qdd @ self.coupling)
 
     def forward_dynamics(self, tau: Array) -> Array:
         """Return accelerations under joint torques, shape (N, n), N m and N; rad/s^2 and m/s^2, shape (N, n)."""
         import pinocchio as pin
 
+        if self.coupling.any():
+            bias = self._each(lambda q, qd, qdd: pin.nonLinearEffects(self.model, self._data, q, qd), (self.n,))
+            return np.asarray(np.linalg.solve(self.mass_matrix(), (tau - bias)[..., None])[..., 0])
         torques = iter(tau)
         return self._each(lambda q, qd, qdd: pin.aba(self.model, self._data, q, qd, next(torques)), (self.n,))
 
@@ -78,7 +87,8 @@ class PinocchioResults:
         """Return kinetic energies, shape (N,), J."""
         import pinocchio as pin
 
-        return self._each(lambda q, qd, qdd: pin.computeKineticEnergy(self.model, self._data, q, qd), ())
+        K = self._each(lambda q, qd, qdd: pin.computeKineticEnergy(self.model, self._data, q, qd), ())
+        return np.asarray(K + np.einsum("ni,ij,nj->n", self.motion.qd, self.coupling, self.motion.qd) / 2)
 
     def potential_energy(self) -> Array:
         """Return potential energies, shape (N,), J."""

@@ -100,6 +100,7 @@ def _kinds(description: Description) -> dict[str, str]:
             note("rotor", joint.drive.rotor_inertia)
             note("friction", joint.drive.viscous)
         note("length", joint.a, joint.d)
+    note("rotor", *(coupling.inertia for coupling in description.couplings))
     note("length", *description.tool.placement.xyz)
     bodies = [body for joint in description.joints for body in joint.bodies]
     for body in bodies:

@@ -93,7 +93,7 @@ class Original:
         if self.model is None or not all(joint.bodies for joint in description.joints):
             return Residual(tool, None, None, len(self.q))
         model = pinocchio_model(description)
-        model.armature = np.zeros(model.nv)
+        model.armature = np.zeros(model.nv)  # a URDF has none
         M, g = _dynamics(model, self.q)
         numbers = description.numbers
         weight = float(np.nansum(numbers.mass)) * float(np.linalg.norm(numbers.gravity))

@@ -28,6 +28,8 @@ def composite_mass_matrix(table: InertialTable, q: casadi.SX) -> casadi.SX:
         for i, (force, moment) in _wrench_at_each_joint(frames, j, wrench):
             entries[i][j] = entries[j][i] = (force if frames[i].prismatic else moment)[2]
         entries[j][j] = entries[j][j] + table.armature[j]
+    for i, j, inertia in table.couplings:
+        entries[i][j] = entries[j][i] = entries[i][j] + inertia
     return _matrix(entries)
 
 

@@ -30,6 +30,8 @@ def kinetic_energy(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.
         products = xy * (x * y) + xz * (x * z) + yz * (y * z)
         carried = dot(v, cross(w, own.first))
         twice += own.mass * dot(v, v) + spinning - 2 * products + 2 * carried + table.armature[i] * (qd[i] * qd[i])
+    for i, j, inertia in table.couplings:
+        twice += 2 * inertia * (qd[i] * qd[j])
     return casadi.SX(twice / 2)
 
 

@@ -17,6 +17,7 @@ from dhkit.symbolic.differentiable.vectors import (
     about_z,
     about_z_back,
     cross,
+    is_zero,
     plus,
 )
 
@@ -69,7 +70,7 @@ def equation_frames(table: InertialTable, q: casadi.SX) -> list[EquationFrame]:
         lever = about_z(*link_rotation, (row.a, -row.sin_alpha * d, row.cos_alpha * d))
         angles = _summed_angles(row, angles, q[i])
         rotation = _cos_sin(angles)
-        stays_twisted = i + 1 == len(table.rows) or _is_zero(table.rows[i + 1].sin_alpha)
+        stays_twisted = i + 1 == len(table.rows) or is_zero(table.rows[i + 1].sin_alpha)
         if stays_twisted:
             shown, moments, link_rotation = (1.0, 0.0), link.about_z(*rotation), rotation
         else:
@@ -105,7 +106,7 @@ def link_velocities(frames: list[EquationFrame], qd: casadi.SX) -> list[tuple[Ve
 def _summed_angles(row: JointRow, angles: tuple[Scalar, Scalar, Scalar], q: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     """Return a link's angle in its twisted axes: the angle before, reversed for opposed axes, plus the joint's own."""
     angle, c, s = angles
-    if _is_zero(row.sin_alpha) and float(row.cos_alpha) < 0:
+    if is_zero(row.sin_alpha) and float(row.cos_alpha) < 0:
         angle, s = -angle, -s
     c, s = c * row.cos_theta - s * row.sin_theta, s * row.cos_theta + c * row.sin_theta
     return (angle if row.prismatic else q + angle), c, s
@@ -120,7 +121,3 @@ def _cos_sin(angles: tuple[Scalar, Scalar, Scalar]) -> tuple[Scalar, Scalar]:
         return c, s
     cos_q, sin_q = casadi.cos(angle), casadi.sin(angle)
     return cos_q * c - sin_q * s, sin_q * c + cos_q * s
-
-
-def _is_zero(x: Scalar) -> bool:
-    return isinstance(x, float) and x == 0.0

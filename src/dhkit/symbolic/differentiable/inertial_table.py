@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +15,7 @@ from dhkit.display import counted, repr_line
 from dhkit.symbolic.differentiable.joint_frames import JointRow, joint_rows
 from dhkit.symbolic.differentiable.moments import Moments, regroup
 from dhkit.symbolic.differentiable.number_patterns import NumberPattern
-from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, about_x, plus
+from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, about_x, is_zero, plus
 
 if TYPE_CHECKING:
     import casadi
@@ -33,6 +34,8 @@ class InertialTable:
     links: tuple[Moments, ...]
     armature: tuple[Scalar, ...]
     """Rotor inertias at the joint side, gear^2 times rotor inertia, kg m^2 or kg."""
+    couplings: tuple[tuple[int, int, Scalar], ...]
+    """Joints i < j, from 0, and the drives' inertia that both turn, kg m^2, kg m or kg, where it is not 0."""
     gravity: Vector3
     """Free-fall acceleration in frame 0, m/s^2."""
     potential: Scalar
@@ -63,11 +66,13 @@ class InertialTable:
     def _filled(cls, description: Description, entries: Sequence[Scalar]) -> InertialTable:
         n = description.n
         prismatic = description.numbers.prismatic.tolist()
-        x, y, z, potential = entries[17 * n :]
+        x, y, z, potential, *coupling = entries[17 * n :]
+        pairs = zip(combinations(range(n), 2), coupling, strict=True)
         return cls(
             tuple(JointRow(prismatic[i], *entries[6 * i : 6 * i + 6]) for i in range(n)),
             tuple(Moments.of_entries(entries[6 * n + 10 * i : 6 * n + 10 * i + 10]) for i in range(n)),
             tuple(entries[16 * n : 17 * n]),
+            tuple((i, j, entry) for (i, j), entry in pairs if not is_zero(entry)),
             (x, y, z),
             potential,
         )
@@ -126,7 +131,10 @@ def _pattern(descriptions: Sequence[Description]) -> NumberPattern:
 
 
 def _numbers(description: Description) -> Array:
-    """Return an arm's numbers, shape (17 n + 4,): six a joint, ten a link, armatures, gravity, the base's energy."""
+    """Return an arm's numbers, shape (17 n + 4 + n (n - 1) / 2,).
+
+    Six a joint, ten a link, armatures, gravity, the base's energy, and the couplings, row by row.
+    """
     require_bodies(description)
     numbers = description.numbers
     rows = joint_rows(description)
@@ -138,8 +146,9 @@ def _numbers(description: Description) -> Array:
         numbers.gravity @ numbers.T_world_base[:3, 3]
     )
     joints = [entry for row in rows for entry in row.entries]
+    coupling = numbers.coupling[np.triu_indices(description.n, 1)]
     moments = [float(entry) for link in links for entry in link.entries]
-    return np.array([*joints, *moments, *numbers.armature, *gravity, energy], dtype=float)
+    return np.array([*joints, *moments, *numbers.armature, *gravity, energy, *coupling], dtype=float)
 
 
 def exact_moments(description: Description) -> list[Moments]:

@@ -113,6 +113,8 @@ def recursive_inverse_dynamics(
         tau[i] = (f if frame.prismatic else n)[2] + table.armature[i] * qdd[i]
         f, n = frame.to_previous(f), frame.to_previous(n)
         n = plus(n, cross(frame.lever, f))
+    for i, j, inertia in table.couplings:
+        tau[i], tau[j] = tau[i] + inertia * qdd[j], tau[j] + inertia * qdd[i]
     return casadi.SX(casadi.vertcat(*tau))
 
 

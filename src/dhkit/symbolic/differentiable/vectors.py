@@ -88,3 +88,8 @@ def _difference(a: Scalar, b: Scalar) -> Scalar:
     if isinstance(b, NUMBER) and b == 0:
         return a
     return -b if isinstance(a, NUMBER) and a == 0 else a - b
+
+
+def is_zero(x: Scalar) -> bool:
+    """Return whether a scalar is the number 0, not a symbol."""
+    return isinstance(x, float) and x == 0.0

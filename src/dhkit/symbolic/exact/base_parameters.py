@@ -38,9 +38,10 @@ MAX_TERMS = 60_000
 class BaseParameters:
     """The fewest combinations of inertial parameters that determine an arm's torques.
 
-    Names follow Khalil: inertia ``XX2`` ... ``ZZ2`` about the origin of link 2's joint frame, first moments
-    ``MX2 MY2 MZ2``, mass ``M2``, and rotor inertia at the joint side ``Ia2``. The joint frame moves with the link and
-    has its z axis along the joint; in the modified convention it is the DH frame.
+    Names follow Khalil: inertia ``XX2`` ... ``ZZ2`` about the origin of link 2's joint frame, first moments ``MX2
+    MY2 MZ2``, mass ``M2``, rotor inertia at the joint side ``Ia2``, and that which two joints turn ``Ic23``. The
+    joint frame moves with the link and has its z axis along the joint; in the modified convention it is the DH
+    frame.
 
     Attributes
     ----------
@@ -138,12 +139,14 @@ def _regroup(arm: ExactArm) -> dict[str, Element]:
         definitions |= {f"{key}{j}{end}": body.second[place] for key, place in SECOND.items()}
         definitions |= {f"{key}{j}{end}": body.moment[k] for key, k in MOMENT.items()}
         definitions |= {f"M{j}{end}": body.mass, f"Ia{j}{end}": arm.armature[j - 1]}
+    definitions |= {f"Ic{i + 1}{j + 1}{end}": inertia for i, j, inertia in arm.couplings}
     return {name: element for name, element in definitions.items() if element}
 
 
 def _ending(arm: ExactArm) -> str:
     """Return the ending of base parameters' names: an underscore where a parameter of the file has such a name."""
     names = {f"{key}{j}" for key in (*SECOND, *MOMENT, "M", "Ia") for j in range(1, arm.n + 1)}
+    names |= {f"Ic{i + 1}{j + 1}" for i, j, _ in arm.couplings}
     return "" if names.isdisjoint(arm.ring.constants) else "_"
 
 
@@ -198,6 +201,7 @@ def _equations(arm: ExactArm, definitions: Mapping[str, Element]) -> Lagrangian:
         bodies=(),
         gear=(ring.one,) * arm.n,
         rotor=tuple(named(f"Ia{j}") for j in range(1, arm.n + 1)),
+        couplings=tuple((i, j, named(f"Ic{i + 1}{j + 1}")) for i, j, _ in arm.couplings),
         gravity=_mapped(arm.gravity, ring, {}),
         origin=_mapped(arm.origin, ring, {}),
         tool=_mapped(arm.tool, ring, {}),
@@ -221,7 +225,7 @@ def _kept(arm: ExactArm) -> list[Constant]:
     geometry = [*arm.gravity, *arm.origin, *arm.tool]
     for row in arm.rows:
         geometry += [row.a, row.d, *row.alpha, *row.theta]
-    inertial = [*arm.gear, *arm.rotor]
+    inertial = [*arm.gear, *arm.rotor, *(inertia for *_, inertia in arm.couplings)]
     for body in chain.from_iterable(arm.bodies):
         inertial += [body.mass, *body.moment, *body.second.flat]
     names = _constants(inertial) - _constants(geometry)

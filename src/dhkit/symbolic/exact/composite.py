@@ -78,6 +78,8 @@ def mass_matrix(arm: ExactArm, bodies: Sequence[RigidBody] | None = None) -> Ele
                 force = steps[i].R @ force
                 torque = steps[i].R @ torque + np.cross(steps[i].p, force)
         M[j, j] = M[j, j] + arm.armature[j]
+    for i, j, inertia in arm.couplings:
+        M[i, j] = M[j, i] = M[i, j] + inertia
     return M
 
 

@@ -69,6 +69,8 @@ class ExactArm:
         Bodies of each link; with ``symbols="inertial"`` a single one that stands for all of them.
     gear, rotor, viscous
         Gear ratio, rotor inertia, kg m^2, and motor-side viscous friction, N m s, of each drive; 1, 0, 0 without one.
+    couplings
+        Joints i < j, from 0, and the drives' inertia that both turn, kg m^2, kg m or kg.
     base
         Rotation of frame 0 in the world, shape (3, 3).
     gravity
@@ -95,6 +97,7 @@ class ExactArm:
     gear: tuple[Element, ...]
     rotor: tuple[Element, ...]
     viscous: tuple[Element, ...]
+    couplings: tuple[tuple[int, int, Element], ...]
     base: Elements
     gravity: Elements
     origin: Elements
@@ -201,7 +204,8 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
 
     tool = [naming.known(x) for x in description.tool.placement.xyz]
     viscous = [naming.known(joint.drive.viscous) if joint.drive else ZERO for joint in description.joints]
-    expressions = [*gravity, *xyz, *tool, *viscous, *needed]
+    couplings = [(*coupling.joints, naming.coupling(coupling)) for coupling in description.couplings]
+    expressions = [*gravity, *xyz, *tool, *viscous, *(inertia for *_, inertia in couplings), *needed]
     angles = [*rpy]
     for link in links:
         expressions += link.row[:2]
@@ -221,6 +225,7 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
         tuple(ring.read(link.gear) for link in links),
         tuple(ring.read(link.rotor) for link in links),
         tuple(ring.read(x) for x in viscous),
+        tuple((i - 1, j - 1, ring.read(inertia)) for i, j, inertia in couplings),
         rotation,
         rotation.T @ np.array([ring.read(x) for x in gravity], dtype=object),
         rotation.T @ np.array([ring.read(x) for x in xyz], dtype=object),

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from dhkit.description import INERTIA_PLACES, Body, Description, Drive
+from dhkit.description import INERTIA_PLACES, Body, Coupling, Description, Drive
 from dhkit.description.parameters import resolved
 from dhkit.expressions import Expression, exact, exact_angle, substitute
 
@@ -117,6 +117,14 @@ class Naming:
             rotor = self.inertial_symbol(f"Jm{number}", substitute(drive.rotor_inertia, self.values))
         whole = BodyNumbers("", mass, tuple(r / mass for r in moments), None, tensor)
         return LinkNumbers(row, (whole,), gear, rotor)
+
+    def coupling(self, coupling: Coupling) -> Expression:
+        """Return the inertia of a drive that two joints turn."""
+        known = self.known(coupling.inertia)
+        if self.symbols != "inertial" or known.is_zero:
+            return known
+        first, second = coupling.joints
+        return self.inertial_symbol(f"Jc{first}{second}", substitute(coupling.inertia, self.values))
 
     def _body(self, body: Body) -> BodyNumbers:
         inertia = tuple(self.known(getattr(body.inertia, key)) for key in INERTIA_PLACES)

@@ -21,7 +21,7 @@ class Regressor:
         The equations.
     names
         The parameters theta: of every link ``m2``, first moments ``rx2`` ..., second moments about its DH frame
-        ``Ixx2`` ..., and its drive's rotor inertia ``Jm2``; or base parameters.
+        ``Ixx2`` ..., its drive's rotor inertia ``Jm2``, and that which two joints turn ``Jc23``; or base parameters.
     Y
         Shape (n, parameters); elements that do not contain the parameters.
     """
