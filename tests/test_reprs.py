@@ -317,7 +317,7 @@ VALUES = {
     description.Cylinder: lambda: description.Cylinder(parse("1/7"), parse("1/3")),
     description.DHTable: lambda: puma().dh,
     description.Description: lambda: puma().description,
-    description.Coupling: lambda: Arm.load("manutec_r3").description.couplings[0],
+    description.Coupling: lambda: dhkit.Arm.load("manutec_r3").description.couplings[0],
     description.Drive: lambda: puma().description.joints[0].drive,
     description.Inertia: lambda: puma().description.joints[1].body.inertia,
     description.Joint: lambda: puma().description.joints[0],

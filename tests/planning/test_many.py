@@ -39,6 +39,21 @@ def test_one_start_serves_all_goals_and_options_are_those_of_solve():
     assert len(planner().solve_many([0, 0.3], poses, workers=1)) == 2
 
 
+def test_each_pair_may_begin_from_a_similar_motion():
+    made = planner()
+    first = made.solve_many(STARTS, GOALS, workers=1)
+    again = made.solve_many(STARTS, GOALS + 1e-3, workers=1, warm=first)
+    for cold, warm in zip(made.solve_many(STARTS, GOALS + 1e-3, workers=1), again, strict=True):
+        assert isinstance(cold, PlanningError) == isinstance(warm, PlanningError)
+        if not isinstance(cold, PlanningError):
+            assert warm.duration == pytest.approx(cold.duration, rel=1e-3)
+    assert len(made.solve_many(STARTS, GOALS[:1], workers=1, warm=first[0])) == 4
+    with pytest.raises(ValueError, match="warm has 2 motions; expected one, or 4"):
+        made.solve_many(STARTS, GOALS, workers=1, warm=first[:2])
+    with pytest.raises(TypeError, match="warm is str; expected a Trajectory"):
+        made.solve_many(STARTS, GOALS, workers=1, warm="ready")
+
+
 @pytest.mark.parametrize(
     ("starts", "goals", "options", "message"),
     [

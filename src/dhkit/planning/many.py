@@ -16,6 +16,8 @@ from dhkit.errors import PlanningError
 from dhkit.kernels import check_whole
 from dhkit.trajectories import Trajectory
 
+SimilarMotions: TypeAlias = Trajectory | Sequence[Trajectory | PlanningError | None] | None
+"""A motion like all that are planned, or one for each; None and errors where there is none."""
 ManyProgress: TypeAlias = Callable[[int, int], object]
 """Callback after each motion, with the number of motions that are done and of all; an exception in it ends the rest."""
 
@@ -36,6 +38,7 @@ def solve_many(
     starts: ArrayLike,
     goals: ArrayLike,
     *,
+    warm: SimilarMotions = None,
     workers: int | None = None,
     progress: ManyProgress | None = None,
     options: Mapping[str, Any] | None = None,
@@ -48,22 +51,23 @@ def solve_many(
     for name, places in (("starts", first), ("goals", last)):
         if len(places) not in (1, count):
             raise ValueError(f"{name} has {len(places)} places; expected 1 or {count}")
-    pairs = [(first[k % len(first)], last[k % len(last)]) for k in range(count)]
+    similar = _similar(warm, count)
+    pairs = [(first[k % len(first)], last[k % len(last)], similar[k]) for k in range(count)]
     if workers is None:
         workers = os.cpu_count() or 1
     check_whole("workers", workers, 1)
     report, given = progress or (lambda done, total: None), dict(options or {})
     if min(workers, count) <= 1:
         found = []
-        for start, goal in pairs:
-            found.append(_solved(planner, start, goal, given))
+        for pair in pairs:
+            found.append(_solved(planner, *pair, given))
             report(len(found), count)
         return found
     results: list[Trajectory | PlanningError | None] = [None] * count
     pool = ProcessPoolExecutor(min(workers, count), get_context("spawn"), _begin, (planner,))
     try:
         futures: dict[Future[Trajectory | PlanningError], int] = {
-            pool.submit(_solve, start, goal, given): k for k, (start, goal) in enumerate(pairs)
+            pool.submit(_solve, *pair, given): k for k, pair in enumerate(pairs)
         }
         for done, future in enumerate(as_completed(futures), start=1):
             results[futures[future]] = future.result()
@@ -85,16 +89,29 @@ def _begin(planner: OneMotion) -> None:
     _planner[:] = [planner]
 
 
-def _solve(start: Array, goal: Array, options: dict[str, Any]) -> Trajectory | PlanningError:
-    return _solved(_planner[0], start, goal, options)
+def _solve(start: Array, goal: Array, warm: Trajectory | None, options: dict[str, Any]) -> Trajectory | PlanningError:
+    return _solved(_planner[0], start, goal, warm, options)
 
 
-def _solved(planner: OneMotion, start: Array, goal: Array, options: dict[str, Any]) -> Trajectory | PlanningError:
+def _solved(
+    planner: OneMotion, start: Array, goal: Array, warm: Trajectory | None, options: dict[str, Any]
+) -> Trajectory | PlanningError:
     try:
-        return planner.solve(start, goal, **options)
+        return planner.solve(start, goal, warm=warm, **options)
     except PlanningError as error:
         # Without its traceback and context, which hold the planner's programs.
         return PlanningError(str(error))
+
+
+def _similar(warm: object, count: int) -> list[Trajectory | None]:
+    """Return a similar motion for each pair: one for all, or one each; results of an earlier call hold errors too."""
+    if warm is None or isinstance(warm, Trajectory):
+        return [warm] * count
+    if not isinstance(warm, Sequence) or not all(isinstance(one, Trajectory | PlanningError | None) for one in warm):
+        raise TypeError(f"warm is {type(warm).__name__}; expected a Trajectory, or a list of them and of None")
+    if len(warm) != count:
+        raise ValueError(f"warm has {len(warm)} motions; expected one, or {count}")
+    return [one if isinstance(one, Trajectory) else None for one in warm]
 
 
 def _places(values: ArrayLike, n: int, name: str, *, poses: bool) -> Sequence[Array]:

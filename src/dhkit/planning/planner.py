@@ -28,7 +28,7 @@ from dhkit.planning.feasibility import (
 from dhkit.planning.goals import Route, find_routes, parse_places
 from dhkit.planning.guess import leg_durations
 from dhkit.planning.joint_limits import Limit
-from dhkit.planning.many import ManyProgress, solve_many
+from dhkit.planning.many import ManyProgress, SimilarMotions, solve_many
 from dhkit.planning.mesh import MIN_LEG_INTERVALS, Curve, Mesh
 from dhkit.planning.motion_program import MAX_SMALL_JOINTS, MotionProgram, curves_for
 from dhkit.planning.objectives import Objective, ObjectiveLike
@@ -248,6 +248,7 @@ class Planner:
         starts: ArrayLike,
         goals: ArrayLike,
         *,
+        warm: SimilarMotions = None,
         workers: int | None = None,
         progress: ManyProgress | None = None,
         **options: Any,
@@ -260,6 +261,8 @@ class Planner:
         ----------
         starts, goals
             Joint values, shape (N, n), or (n,) for all, rad and m; goals may be poses (N, 4, 4) or (4, 4) of the tool.
+        warm
+            A motion like all of them, or N motions, such as those found for places nearby: initial guesses.
         workers
             Number of processes: as many as the machine has cores unless given, 1 for none.
         progress
@@ -272,7 +275,7 @@ class Planner:
         ValueError, TypeError
             Arguments of another shape or type.
         """
-        return solve_many(self, starts, goals, workers=workers, progress=progress, options=options)
+        return solve_many(self, starts, goals, warm=warm, workers=workers, progress=progress, options=options)
 
     # Programs
 
@@ -395,8 +398,7 @@ class Planner:
         """Return the best motion of a task, and count the work."""
         if task.rests and task.span < RESOLUTION:
             return PlannedMotion.unresolved(task)
-        count = len(self._curves(task))
-        for attempt in range(count):
+        for attempt in range(count := len(self._curves(task))):
             program, seconds = self.program(task, attempt)
             work.build_seconds += seconds
             is_last = attempt == count - 1
