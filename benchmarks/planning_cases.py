@@ -254,7 +254,8 @@ def _manutec() -> Iterator[Case]:
     start, goal = (arm.numbers.configurations[name] for name in ("start", "goal"))
 
     def solve(intervals: int) -> Trajectory:
-        motion = Planner(arm, Effort(joint_weights=tuple(VOLTAGE**2)), intervals=intervals).solve(start, goal, duration=0.53)
+        planner = Planner(arm, Effort(joint_weights=tuple(VOLTAGE**2)), intervals=intervals)
+        motion = planner.solve(start, goal, duration=0.53)
         if abs(motion.report.cost / PUBLISHED_ENERGY - 1) > 1e-3:
             raise PlanningError(f"{intervals} intervals: {motion.report.cost:.5g} V^2 s")
         return motion
