@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from dhkit import Arm, ComputedTorque
 from dhkit.description import Coupling, from_toml, library_robot, lock, to_toml
 from dhkit.dynamics import regressor
+from dhkit.errors import DescriptionError
 from dhkit.expressions import exact
 from dhkit.model import urdf_text
 from dhkit.symbolic import base_parameters, derive, lagrangian
@@ -139,3 +140,13 @@ def test_motions_and_controllers_know_it():
     without = Arm(replace(MANUTEC, couplings=()))
     worse = arm.simulate(ComputedTorque.tuned(without), motion, saturation=False)
     assert np.abs(worse.error).max() > 1.01 * np.abs(run.error).max()
+
+
+@pytest.mark.parametrize("inertia", [30.0, 500.0, -500.0])
+def test_a_coupling_that_makes_the_mass_matrix_indefinite_is_refused(inertia):
+    arm = Arm(replace(MANUTEC, couplings=(Coupling((2, 3), exact(inertia)),)))
+    message = "not positive definite: the coupling of joints 2 and 3 is too large"
+    with pytest.raises(DescriptionError, match=message):
+        arm.plan("start", "goal")
+    with pytest.raises(DescriptionError, match=message):
+        arm.forward_dynamics(np.array([0.1, -0.8, 1.2]), np.zeros(3), np.ones(3))

@@ -5,12 +5,16 @@ Modules: certificate.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import dhkit
 from dhkit import Arm, Limits, Trajectory
-from dhkit.planning import Payload
+from dhkit.description import from_dh
+from dhkit.expressions import exact
+from dhkit.planning import Payload, certify
 
 
 def test_a_motion_is_certified_against_the_arms_limits_or_others():
@@ -149,3 +153,16 @@ def test_a_table_read_as_samples_keeps_its_payload(tmp_path):
         again = Trajectory.read(tmp_path / "changed.csv", ARM)
         assert again.payload == motion.payload
         assert not ARM.certify(again).ok
+
+
+@pytest.mark.parametrize("turns", [11.5, 23, 46])
+def test_whole_turns_between_the_points_of_a_piece_are_seen(turns):
+    """23 turns in 23 steps put all states of a piece at one phase of gravity."""
+    arm = from_dh([(0, 0, 1.0, 0)], bodies=[{"mass": 1, "com": [-0.5, 0, 0], "inertia": np.eye(3) * 0.01}])
+    arm = replace(arm, gravity=(exact(0), exact(-9.81), exact(0)))
+    rate = 2 * np.pi * turns / 2.0
+    motion = Trajectory.from_samples(arm, [0, 2.0], [[-np.pi / 2], [-np.pi / 2 + 2 * rate]], [[rate], [rate]])
+    limits = Limits.of(arm, velocity=400.0, torque=3.0)
+    certificate = certify(arm, motion, limits)
+    assert not certificate.ok
+    assert certificate.violation == pytest.approx(0.5 * 9.81 / 3 - 1, rel=1e-2)

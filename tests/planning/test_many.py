@@ -1,7 +1,10 @@
 """Many motions over processes: those of one planner, one after the other."""
 
+import multiprocessing
+import os
 import pickle
 import time
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -68,6 +71,34 @@ def test_other_shapes_are_refused(starts, goals, options, message):
         planner().solve_many(starts, goals, **options)
     with pytest.raises(TypeError, match=r"starts: found .* expected numbers, shape \(..., 2\)"):
         planner().solve_many("ready", goals)
+
+
+@dataclass(frozen=True)
+class Dies(ToolSpeed):
+    """A constraint that ends the process that another one started."""
+
+    def rows(self, point, parameters):
+        if multiprocessing.parent_process() is not None:
+            os._exit(1)
+        return super().rows(point, parameters)
+
+
+def test_what_can_go_wrong_with_processes_is_said():
+    found = planner(constraints=[Dies(5.0)]).solve_many(STARTS[:2], GOALS[:2], workers=2)
+    assert all("ended from outside" in str(error) for error in found) and len(found) == 2
+
+    @dataclass(frozen=True)
+    class Local(ToolSpeed):
+        pass
+
+    with pytest.raises(TypeError, match=r"cannot be sent to other processes .*Local"):
+        planner(constraints=[Local(5.0)]).solve_many(STARTS, GOALS, workers=2)
+    with pytest.raises(TypeError, match="progress is int; expected a function"):
+        planner().solve_many(STARTS, GOALS, workers=1, progress=5)
+    bad = GOALS.copy()
+    bad[2, 1] = np.nan
+    with pytest.raises(ValueError, match=r"goals\[2\] has values that are not finite"):
+        planner().solve_many(STARTS, bad, workers=1)
 
 
 def test_an_exception_in_progress_ends_the_rest():

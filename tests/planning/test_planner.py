@@ -180,6 +180,22 @@ def test_the_tools_speed():
     assert speed.max() > 0.499
 
 
+@pytest.mark.parametrize(("name", "speed"), [("puma560", 0.01), ("puma560", 1e-4), ("ur5", 0.01)])
+def test_a_tool_speed_far_below_the_joints_speeds_is_kept(name, speed):
+    """From rest to rest the slowed motion is a solution."""
+    arm = dhkit.Arm.load(name)
+    start = np.array(arm.configurations["ready"])
+    motion = arm.plan(
+        start,
+        start + np.array([0.8, -0.2, 0.3, 0.1, 0.2, 0.3]),
+        constraints=[dhkit.ToolSpeed(speed)],
+        compare=False,
+        time_limit=2,
+    )
+    assert motion.report.certificate.ok
+    assert np.linalg.norm(tool_motion(arm.description, motion)[0], axis=1).max() <= speed * (1 + ALLOWED)
+
+
 @pytest.mark.slow
 def test_the_tools_acceleration():
     motion = Planner(PUMA, constraints=[ToolAcceleration(3.0)], intervals=24).solve(START, GOAL)

@@ -70,15 +70,24 @@ def forward_dynamics(
 
 @takes_robot
 def require_inertia(description: Description) -> None:
-    """Check that an arm's mass matrix is regular at some state, so that its joints have accelerations.
+    """Check that an arm's mass matrix is regular at some state, and with couplings positive definite at all.
 
     Raises
     ------
     DescriptionError
-        A link without a body; joints that carry no inertia at any state: names them, and what would help.
+        A link without a body; joints that carry no inertia at any state, or couplings that are too large: names them,
+        and what would help.
     """
     q = np.random.default_rng(0).uniform(-np.pi, np.pi, (SINGULAR_SAMPLES, description.n))
-    everywhere = _failing(mass_matrix(description, q))
+    M = mass_matrix(description, q)
+    if description.couplings and (np.linalg.eigvalsh(M)[:, 0] < -SINGULAR * np.abs(M).max(axis=(1, 2))).any():
+        pairs = (coupling.joints for coupling in description.couplings)
+        listed = ", ".join(f"joints {i} and {j}" for i, j in pairs)
+        raise DescriptionError(
+            f"{description.name}: the mass matrix is not positive definite: the coupling of {listed} is too large for "
+            "the inertia of links and drives"
+        )
+    everywhere = _failing(M)
     if np.all(everywhere >= 0):
         names = _named(description, np.unique(everywhere))
         raise DescriptionError(

@@ -24,11 +24,15 @@ POINTS = 24
 """Number of states in an interval, with both ends: dense, since users sample a motion at any times."""
 POINTS_PER_COEFFICIENT = 4
 """Number of states in an interval for each coefficient of its polynomials, whose extremes lie close together."""
+LARGEST_TURN = 0.2
+"""Turn of a joint between two states, rad: torques change with sines and cosines of the joint values."""
+MAX_POINTS = 20_000
+"""Largest number of states in an interval."""
 ACCEPTED_EXCESS = 5e-7
 """Largest excess of a certified motion, as a share of the limit: half of the documented 1e-6."""
 ACTIVE_SHARE = 0.99
 """Share of a limit from which it counts as active."""
-MAX_SLOW_DOWN, SLOW_DOWN_TOLERANCE = 1e3, 1e-9
+MAX_SLOW_DOWN, SLOW_DOWN_TOLERANCE = 1e9, 1e-9
 """Largest factor by which a motion is slowed down, and the tolerance of such factors."""
 MIN_SEARCHED_COEFFICIENTS = 3
 """Number of coefficients from which a polynomial may have an extreme inside its piece."""
@@ -174,7 +178,7 @@ def certify(
         raise ValueError(f"limits are of {len(limits.velocity)} joints; expected {description.n}")
     carried = motion.payload if payload is None else payload
     chosen = motion.friction if friction is None else Friction.chosen(friction)
-    points = max(POINTS, POINTS_PER_COEFFICIENT * motion.coefficients.shape[1])
+    points = max(POINTS, POINTS_PER_COEFFICIENT * motion.coefficients.shape[1], _points_of_turns(description, motion))
     certificate = Checker(loaded(description, carried), limits, friction=chosen, points=points).check(motion)
     return certificate.with_worse_checks(_extremes(motion, limits, points))
 
@@ -312,6 +316,14 @@ def _largest_jump(trajectory: Trajectory, limits: Limits) -> Check | None:
         found.append(Check(what, float(jumps[k, i]), int(i), float(inner[k])))
     worst = max(found, key=lambda check: check.excess)
     return worst if worst.excess > ACCEPTED_EXCESS else None
+
+
+def _points_of_turns(description: Description, motion: Trajectory) -> int:
+    """Return the number of states of a piece with which no joint turns by more than ``LARGEST_TURN`` between two."""
+    _, rates = motion.pieces.differentiated(1).inside(POINTS)
+    turns = np.abs(rates).mean(axis=1) * np.diff(motion.breaks)[:, None]
+    most = float(turns[:, ~description.numbers.prismatic].max(initial=0.0))
+    return min(int(most / LARGEST_TURN) + 2, MAX_POINTS)
 
 
 def _extremes(motion: Trajectory, limits: Limits, points: int) -> list[Check]:

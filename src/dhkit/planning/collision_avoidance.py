@@ -12,6 +12,7 @@ import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.errors import PlanningError
+from dhkit.planning.between_states import smallest_between
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.joint_limits import joint_limits
 from dhkit.planning.obstacles import (
@@ -31,6 +32,8 @@ from dhkit.trajectories import Limits
 
 MIN_REACH = 1e-9
 """Smallest reach (m) used as a scale of lengths, for arms without reach."""
+BETWEEN, MIN_BETWEEN = 0.1, 1e-3
+"""Share of the clearance, at least in m, by which a distance may fall below it between two states of a certificate."""
 KEPT_SHARE = 0.75
 """Share of a gap at an end of a motion to which the clearance is reduced there: a link may come a little nearer on its
 way out of a narrow place."""
@@ -94,7 +97,15 @@ class CollisionAvoidance:
         }
 
     def between(self, description: Description, start: Array, goal: Array) -> CollisionAvoidance:
-        """Return the settings for a motion between two configurations (n,), with the reduced clearances of its ends."""
+        """Return the settings for a motion between two configurations (n,), with the reduced clearances of its ends.
+
+        Raises
+        ------
+        PlanningError
+            A clearance above the reach.
+        """
+        if self.clearance > Clearance.unit(description):
+            raise PlanningError(f"clearance is {self.clearance:.4g} m, more than the arm's reach")
         separation = Separation(description, self.obstacles, self.self_collision)
         ends = separation.gaps(np.stack([start, goal])[:, None]).gap
         reduced = []
@@ -115,15 +126,42 @@ class CollisionAvoidance:
         at_start, at_goal = self.at_ends(pairs).T
         return required_gaps(gap, self.clearance, at_start, at_goal, longer)
 
-    def shortfalls(self, description: Description, q: Array) -> Array:
-        """Return how much is missing of the required distances along a motion q (N, n), shape (N,), m; by coal."""
-        pairs = [reduced.pair for reduced in self.reduced]
-        found = distances_without(description, q, self.obstacles, self.self_collision, pairs)
-        short: Array = self.clearance - np.asarray(found.distance)
+    def shortfalls(self, states: States) -> Array:
+        """Return how much is missing of the required distances along a motion, shape (N,), m; by coal.
+
+        At the states the distances themselves are required, and between them all but ``BETWEEN`` of the clearance;
+        pairs with a reduced clearance may not touch.
+        """
+        pairs, description = [reduced.pair for reduced in self.reduced], states.description
+        usual, each = self._distances(description, states.q), self._reduced_distances(description, states.q)
+        short = self.clearance - usual
         if pairs:
-            each = np.stack([pair_distances(description, q, self.obstacles, pair) for pair in pairs], axis=1)
             short = np.maximum(short, np.max(self.required(each, pairs) - each, axis=1))
-        return short
+
+        def gaps(q: Array) -> Array:
+            return np.stack([self._distances(description, q), self._nearest_reduced(description, q)], axis=1)
+
+        slack = min(max(BETWEEN * self.clearance, MIN_BETWEEN), self.clearance)
+        least = np.array([self.clearance - slack, 0.0])
+        at_states = np.stack([usual, each.min(axis=1, initial=np.inf)], axis=1)
+        between = smallest_between(states, at_states, gaps, least)
+        missing = np.where(between < least, [self.clearance, 0.0] - between, -np.inf)
+        result: Array = np.maximum(short, missing.max(axis=1))
+        return result
+
+    def _distances(self, description: Description, q: Array) -> Array:
+        """Return the smallest distance of pairs whose clearance is not reduced, shape (N,), m."""
+        without = [reduced.pair for reduced in self.reduced]
+        return np.asarray(distances_without(description, q, self.obstacles, self.self_collision, without).distance)
+
+    def _reduced_distances(self, description: Description, q: Array) -> Array:
+        """Return the distances of the pairs whose clearance is reduced, shape (N, P), m."""
+        each = [pair_distances(description, q, self.obstacles, reduced.pair) for reduced in self.reduced]
+        return np.stack(each, axis=1) if each else np.zeros((len(q), 0))
+
+    def _nearest_reduced(self, description: Description, q: Array) -> Array:
+        nearest: Array = self._reduced_distances(description, q).min(axis=1, initial=np.inf)
+        return nearest
 
     def require_gap(self, description: Description, q: Array, where: str, least: float) -> None:
         """Require a distance of at least ``least`` (m), and no collision, at one configuration q (n,), rad and m.
@@ -169,7 +207,7 @@ class Clearance(Constraint):
 
     def measured(self, states: States, parameters: Array) -> Array:
         """Return 1 plus what is missing of the required distances in shares of the reach, shape (N, 1); at least 0."""
-        short = self.avoidance.shortfalls(states.description, states.q)
+        short = self.avoidance.shortfalls(states)
         return 1 + np.maximum(short[:, None] / self.unit(states.description), -1.0)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from dhkit.description import Array, Description
 from dhkit.description.frames import world_to_tool
 from dhkit.description.joint_text import joint_text, violated_limit_text
+from dhkit.dynamics import require_inertia
 from dhkit.errors import PlanningError
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.goals import Place, Route
@@ -138,7 +139,11 @@ def require_possible(
     ------
     PlanningError
         Says which place, limit or obstacle does not.
+    DescriptionError
+        Couplings of drives make the mass matrix indefinite.
     """
+    if description.couplings:
+        require_inertia(description)
     limits = request.limits
     require_speed(description, limits, request.start_velocity, "start")
     require_speed(description, limits, request.goal_velocity, "goal")

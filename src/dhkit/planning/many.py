@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+import pickle
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from multiprocessing import get_context
 from typing import Any, Protocol, TypeAlias
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description
@@ -56,6 +60,8 @@ def solve_many(
     if workers is None:
         workers = os.cpu_count() or 1
     check_whole("workers", workers, 1)
+    if progress is not None and not callable(progress):
+        raise TypeError(f"progress is {type(progress).__name__}; expected a function of two numbers")
     report, given = progress or (lambda done, total: None), dict(options or {})
     if min(workers, count) <= 1:
         found = []
@@ -63,14 +69,17 @@ def solve_many(
             found.append(_solved(planner, *pair, given))
             report(len(found), count)
         return found
-    results: list[Trajectory | PlanningError | None] = [None] * count
+    _require_sendable(planner)
+    lost = PlanningError("its process was ended from outside, for want of memory perhaps; fewer workers= need less")
+    results: list[Trajectory | PlanningError] = [lost] * count
     pool = ProcessPoolExecutor(min(workers, count), get_context("spawn"), _begin, (planner,))
     try:
         futures: dict[Future[Trajectory | PlanningError], int] = {
             pool.submit(_solve, *pair, given): k for k, pair in enumerate(pairs)
         }
         for done, future in enumerate(as_completed(futures), start=1):
-            results[futures[future]] = future.result()
+            with suppress(BrokenProcessPool):
+                results[futures[future]] = future.result()
             report(done, count)
     except BaseException:
         for process in list((pool._processes or {}).values()):
@@ -78,7 +87,17 @@ def solve_many(
         pool.shutdown(cancel_futures=True)
         raise
     pool.shutdown()
-    return [result for result in results if result is not None]
+    return results
+
+
+def _require_sendable(planner: OneMotion) -> None:
+    try:
+        pickle.dumps(planner)
+    except (AttributeError, TypeError, pickle.PicklingError) as error:
+        raise TypeError(
+            f"the planner cannot be sent to other processes ({error}): define its constraints and objective at the top "
+            "of a module, or use workers=1"
+        ) from None
 
 
 _planner: list[OneMotion] = []
@@ -118,8 +137,12 @@ def _places(values: ArrayLike, n: int, name: str, *, poses: bool) -> Sequence[Ar
     """Return places, each of shape (n,) or (4, 4), from one or several of them."""
     expected = f"(..., {n})" + (" or (..., 4, 4)" if poses else "")
     array = number_array(values, name, expected)
+    if not array.size:
+        raise ValueError(f"{name} has shape {array.shape}: no places; expected {expected}")
+    if array.ndim > 1 and not (finite := np.isfinite(array).reshape(len(array), -1).all(axis=1)).all():
+        raise ValueError(f"{name}[{int(np.argmin(finite))}] has values that are not finite")
     if poses and array.shape[-2:] == (4, 4) and array.ndim in (2, 3):
         return list(array.reshape(-1, 4, 4))
-    if array.ndim not in (1, 2) or array.shape[-1] != n or not array.size:
+    if array.ndim not in (1, 2) or array.shape[-1] != n:
         raise ValueError(f"{name} has shape {array.shape}; expected {expected}")
     return list(array.reshape(-1, n))

@@ -91,9 +91,18 @@ class MotionProgram(Program[Knots]):
         durations = np.maximum(durations, 10 * MIN_LEG_SHARE * float(durations.sum()) or STILL_DURATION)
         if task.duration is not None:
             durations *= task.duration / durations.sum()
-        elif not task.objective.only_time:
-            durations *= self._best_factor(task, durations)
+        else:
+            if task.rests and any(constraint.moving for constraint in task.checker.constraints):
+                durations *= self._slowness(task, durations)
+            if not task.objective.only_time:
+                durations *= self._best_factor(task, durations)
         return durations
+
+    def _slowness(self, task: Task, durations: Array) -> float:
+        """Return how much slower the straight path must be for constraints, which may be far below the limits."""
+        motion = self._assembled(task, straight_knots(task, self.mesh, durations))
+        slower = task.checker.slow_down(task.checker.states(motion))
+        return slower if np.isfinite(slower) else 1.0
 
     def _best_factor(self, task: Task, durations: Array) -> float:
         """Return the factor of the durations with which the straight path costs least."""

@@ -365,8 +365,7 @@ class Planner:
         reports, work, chosen = list[BranchReport](), Work(), -1
         for number, route in enumerate(routes):
             hopeless = best is not None and self.objective.only_time and route.bound >= best[1].trajectory.duration
-            late = best is not None and time.perf_counter() > deadline
-            if hopeless or late:
+            if hopeless or (best is not None and time.perf_counter() > deadline):
                 reports.append(BranchReport(route.label, route.bound, solved=False))
                 continue
             try:
@@ -418,6 +417,8 @@ class Planner:
                 return AvoidingSearch(task, search, program, finer)(warm)
             except PlanningError:
                 if is_last or time.perf_counter() > deadline:
+                    if (slow := PlannedMotion.slowed_straight(task, program.intervals)) is not None:
+                        return slow
                     raise
         raise AssertionError("no curve")
 
@@ -425,8 +426,7 @@ class Planner:
         self, error: PlanningError, request: PlanRequest, routes: Sequence[Route], deadline: float
     ) -> PlanningError:
         """Return the error for a motion that was not found: a duration below that of the fastest motion, if so."""
-        late = time.perf_counter() > deadline
-        if late or request.duration is None or len(routes) > 1 or request.avoidance:
+        if time.perf_counter() > deadline or request.duration is None or len(routes) > 1 or request.avoidance:
             return error
         quickest = Planner(
             self.description, "time", request.limits, self.constraints, MIN_DEFAULT_INTERVALS, self.friction or False

@@ -83,7 +83,8 @@ class PlanReport:
             asked, spare = 1000 * self.clearance, 1000 * max(self.spare_clearance, 0.0)
             notes.append(f"clearance: {asked:.3g} mm kept from obstacles, and at least {spare:.3g} mm more")
         if self.reduced_clearances:
-            notes.append(f"clearance reduced near the ends: {', '.join(self.reduced_clearances)}")
+            less = ", ".join(self.reduced_clearances)
+            notes[-1] += f", but less near the ends, until they are that far apart: {less}"
         if not self.is_converged:
             notes.append("not optimal to the solver's tolerance: it stopped at a motion that keeps all limits")
         if not self.is_resolved:

@@ -82,6 +82,27 @@ class PlannedMotion:
         cost = cost_of(task.objective, trajectory, task.loaded, task.friction)
         return cls(trajectory, certificate, cost, 1, is_resolved=False)
 
+    @classmethod
+    def slowed_straight(cls, task: Task, intervals: int) -> PlannedMotion | None:
+        """Return cubics along the straight path, slowed down until they keep all limits; None if they cannot.
+
+        For constraints far below the joints' limits, which leave the optimizer a flat objective.
+        """
+        if not (task.rests and task.duration is None and task.checker.constraints):
+            return None
+        durations = np.maximum(leg_durations(task.loaded, task.limits, task.points), SHORTEST_DURATION)
+        times, velocities = np.concatenate([[0.0], np.cumsum(durations)]), np.zeros_like(task.points)
+        straight = Trajectory.from_samples(task.arm, times, task.points, velocities)
+        c = task.checker.slow_down(task.checker.states(straight))
+        if not np.isfinite(c):
+            return None
+        trajectory = straight.slowed(c * (1 + TIME_SCALING_MARGIN))
+        certificate = task.checker.check(trajectory)
+        if not certificate.ok:
+            return None
+        cost = cost_of(task.objective, trajectory, task.loaded, task.friction)
+        return cls(trajectory, certificate, cost, intervals, is_converged=False)
+
 
 @dataclass
 class Work:

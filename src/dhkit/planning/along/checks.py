@@ -73,8 +73,11 @@ def require_kept(program: PathProgram[Profile]) -> None:
         Names the constraint or the obstacle, and the place.
     """
     task, states = program.task, program.states
-    q, s = states.q.reshape(-1, task.arm.n), states.s.ravel()
-    still = States(task.loaded, s, q, 0 * q, 0 * q)
+    # Both ends of each interval in the order of s, with derivatives by s in place of rates: between two places the
+    # clearance is measured along the path itself.
+    q, slope, bend = (np.swapaxes(x, 0, 1).reshape(-1, task.arm.n) for x in (states.q, states.qs, states.qss))
+    s = states.s.T.ravel()
+    still = States(task.loaded, s, q, slope, bend)
     for limit, (constraint, parameters) in task.checker.limiting.items():
         if constraint.moving or limit == Limit.POSITION:
             continue
@@ -82,7 +85,9 @@ def require_kept(program: PathProgram[Profile]) -> None:
         k = int(np.argmax(use))
         if use[k] > 1 + CONSTRAINT_ROUNDING:
             if limit == Limit.CLEARANCE:
-                task.avoidance.require_gap(task.arm, q[k], f"the path at s = {s[k]:.4g}", task.avoidance.clearance)
+                where = f"the path at s = {s[k]:.4g}"
+                task.avoidance.require_gap(task.arm, q[k], where, task.avoidance.clearance)
+                raise PlanningError(f"{where}: the way to the next place leads too near to {task.avoidance.names}")
             raise PlanningError(
                 f"{constraint.what} is exceeded by {100 * (use[k] - 1):.2g} % at s = {s[k]:.4g}, at any speed"
             )

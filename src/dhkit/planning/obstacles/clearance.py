@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.display import counted, repr_line
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, world_axes
-from dhkit.planning.obstacles.pairs import Pair, checked_pairs
+from dhkit.planning.obstacles.pairs import Pair, capsules_beside, checked_pairs, ends_above
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
 from dhkit.planning.obstacles.segments import Bounds, axis_bounds, segment_distances
 from dhkit.planning.obstacles.solids import capsule_distances, obstacle_distances
@@ -145,18 +145,18 @@ def _from_one(
     without: Collection[int],
 ) -> Nearest:
     """Return the distances from one obstacle, without some capsules; the candidates are those of `_pair_names`."""
-    pairs = checked_pairs(description)
     if isinstance(obstacle, Floor):
         nothing = np.full(len(axes), np.inf)
         heights = [
             nothing if i in without else axes[:, i, end, 2] - capsules[i].radius - obstacle.height
-            for i, end in pairs.heights
+            for i, end in ends_above(description, obstacle.height)
         ]
         return _smallest(np.stack(heights, axis=1) if heights else np.full((len(axes), 0), np.inf))
-    radii = np.array([capsules[i].radius for i in pairs.moving])
-    moving = axes[:, list(pairs.moving)]
+    beside = capsules_beside(description, obstacle)
+    radii = np.array([capsules[i].radius for i in beside])
+    moving = axes[:, list(beside)]
     low, high = axis_bounds(obstacle, moving)
-    far = np.where([i in without for i in pairs.moving], np.inf, 0.0)
+    far = np.where([i in without for i in beside], np.inf, 0.0)
     return _exact(
         (low - radii + far, high - radii + far), lambda i, rows: obstacle_distances(radii[i], moving[rows, i], obstacle)
     )
@@ -193,8 +193,10 @@ def _smallest(distances: Array) -> Nearest:
 def _pair_names(
     description: Description, capsules: tuple[LinkCapsule, ...], obstacle: Obstacle | Floor
 ) -> list[tuple[str, str]]:
-    pairs = checked_pairs(description)
-    ends = [i for i, _ in pairs.heights] if isinstance(obstacle, Floor) else pairs.moving
+    if isinstance(obstacle, Floor):
+        ends = tuple(i for i, _ in ends_above(description, obstacle.height))
+    else:
+        ends = capsules_beside(description, obstacle)
     return [(capsules[i].name, obstacle.name) for i in ends]
 
 

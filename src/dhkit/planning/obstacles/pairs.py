@@ -12,7 +12,9 @@ import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.planning.obstacles.capsules import link_capsules, world_axes
+from dhkit.planning.obstacles.scene import Obstacle
 from dhkit.planning.obstacles.segments import segment_distances
+from dhkit.planning.obstacles.solids import obstacle_distances
 
 SAMPLES = 4000
 """Number of random configurations from which the pairs are chosen."""
@@ -21,6 +23,10 @@ CONSTANT_DISTANCE = 1e-3
 """Largest change of a distance over all configurations (m) with which it counts as constant."""
 OVERLAP_SHARE = 0.4
 """Share of configurations with an overlap from which two capsules are not checked: neighbours, or crude capsules."""
+STILL = 1e-9
+"""Largest travel, as a share of the reach, that is rounding."""
+STANDING_SAMPLES = 400
+"""Number of configurations in which an arm that stands in an obstacle overlaps it."""
 NEAR_SHARE = 0.05
 """Smallest distance over all configurations, as a share of the reach, beyond which an optimizer ignores a pair."""
 
@@ -31,17 +37,16 @@ class CheckedPairs:
 
     Determined from 4,000 random configurations within the limits (unlimited joints: pi, or the reach, each way):
 
-    - obstacles: capsules with an end that travels by more than the radius, along some axis of the world; so never the
-      base's, nor a shoulder's that turns about its own axis: no motion changes their distances;
-    - floor: ends whose height changes by more than the radius: an arm may stand on the floor, close above it or in it;
+    - obstacles: capsules with an end that moves; so never the base's, nor a shoulder's that turns about its own axis;
+    - floor: ends whose height changes;
     - itself: capsules of links that no joint connects, unless their distance does not change or they overlap in
       more than 40 % of the configurations, as those of a spherical wrist do, or of a slider and its bar.
     """
 
     moving: tuple[int, ...]
-    """Indices of capsules that are checked against obstacles."""
+    """Indices of capsules that are checked against obstacles, see :func:`capsules_beside`."""
     heights: tuple[tuple[int, int], ...]
-    """Capsules and their ends (0 or 1) that are checked against the floor."""
+    """Capsules and their ends (0 or 1) that are checked against the floor, see :func:`ends_above`."""
     itself: tuple[tuple[int, int], ...]
     """Pairs of capsules that are checked against each other."""
     near: tuple[tuple[int, int], ...]
@@ -71,18 +76,62 @@ def _checked_pairs(description: Description, mesh_folder: Path | None) -> Checke
     axes = world_axes(description, _configurations(description))
     radii = np.array([capsule.radius for capsule in capsules])
     travels = np.ptp(axes, axis=0)  # of each end of each capsule along x, y and z
-    heights = np.argwhere(travels[:, :, 2] > radii[:, None]).tolist()
+    moves = travels > STILL * max(description.reach, STILL)
+    heights = np.argwhere(moves[:, :, 2]).tolist()
     apart = [(i, j) for i, j in combinations(range(len(capsules)), 2) if capsules[j].link - capsules[i].link > 1]
     gaps = {(i, j): segment_distances(axes[:, i], axes[:, j]) - radii[i] - radii[j] for i, j in apart}
     itself = [
         pair for pair, gap in gaps.items() if np.ptp(gap) > CONSTANT_DISTANCE and np.mean(gap < 0) <= OVERLAP_SHARE
     ]
     return CheckedPairs(
-        moving=tuple(int(i) for i in np.flatnonzero(travels.max(axis=(1, 2)) > radii)),
+        moving=tuple(int(i) for i in np.flatnonzero(moves.any(axis=(1, 2)))),
         heights=tuple((i, end) for i, end in heights),
         itself=tuple(itself),
         near=tuple(pair for pair in itself if gaps[pair].min() < NEAR_SHARE * description.reach),
     )
+
+
+def capsules_beside(description: Description, obstacle: Obstacle) -> tuple[int, ...]:
+    """Return the indices of the capsules that are checked against an obstacle.
+
+    They are those that move, without those that travel by no more than their radius and overlap the obstacle in all
+    configurations: a foot in the box or table that the arm stands on, which no motion changes.
+    """
+    return _capsules_beside(description, description.mesh_folder, obstacle)
+
+
+@lru_cache(maxsize=1024)
+def _capsules_beside(description: Description, mesh_folder: Path | None, obstacle: Obstacle) -> tuple[int, ...]:
+    capsules = link_capsules(description)
+    axes = world_axes(description, _configurations(description)[:STANDING_SAMPLES])
+
+    def stands_in(i: int) -> bool:
+        radius = capsules[i].radius
+        is_slight = np.ptp(axes[:, i], axis=0).max() <= radius
+        return bool(is_slight and (obstacle_distances(radius, axes[:, i], obstacle) < 0).all())
+
+    return tuple(i for i in checked_pairs(description).moving if not stands_in(i))
+
+
+def ends_above(description: Description, height: float) -> tuple[tuple[int, int], ...]:
+    """Return the capsules and their ends (0 or 1) that are checked against a floor at a height, m.
+
+    They are those whose height changes, without those that change it by no more than their radius and are below the
+    floor in all configurations: an arm may stand in it.
+    """
+    return _ends_above(description, description.mesh_folder, height)
+
+
+@lru_cache(maxsize=256)
+def _ends_above(description: Description, mesh_folder: Path | None, height: float) -> tuple[tuple[int, int], ...]:
+    capsules = link_capsules(description)
+    axes = world_axes(description, _configurations(description)[:STANDING_SAMPLES])
+
+    def stands_in(i: int, end: int) -> bool:
+        radius, lowest = capsules[i].radius, axes[:, i, end, 2]
+        return bool(np.ptp(lowest) <= radius and (lowest < radius + height).all())
+
+    return tuple((i, end) for i, end in checked_pairs(description).heights if not stands_in(i, end))
 
 
 def _configurations(description: Description) -> Array:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array, Box, Description
 from dhkit.planning.obstacles.capsules import link_capsules, world_axes
-from dhkit.planning.obstacles.pairs import Pair, checked_pairs
+from dhkit.planning.obstacles.pairs import Pair, capsules_beside, checked_pairs, ends_above
 from dhkit.planning.obstacles.scene import Floor, Obstacle
 from dhkit.planning.obstacles.segments import nearest_on_box, nearest_points
 
@@ -83,10 +83,11 @@ class Separation:
         self._groups: list[_Group] = []
         for k, item in enumerate(self.obstacles):
             if isinstance(item, Floor):
-                ends = {i: tuple(end for j, end in checked.heights if j == i) for i, _ in checked.heights}
+                above = ends_above(description, item.height)
+                ends = {i: tuple(end for j, end in above if j == i) for i, _ in above}
                 self._add([Pair(i, k, None, which) for i, which in ends.items()], item)
             else:
-                self._add([Pair(i, k) for i in checked.moving], item)
+                self._add([Pair(i, k) for i in capsules_beside(description, item)], item)
         if self_collision:
             self._add([Pair(i, None, j) for i, j in checked.itself], None)
 

@@ -1,0 +1,141 @@
+"""Distances between the sampled states of a motion: an obstacle thinner than a step is not missed.
+
+The distance of a link from an obstacle, or from another link, changes by no more than the link's points travel. Where
+two neighbouring states are so near, or so far apart, that this does not exclude a distance below what is asked for,
+the motion is sampled there again (conservative advancement: Mirtich 1996; Tang, Kim & Manocha 2009).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.description import Array
+from dhkit.description.frames import carrying, world_to_frames
+from dhkit.planning.obstacles import link_capsules, world_axes
+from dhkit.planning.states import States
+
+SMALLEST_TRAVEL = 1e-4
+"""Travel of a link, m, below which a motion is not sampled more finely."""
+MAX_PARTS = 64
+"""Largest number of parts into which a step is divided at once."""
+MAX_TURN = 0.5
+"""Largest sum of the joints' turns in a step, rad, for which its travel is bounded."""
+
+
+def smallest_between(states: States, found: Array, gaps: Callable[[Array], Array], least: Array) -> Array:
+    """Return the smallest distances that are found after each state, before the next, shape (N, G), m.
+
+    If none of them is below ``least``, no distance is anywhere, to ``SMALLEST_TRAVEL``. They are infinite where the
+    distances at the states suffice to tell.
+
+    Parameters
+    ----------
+    states
+        N states in the order of time; where the time goes back, another run begins.
+    found
+        G distances at the states, shape (N, G), m.
+    gaps
+        Returns them for joint values (M, n), rad and m, as (M, G).
+    least
+        Distances that are asked for between the states, shape (G,), m.
+    """
+    smallest = np.full(found.shape, np.inf)
+    step = np.append(np.diff(states.times), 0.0)
+    steps = np.flatnonzero(step > 0)
+    travels = _Travels(states, steps)
+    # Parts of steps: their step, as an index of ``steps``, beginning and end, 0 to 1, and the distances there.
+    which, low, high = np.arange(len(steps)), np.zeros(len(steps)), np.ones(len(steps))
+    at_low, at_high = found[steps], found[steps + 1]
+    while len(which):
+        travel = travels(which, high - low)
+        near = np.minimum(at_low, at_high)
+        open_ = (near >= least) & ((at_low + at_high - travel[:, None]) / 2 < least)
+        kept = open_.any(axis=1) & (travel > SMALLEST_TRAVEL)
+        which, low, high, travel = which[kept], low[kept], high[kept], travel[kept]
+        room = np.where(open_, at_low + at_high - 2 * least, np.inf)[kept].min(axis=1, initial=np.inf)
+        at_low, at_high = at_low[kept], at_high[kept]
+        if not len(which):
+            break
+        with np.errstate(invalid="ignore"):
+            wanted = np.ceil(1.5 * travel / np.maximum(room, SMALLEST_TRAVEL))
+        parts = np.clip(np.nan_to_num(wanted, posinf=MAX_PARTS), 2, MAX_PARTS).astype(int)
+        which, low, high, at_low, at_high = _divided(states, steps, (which, low, high, at_low, at_high), parts, gaps)
+        np.minimum.at(smallest, steps[which], at_low)
+    return smallest
+
+
+_Parts = tuple[NDArray[np.int_], Array, Array, Array, Array]
+
+
+def _divided(
+    states: States, steps: NDArray[np.int_], whole: _Parts, parts: NDArray[np.int_], gaps: Callable[[Array], Array]
+) -> _Parts:
+    """Return parts of steps divided into ``parts`` equal ones each, with the distances at their ends."""
+    which, low, high, at_low, at_high = whole
+    first = np.cumsum(parts) - parts  # index of the first part of each
+    place = np.arange(parts.sum()) - np.repeat(first, parts)
+    size = np.repeat((high - low) / parts, parts)
+    begin = np.repeat(low, parts) + size * place
+    which = np.repeat(which, parts)
+    inner = place > 0
+    begins = np.repeat(at_low, parts, axis=0)
+    begins[inner] = gaps(_joint_values(states, steps[which[inner]], begin[inner]))
+    ends = np.append(begins[1:], begins[:1], axis=0)
+    ends[first + parts - 1] = at_high
+    return which, begin, begin + size, begins, ends
+
+
+def _joint_values(states: States, step: NDArray[np.int_], s: Array) -> Array:
+    """Return joint values at shares s (M,) of steps, shape (M, n): the quintic through both states with their rates."""
+    h, s = (states.times[step + 1] - states.times[step])[:, None], s[:, None]
+    q0, v0, a0 = states.q[step], states.qd[step] * h, states.qdd[step] * h * h
+    q1, v1, a1 = states.q[step + 1], states.qd[step + 1] * h, states.qdd[step + 1] * h * h
+    # What the parabola of the first state misses at the end: value, slope and curvature.
+    x, y, z = q1 - (q0 + v0 + a0 / 2), v1 - (v0 + a0), a1 - a0
+    c3, c4, c5 = 10 * x - 4 * y + z / 2, -15 * x + 7 * y - z, 6 * x - 3 * y + z / 2
+    values: Array = q0 + s * (v0 + s * (a0 / 2 + s * (c3 + s * (c4 + s * c5))))
+    return values
+
+
+class _Travels:
+    """Bounds of the distance that any point of the capsules' axes travels in parts of steps."""
+
+    def __init__(self, states: States, steps: NDArray[np.int_]) -> None:
+        h = (states.times[steps + 1] - states.times[steps])[:, None]
+
+        def larger(values: Array) -> Array:
+            return np.maximum(np.abs(values[steps]), np.abs(values[steps + 1]))
+
+        way = np.maximum(
+            np.abs(states.q[steps + 1] - states.q[steps]), h * larger(states.qd) + h * h / 2 * larger(states.qdd)
+        )
+        self.turn = way[:, ~states.description.numbers.prismatic].sum(axis=1)
+        self.travel = np.einsum("ki,ki->k", way, larger(_levers(states)))
+
+    def __call__(self, which: NDArray[np.int_], share: Array) -> Array:
+        """Return bounds for shares of steps, m; infinite for large turns, in which levers may change much."""
+        turn = self.turn[which] * share
+        # A lever grows by no more than its end travels.
+        inverse = 1 / np.where(turn < MAX_TURN, 1 - turn, 1.0)
+        bounds: Array = np.where(turn < MAX_TURN, self.travel[which] * share * inverse, np.inf)
+        return bounds
+
+
+def _levers(states: States) -> Array:
+    """Return the largest distance of a capsule's axis that a joint moves from the joint's own axis, shape (N, n), m.
+
+    1 for a prismatic joint, which moves all points alike.
+    """
+    description = states.description
+    capsules, ends = link_capsules(description), world_axes(description, states.q)
+    frames = np.moveaxis(world_to_frames(description, states.q), -3, 0)
+    levers = np.ones(states.q.shape)
+    for i, T in enumerate(carrying(description.convention, frames)):
+        if not description.numbers.prismatic[i]:
+            carried = ends[:, [k for k, capsule in enumerate(capsules) if capsule.link > i]]
+            across = np.cross(carried - T[:, None, None, :3, 3], T[:, None, None, :3, 2])
+            levers[:, i] = np.linalg.norm(across, axis=-1).max(axis=(1, 2), initial=0.0)
+    return levers
