@@ -152,7 +152,7 @@ class AvoidingSearch:
     def _none_found(self, when: str) -> PlanningError:
         failure = self.search.failure
         clear = f"{1000 * self.clearance:.3g} mm clear of {self.task.avoidance.names}"
-        starts = f"in {self.paths} start{'s' * (self.paths != 1)}"
+        starts = f"in {self.paths} start{'s' * (self.paths > 1)}" if self.paths else "sampling found no way around"
         reason = f"; the first: {failure}" if failure else ""
         return PlanningError(f"no motion found that keeps {clear}{when}, {starts}{reason}")
 

@@ -61,6 +61,8 @@ def parse_places(
     ValueError, TypeError
         Another shape, values that are not finite, not numbers, or a pose as the start.
     """
+    if not hasattr(via, "__len__"):
+        raise TypeError(f"via is {type(via).__name__}; expected a list of places")
     is_single = isinstance(via, str) or (len(via) and not isinstance(via[0], str) and np.ndim(via[0]) == 0)
     between: list[Any] = [via] if is_single else list(via)
     names = ["start", *(f"via {k}" for k in range(1, len(between) + 1)), "goal"]
@@ -90,6 +92,8 @@ def parse_place(description: Description, value: ArrayLike | str, name: str) -> 
         return Place(name, np.array(known[value]))
     array = number_array(value, name, f"({description.n},) or (4, 4)")
     if array.shape == (4, 4):
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name} has values that are not finite")
         try:
             return Place(name, None, check_pose(array))
         except (DescriptionError, ValueError) as error:
