@@ -246,7 +246,9 @@ class Checker:
                 ActiveLimit(constraint.what, i, float(share @ reached[:, i]), constraint.of_joints)
                 for i in np.flatnonzero(reached.any(axis=0)).tolist()
             ]
-        return Certificate(tuple(checks), len(states.times), states.reference, tuple(active), float(share @ anywhere))
+        return Certificate(
+            tuple(checks), len(states.times), states.reference, tuple(active), min(float(share @ anywhere), 1.0)
+        )
 
     def slow_down(self, states: States) -> float:
         """Return the smallest factor c >= 1 of the duration with which limits that depend on velocity are kept.
