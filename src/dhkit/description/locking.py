@@ -199,6 +199,7 @@ def _lock_all(description: Description, locked: Mapping[int, Expression]) -> Des
     for place, shift in (*((place, place) for place in range(first)), *((place, first) for place in inwards)):
         chain = _lock_one(chain, description.convention, place - shift, locked[place], values)
     moving = [i for i in range(description.n) if i not in locked]
+    numbers = {i + 1: k for k, i in enumerate(moving, start=1)}  # of the joints that remain
     on_base = [body for body in chain.bodies[0] if body is not None]
     return replace(
         description,
@@ -209,10 +210,9 @@ def _lock_all(description: Description, locked: Mapping[int, Expression]) -> Des
         ),
         tool=chain.tool,
         couplings=tuple(
-            replace(coupling, joints=(moving.index(i) + 1, moving.index(j) + 1))
+            replace(coupling, joints=(numbers[coupling.joints[0]], numbers[coupling.joints[1]]))
             for coupling in description.couplings
-            for i, j in [(coupling.joints[0] - 1, coupling.joints[1] - 1)]
-            if i in moving and j in moving
+            if numbers.keys() >= set(coupling.joints)
         ),
         configurations=Named({name: tuple(q[i] for i in moving) for name, q in description.configurations.items()}),
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,10 +78,12 @@ class Numbers:
     reach: float
     """The sum of abs(a) + abs(d) + stroke, m."""
 
-    @property
+    @cached_property
     def drive_inertia(self) -> Array:
         """The drives' part of the mass matrix, shape (n, n), kg m^2, kg m and kg: armature and coupling."""
-        return np.diag(self.armature) + self.coupling
+        matrix = np.diag(self.armature) + self.coupling
+        matrix.flags.writeable = False
+        return matrix
 
     @property
     def inertial_parameters(self) -> Array:

@@ -22,7 +22,7 @@ SMALLEST_TRAVEL = 1e-4
 MAX_PARTS = 64
 """Largest number of parts into which a step is divided at once."""
 MAX_TURN = 0.5
-"""Largest sum of the joints' turns in a step, rad, for which its travel is bounded."""
+"""Largest sum of the joints' turns in a step, rad, for which its travel is bounded by the levers at its ends."""
 
 
 def smallest_between(states: States, found: Array, gaps: Callable[[Array], Array], least: Array) -> Array:
@@ -45,12 +45,12 @@ def smallest_between(states: States, found: Array, gaps: Callable[[Array], Array
     smallest = np.full(found.shape, np.inf)
     step = np.append(np.diff(states.times), 0.0)
     steps = np.flatnonzero(step > 0)
-    travels = _Travels(states, steps)
+    travels = _travels(states, steps)
     # Parts of steps: their step, as an index of ``steps``, beginning and end, 0 to 1, and the distances there.
     which, low, high = np.arange(len(steps)), np.zeros(len(steps)), np.ones(len(steps))
     at_low, at_high = found[steps], found[steps + 1]
     while len(which):
-        travel = travels(which, high - low)
+        travel = travels[which] * (high - low)
         near = np.minimum(at_low, at_high)
         open_ = (near >= least) & ((at_low + at_high - travel[:, None]) / 2 < least)
         kept = open_.any(axis=1) & (travel > SMALLEST_TRAVEL)
@@ -59,9 +59,7 @@ def smallest_between(states: States, found: Array, gaps: Callable[[Array], Array
         at_low, at_high = at_low[kept], at_high[kept]
         if not len(which):
             break
-        with np.errstate(invalid="ignore"):
-            wanted = np.ceil(1.5 * travel / np.maximum(room, SMALLEST_TRAVEL))
-        parts = np.clip(np.nan_to_num(wanted, posinf=MAX_PARTS), 2, MAX_PARTS).astype(int)
+        parts = np.clip(np.ceil(1.5 * travel / np.maximum(room, SMALLEST_TRAVEL)), 2, MAX_PARTS).astype(int)
         which, low, high, at_low, at_high = _divided(states, steps, (which, low, high, at_low, at_high), parts, gaps)
         np.minimum.at(smallest, steps[which], at_low)
     return smallest
@@ -100,28 +98,32 @@ def _joint_values(states: States, step: NDArray[np.int_], s: Array) -> Array:
     return values
 
 
-class _Travels:
-    """Bounds of the distance that any point of the capsules' axes travels in parts of steps."""
+def _travels(states: States, steps: NDArray[np.int_]) -> Array:
+    """Return bounds of the distance that any point of the capsules' axes travels in steps, shape (K,), m."""
+    h = (states.times[steps + 1] - states.times[steps])[:, None]
+    numbers = states.description.numbers
 
-    def __init__(self, states: States, steps: NDArray[np.int_]) -> None:
-        h = (states.times[steps + 1] - states.times[steps])[:, None]
+    def larger(values: Array) -> Array:
+        return np.maximum(np.abs(values[steps]), np.abs(values[steps + 1]))
 
-        def larger(values: Array) -> Array:
-            return np.maximum(np.abs(values[steps]), np.abs(values[steps + 1]))
+    way = np.maximum(
+        np.abs(states.q[steps + 1] - states.q[steps]), h * larger(states.qd) + h * h / 2 * larger(states.qdd)
+    )
+    turn = way[:, ~numbers.prismatic].sum(axis=1)
+    # Inside a step a lever is longer than at its ends by no more than a point travels; in large turns by any length
+    # that the arm has.
+    near = np.einsum("ki,ki->k", way, larger(_levers(states))) / np.where(turn < MAX_TURN, 1 - turn, 1.0)
+    far = way @ np.where(numbers.prismatic, 1.0, _longest_lever(states))
+    travels: Array = np.where(turn < MAX_TURN, np.minimum(near, far), far)
+    return travels
 
-        way = np.maximum(
-            np.abs(states.q[steps + 1] - states.q[steps]), h * larger(states.qd) + h * h / 2 * larger(states.qdd)
-        )
-        self.turn = way[:, ~states.description.numbers.prismatic].sum(axis=1)
-        self.travel = np.einsum("ki,ki->k", way, larger(_levers(states)))
 
-    def __call__(self, which: NDArray[np.int_], share: Array) -> Array:
-        """Return bounds for shares of steps, m; infinite for large turns, in which levers may change much."""
-        turn = self.turn[which] * share
-        # A lever grows by no more than its end travels.
-        inverse = 1 / np.where(turn < MAX_TURN, 1 - turn, 1.0)
-        bounds: Array = np.where(turn < MAX_TURN, self.travel[which] * share * inverse, np.inf)
-        return bounds
+def _longest_lever(states: States) -> float:
+    """Return a distance, m, that no capsule's axis exceeds from any joint's axis."""
+    ends = [point for capsule in link_capsules(states.description) for point in (capsule.start, capsule.end)]
+    outside = max((float(np.linalg.norm(point)) for point in ends), default=0.0)
+    strokes = np.abs(states.q[:, states.description.numbers.prismatic]).max(axis=0, initial=0.0)
+    return states.description.reach + outside + float(strokes.sum())
 
 
 def _levers(states: States) -> Array:

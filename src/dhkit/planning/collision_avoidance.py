@@ -138,13 +138,15 @@ class CollisionAvoidance:
         if pairs:
             short = np.maximum(short, np.max(self.required(each, pairs) - each, axis=1))
 
+        def nearest(gaps: Array) -> Array:
+            return np.asarray(gaps.min(axis=1, initial=np.inf))
+
         def gaps(q: Array) -> Array:
-            return np.stack([self._distances(description, q), self._nearest_reduced(description, q)], axis=1)
+            return np.stack([self._distances(description, q), nearest(self._reduced_distances(description, q))], axis=1)
 
         slack = min(max(BETWEEN * self.clearance, MIN_BETWEEN), self.clearance)
         least = np.array([self.clearance - slack, 0.0])
-        at_states = np.stack([usual, each.min(axis=1, initial=np.inf)], axis=1)
-        between = smallest_between(states, at_states, gaps, least)
+        between = smallest_between(states, np.stack([usual, nearest(each)], axis=1), gaps, least)
         missing = np.where(between < least, [self.clearance, 0.0] - between, -np.inf)
         result: Array = np.maximum(short, missing.max(axis=1))
         return result
@@ -158,10 +160,6 @@ class CollisionAvoidance:
         """Return the distances of the pairs whose clearance is reduced, shape (N, P), m."""
         each = [pair_distances(description, q, self.obstacles, reduced.pair) for reduced in self.reduced]
         return np.stack(each, axis=1) if each else np.zeros((len(q), 0))
-
-    def _nearest_reduced(self, description: Description, q: Array) -> Array:
-        nearest: Array = self._reduced_distances(description, q).min(axis=1, initial=np.inf)
-        return nearest
 
     def require_gap(self, description: Description, q: Array, where: str, least: float) -> None:
         """Require a distance of at least ``least`` (m), and no collision, at one configuration q (n,), rad and m.

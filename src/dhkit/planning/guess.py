@@ -46,12 +46,16 @@ def _leg(arm: LoadedArm, limits: Limits, start: Array, goal: Array) -> float:
     return float(max(found))
 
 
-def straight_knots(task: Task, mesh: Mesh, durations: Array) -> Knots:
-    """Return cubics between a task's configurations on a mesh, at rest in between; durations of legs (legs,), s."""
+def straight_motion(task: Task, durations: Array) -> Trajectory:
+    """Return cubics between a task's configurations, at rest in between; durations of legs (legs,), s."""
     velocities = np.zeros_like(task.points)
     velocities[0], velocities[-1] = task.start_velocity, task.goal_velocity
-    times = np.concatenate([[0.0], np.cumsum(durations)])
-    return knots_along(Trajectory.from_samples(task.arm, times, task.points, velocities), mesh, times[1:])
+    return Trajectory.from_samples(task.arm, np.concatenate([[0.0], np.cumsum(durations)]), task.points, velocities)
+
+
+def straight_knots(task: Task, mesh: Mesh, durations: Array) -> Knots:
+    """Return :func:`straight_motion` on a mesh."""
+    return knots_along(straight_motion(task, durations), mesh, np.cumsum(durations))
 
 
 def usual_accelerations(task: Task, guess: Knots) -> Array:

@@ -11,7 +11,7 @@ from dhkit.description import Array
 from dhkit.planning.assembly import assemble_trajectory, knots_along
 from dhkit.planning.blocks import Indices
 from dhkit.planning.costs import cost_of, size_of
-from dhkit.planning.guess import detour, leg_durations, straight_knots, usual_accelerations
+from dhkit.planning.guess import detour, leg_durations, straight_knots, straight_motion, usual_accelerations
 from dhkit.planning.joint_limits import Limit
 from dhkit.planning.mesh import Curve
 from dhkit.planning.objectives import Objective
@@ -100,8 +100,7 @@ class MotionProgram(Program[Knots]):
 
     def _slowness(self, task: Task, durations: Array) -> float:
         """Return how much slower the straight path must be for constraints, which may be far below the limits."""
-        motion = self._assembled(task, straight_knots(task, self.mesh, durations))
-        slower = task.checker.slow_down(task.checker.states(motion))
+        slower = task.checker.slow_down(task.checker.states(straight_motion(task, durations)))
         return slower if np.isfinite(slower) else 1.0
 
     def _best_factor(self, task: Task, durations: Array) -> float:

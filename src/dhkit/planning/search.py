@@ -12,7 +12,7 @@ import numpy as np
 from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Certificate
 from dhkit.planning.costs import cost_of
-from dhkit.planning.guess import leg_durations
+from dhkit.planning.guess import leg_durations, straight_motion
 from dhkit.planning.joint_limits import Limit
 from dhkit.planning.program import Iterate, Program, Starts, row_bounds, worst_row
 from dhkit.planning.solver import ProgressCall, Solution, Stopped
@@ -91,8 +91,7 @@ class PlannedMotion:
         if not (task.rests and task.duration is None and task.checker.constraints):
             return None
         durations = np.maximum(leg_durations(task.loaded, task.limits, task.points), SHORTEST_DURATION)
-        times, velocities = np.concatenate([[0.0], np.cumsum(durations)]), np.zeros_like(task.points)
-        straight = Trajectory.from_samples(task.arm, times, task.points, velocities)
+        straight = straight_motion(task, durations)
         c = task.checker.slow_down(task.checker.states(straight))
         if not np.isfinite(c):
             return None
