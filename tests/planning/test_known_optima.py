@@ -5,9 +5,10 @@ import pytest
 
 from dhkit.description import library_robot
 from dhkit.planning import Effort, Energy, Jerk, Planner, Time
+from dhkit.planning.along import along_path
 from dhkit.planning.costs import cost_of, size_of
 from dhkit.planning.objectives import Objective
-from dhkit.trajectories import Limits, cubic, quintic, trapezoidal
+from dhkit.trajectories import JointPath, Limits, cubic, quintic, trapezoidal
 from planning_reference import luus, pendulum, slide, two_slides
 
 ODD = 161
@@ -122,6 +123,34 @@ def test_weights_of_effort_choose_between_joints(law):
         Planner(arm, Effort(joint_weights=(1.0, 2.0, 3.0)), limits).solve([0, 0], [0.7, 0.4], duration=1.3)
     with pytest.raises(TypeError, match="joint weights are 'abc'"):
         Effort(joint_weights="abc")
+
+
+def bang_coast_bang(distance, duration, acceleration):
+    """Return the least energy (J) that 1 kg needs over a way, with drives that get nothing back: of v = a T - d / T."""
+    a, T = acceleration, duration
+    v = (a * T - np.sqrt((a * T) ** 2 - 4 * a * distance)) / 2
+    return v * v / 2
+
+
+@pytest.mark.parametrize("factor", [1.1, 2.0, 4.0, 10.0, 100.0])
+@pytest.mark.parametrize("intervals", [None, ODD])
+def test_least_energy_is_a_short_push_a_long_glide_and_a_short_brake(law, factor, intervals):
+    arm, d, a = slide(), 0.7, 2.0
+    duration = factor * 2 * np.sqrt(d / a)
+    planner = Planner(arm, "energy", limits=Limits.of(arm, torque=a), intervals=intervals)
+    motion = planner.solve([0], [d], duration=duration)
+    law.holds("energy: bang, coast, bang", relative(motion.report.cost, bang_coast_bang(d, duration, a)), 3e-3)
+    path = JointPath.straight(arm, [0], [d])
+    timed = along_path(arm, path, objective="energy", limits=planner.limits, duration=duration)
+    law.holds("energy along a path: bang, coast, bang", relative(timed.report.cost, motion.report.cost), 3e-3)
+
+
+def test_least_energy_with_a_free_duration(law):
+    arm, d, a, weight = slide(), 0.7, 2.0, 10.0
+    motion = Planner(arm, Time() + weight * Energy(), limits=Limits.of(arm, torque=a)).solve([0], [d])
+    durations = np.linspace(1.0001 * 2 * np.sqrt(d / a), 20, 100_001)
+    least = np.min(durations + weight * bang_coast_bang(d, durations, a))
+    law.holds("time and energy: bang, coast, bang", relative(motion.report.cost, least), 5e-3)
 
 
 @pytest.mark.parametrize("intervals", [None, 28, 40, 56, 72])

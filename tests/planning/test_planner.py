@@ -462,7 +462,7 @@ def test_the_report(planner):
     assert report.certificate.reference == "Pinocchio"
     assert report.certificate.states >= 20 * report.intervals
     assert 0.9 < report.certificate.any_active <= 1
-    names = dict(report.classical)
+    names = {motion.name: motion.duration for motion in report.classical}
     assert names["quintic"] > names["best trapezoid"] > motion.duration
     assert report.sensitivity is not None and -1e-4 < report.sensitivity < 0.02
     assert report.active_limits()[0][1] > 0.5

@@ -29,6 +29,7 @@ from dhkit.cli.units import joint_entry
 from dhkit.description import Array
 from dhkit.errors import DescriptionError, PlanningError
 from dhkit.planning import PlanReport, Progress, ToolSpeed
+from dhkit.planning.report import more_text, seconds_text
 from dhkit.trajectories import Limits, Trajectory, joint_path, tool_line
 from dhkit.trajectories.archives import ARCHIVES
 from dhkit.trajectories.files import TABLES
@@ -228,8 +229,7 @@ def _caption(report: PlanReport) -> str:
     """Return what a page says about a motion: what it is, what it keeps, and what limits it."""
     active = ", ".join(f"{name} ({100 * share:.0f} % of the time)" for name, share in report.active_limits()[:3])
     sentences = [
-        f"A planned motion, least {report.objective}: {report.duration:.4g} s, certified by "
-        f"{report.certificate.reference}.",
+        f"A planned motion: {report.title}, certified by {report.certificate.reference}.",
         f"At its limits: {active}." if active else "",
         *(f"{note[0].upper()}{note[1:]}." for note in report.notes),
         "The play bar below moves the arm along it; Motions plots joint values, rates and torques with their limits.",
@@ -242,8 +242,8 @@ def _print(arm: Arm, motion: Trajectory, limits: Limits, *, line: bool, only_tim
     certificate = report.certificate
     along = ", the tool along a straight line" if line else ""
     say(f"{arm.name}: least {report.objective}{along}", "bold")
-    cost = "" if only_time else f", {report.objective} = {report.cost:.6g}"
-    say(f"{report.duration:.4f} s{cost}\n")
+    cost = "" if only_time else f", {report.objective} = {report.cost_text}"
+    say(f"{seconds_text(report.duration)}{cost}\n")
     _print_joints(arm, motion, limits, degrees)
     worst = certificate.worst
     verdict = "all limits kept" if certificate.ok else f"limits exceeded by {certificate.violation:.1e}"
@@ -262,16 +262,14 @@ def _print(arm: Arm, motion: Trajectory, limits: Limits, *, line: bool, only_tim
     for note in report.notes:
         say(note)
     if report.coarse is not None and report.sensitivity is not None:
-        excess = 100 * report.sensitivity
-        say(f"mesh: {report.intervals} intervals; {report.coarse[0]} would cost {excess:.3g} % more")
+        say(f"mesh: {report.intervals} intervals; {report.coarse[0]} would cost {more_text(report.sensitivity)}")
     say(
         f"search: {report.solves} program{'s' * (report.solves != 1)}, {report.iterations} iterations, "
         f"{report.solve_seconds:.2f} s, and {report.build_seconds:.2f} s to make them"
     )
     if report.classical:
         say("")
-        rows = [(name, f"{d:.4f}", f"{100 * (d / report.duration - 1):.1f}") for name, d in report.classical]
-        print_table(("along the straight joint path", "[s]", "longer by [%]"), rows)
+        print_table(("along the straight joint path", "", ""), report.comparisons)
     if report.branches:
         say("")
         branches = [

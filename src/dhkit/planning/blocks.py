@@ -69,6 +69,8 @@ class RowKind(Enum):
     """A limit of the motion."""
     PLANE = "plane"
     """At least zero: the distance beyond a plane, m."""
+    POSITIVE_PART = "positive part"
+    """At least zero: how far a variable exceeds the quantity whose positive part it is."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,9 +12,11 @@ from dhkit.description.joint_text import joint_text, violated_limit_text
 from dhkit.dynamics import require_inertia
 from dhkit.errors import PlanningError
 from dhkit.planning.constraints import Constraint
+from dhkit.planning.costs import cost_of
 from dhkit.planning.goals import Place, Route
 from dhkit.planning.loaded import LoadedArm
 from dhkit.planning.objectives import Objective
+from dhkit.planning.report import ClassicalMotion
 from dhkit.planning.request import PlanRequest
 from dhkit.planning.states import States
 from dhkit.planning.task import Task
@@ -179,10 +181,11 @@ def require_place(description: Description, request: PlanRequest, q: Array, name
         request.avoidance.require_gap(description, q, name, least)
 
 
-def classical_durations(task: Task) -> tuple[tuple[str, float], ...]:
-    """Return the durations of a quintic and of the best trapezoid along the straight joint path, under its limits, s.
+def classical_motions(task: Task) -> tuple[ClassicalMotion, ...]:
+    """Return the best trapezoid and quintic along the straight joint path, slowed down to the task's duration.
 
-    Empty for motions that they cannot follow: with via points, ends not at rest, obstacles, or friction.
+    Empty for motions that they cannot follow: with via points, ends not at rest, obstacles, or friction. Those that
+    take longer than the task's duration are left out.
     """
     if (
         len(task.points) > 2
@@ -196,11 +199,16 @@ def classical_durations(task: Task) -> tuple[tuple[str, float], ...]:
     def torques(q: Array, qd: Array, qdd: Array) -> Array:
         return States(task.loaded, np.zeros(len(q)), q, qd, qdd).tau
 
-    durations = []
+    motions = []
     for name, make in (("best trapezoid", trapezoidal), ("quintic", quintic)):
         try:
             motion = make(task.arm, task.points[0], task.points[1], limits=task.limits, torques=torques)
         except PlanningError:
             continue  # the straight path may need more than the torque limits
-        durations.append((name, motion.duration))
-    return tuple(durations)
+        if task.duration is not None:
+            if motion.duration > task.duration:
+                continue
+            motion = motion.slowed(task.duration / motion.duration)
+        cost = cost_of(task.objective, motion, task.loaded)
+        motions.append(ClassicalMotion(name, motion.duration, cost))
+    return tuple(motions)

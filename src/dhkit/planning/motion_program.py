@@ -31,8 +31,9 @@ MAX_SMALL_JOINTS = 3
 """Largest number of joints of arms whose programs are small."""
 RESTART_FACTORS = (2.5, 0.6)
 """Factors of the guessed durations for further starts, if the first one fails."""
-SMALL_ARM_STARTS = 4
-"""Number of starts for arms of two or three joints: their programs are small and have several local optima."""
+DETOURS = 3
+"""Number of detours from which programs are solved too: those of arms of two or three joints are small and have several
+local optima; with a given duration they are what is tried if the straight path fails."""
 MIN_LEG_SHARE = 1e-4
 """Shortest duration of a leg, as a share of the guessed duration of the motion."""
 STILL_DURATION = 1e-3
@@ -66,17 +67,18 @@ class MotionProgram(Program[Knots]):
     # Guesses
 
     def starts(self, task: Task, warm: Trajectory | None) -> Starts[Knots]:
-        """Return guesses: a given motion, straight paths, and detours of arms with few joints."""
+        """Return guesses: a given motion, straight paths, and detours, which are compared for arms with few joints."""
         # In small moves gravity and inertia hardly change, so that detours do not pay.
-        is_small_arm = 1 < task.arm.n <= MAX_SMALL_JOINTS and task.objective.has_time
-        detours = SMALL_ARM_STARTS - 1 if is_small_arm and task.span >= USUAL_MOVE else 0
+        is_small_arm = 1 < task.arm.n <= MAX_SMALL_JOINTS
+        is_compared = is_small_arm and task.objective.has_time and task.span >= USUAL_MOVE
         durations = self.guessed_durations(task)
         guesses: list[Callable[[], Knots]] = []
         if warm is not None and len(self.mesh.legs) == 1:
             guesses.append(partial(knots_along, warm, self.mesh, np.array([warm.duration])))
         guesses.append(partial(straight_knots, task, self.mesh, durations))
-        guesses += [partial(detour, task, self.mesh, durations, seed) for seed in range(detours)]
-        compared = len(guesses) if detours else 0
+        if is_compared or task.duration is not None:
+            guesses += [partial(detour, task, self.mesh, durations, seed) for seed in range(DETOURS)]
+        compared = len(guesses) if is_compared else 0
         if task.duration is None:
             guesses += [partial(straight_knots, task, self.mesh, durations * factor) for factor in RESTART_FACTORS]
         return Starts(guesses, compared)
@@ -119,12 +121,12 @@ class MotionProgram(Program[Knots]):
         """Return the arguments of a solution."""
         problem = self.problem
         each = [parameters for _, parameters in task.checker.every]
-        scale, usual = 1.0 / self._cost_scale(task, guess), usual_accelerations(task, guess)
+        cost, usual = self._cost_scale(task, guess), usual_accelerations(task, guess)
         return Arguments(
-            problem.vector(guess),
-            np.append(problem.parameters(task.load, each, scale, usual), self._planes),
+            problem.vector(guess, task.load),
+            np.append(problem.parameters(task.load, each, 1 / cost, usual), self._planes),
             self._bounds(task, margins, MIN_LEG_SHARE * float(guess.durations.sum())),
-            problem.scaling(self.blocks, guess),
+            problem.scaling(self.blocks, guess, cost),
         )
 
     def _cost_scale(self, task: Task, guess: Knots) -> float:
@@ -163,7 +165,7 @@ class MotionProgram(Program[Knots]):
             set_bounds(at.qd[:, k], velocity, velocity)
             if self.problem.jerk_counts:
                 set_bounds(at.qdd[:, k], np.zeros(n), np.zeros(n))
-        low[at.durations] = shortest_leg
+        low[at.durations], low[at.positive_parts] = shortest_leg, 0.0
         if task.duration is not None and len(mesh.legs) == 1:
             low[at.durations] = high[at.durations] = task.duration
         return low, high

@@ -8,6 +8,7 @@ from numbers import Real
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.display import value_line
@@ -16,9 +17,6 @@ from dhkit.planning.states import States
 
 if TYPE_CHECKING:
     import casadi
-
-FADE_SHARE = 0.02
-"""Share of a joint's maximum power over which the positive part of its power is smoothed, to be differentiable."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +31,8 @@ class Term:
     """Whether the term is the duration."""
     is_jerk: ClassVar[bool] = False
     """Whether the term is the integral of the squared jerks."""
+    units: ClassVar[tuple[str, str]] = ("", "")
+    """Unit of its value for arms whose joints are all revolute, and for those whose joints are all prismatic."""
     is_flat: ClassVar[bool] = False
     """Whether motions of equal cost may differ, so that accelerations have to be smoothed."""
 
@@ -48,6 +48,15 @@ class Term:
     def integrand(self, point: Point) -> casadi.SX:
         """Return the integrand over time, 1 x 1, unit of the term over s, of terms that have one."""
         raise NotImplementedError(f"{type(self).__name__} is no integral of a function of the state")
+
+    def positive_parts(self, point: Point) -> casadi.SX:
+        """Return quantities whose positive parts are added to the integrand, k x 1, unit of the term over s.
+
+        They have no derivative at zero; programs have a variable for each, at least zero and at least the quantity.
+        """
+        import casadi
+
+        return casadi.SX(0, 1)
 
     def measured(self, states: States) -> Array:
         """Return the integrand at a motion's states, shape (N,)."""
@@ -67,6 +76,7 @@ class Time(Term):
     """The duration, s."""
 
     is_time = True
+    units = ("s", "s")
 
     @property
     def is_smooth(self) -> bool:
@@ -85,6 +95,7 @@ class Effort(Term):
     joint_weights: float | tuple[float, ...] = ()
     """Weights of the joints' squared torques, such as 1 / limit^2: one for each joint, without unit; empty for 1."""
     has_integrand = True
+    units = ("N² m² s", "N² s")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -114,6 +125,7 @@ class Jerk(Term):
     """The integral of the squared jerks, rad^2/s^5 or m^2/s^5; such motions begin and end with zero acceleration."""
 
     is_jerk = True
+    units = ("rad²/s⁵", "m²/s⁵")
 
     def measured(self, states: States) -> Array:
         """Return the sum of the squared jerks, shape (N,)."""
@@ -135,6 +147,7 @@ class Energy(Term):
     """Whether the drives feed the power of braking back."""
     is_flat = True
     has_integrand = True
+    units = ("J", "J")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -151,11 +164,11 @@ class Energy(Term):
         return self.motor_constants if isinstance(self.motor_constants, tuple) else (self.motor_constants,)
 
     def integrand(self, point: Point) -> casadi.SX:
-        """Return the electrical power, 1 x 1, W, minus the part that is equal for all motions between the same states.
+        """Return what electrical power is besides :meth:`positive_parts`, 1 x 1, W.
 
-        The joints' work, the integral of tau qd, is what the arm's energy gains and friction takes; of the positive
-        power (P + abs P) / 2 only abs P depends on the motion. With all of it, the optimizer would find motions for
-        which the quadrature is inaccurate.
+        The joints' work, the integral of P = tau qd, is what the arm's energy gains and friction takes, so that of the
+        positive power (P + abs P) / 2 only abs P and the dissipation depend on the motion. With P itself, the optimizer
+        would find motions for which the quadrature is inaccurate.
         """
         import casadi
 
@@ -164,14 +177,18 @@ class Energy(Term):
             raise ValueError(
                 "Energy: without motor constants, friction or power that is lost all motions cost the same"
             )
-        total = point.dissipation / (1.0 if self.regenerates else 2.0)
-        for i in range(n):
-            if not self.regenerates:
-                power, soft = point.tau[i] * point.qd[i], FADE_SHARE * point.power_scale[i]
-                total += (casadi.sqrt(power * power + soft * soft) - soft) / 2
+        total = point.dissipation
+        if not self.regenerates:
+            total = (total - casadi.dot(point.tau, point.qd)) / 2
         if constants:
             total += casadi.sumsqr(point.tau / (_each("Energy", "motor constants", constants, n) * point.gear))
         return total
+
+    def positive_parts(self, point: Point) -> casadi.SX:
+        """Return the joints' power, n x 1, W, or nothing if negative power is fed back."""
+        import casadi
+
+        return casadi.SX(0, 1) if self.regenerates else point.tau * point.qd
 
     def measured(self, states: States) -> Array:
         """Return the electrical power, shape (N,), W."""
@@ -268,6 +285,12 @@ class Objective:
         """Whether a term is the integral of a function of the state, which depends on torques."""
         return any(term.has_integrand for term in self.terms)
 
+    def unit(self, prismatic: NDArray[np.bool_]) -> str:
+        """Return the unit of the value for an arm with such joints, shape (n,); empty for a sum and mixed joints."""
+        revolute, slides = self.terms[0].units
+        unit = revolute if not prismatic.any() else slides if prismatic.all() or revolute == slides else ""
+        return unit if len(self.terms) == 1 else ""
+
     @property
     def time_weight(self) -> float:
         """Weight of the duration."""
@@ -284,6 +307,13 @@ class Objective:
 
         each = [term.weight * term.integrand(point) for term in self.terms if term.has_integrand]
         return sum(each, casadi.SX(0))
+
+    def positive_parts(self, point: Point) -> casadi.SX:
+        """Return all terms' quantities whose positive parts are added to the integrand, k x 1."""
+        import casadi
+
+        each = [term.weight * term.positive_parts(point) for term in self.terms if term.has_integrand]
+        return casadi.vertcat(casadi.SX(0, 1), *each)
 
     def __add__(self, other: Term | Objective) -> Objective:
         if not isinstance(other, Term | Objective):

@@ -20,21 +20,20 @@ from dhkit.planning.certificate import Checker
 from dhkit.planning.collision_avoidance import CollisionAvoidance
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.feasibility import (
-    classical_durations,
+    classical_motions,
     require_inside_limits,
     require_place,
     require_possible,
 )
 from dhkit.planning.goals import Route, find_routes, parse_places
 from dhkit.planning.guess import leg_durations
-from dhkit.planning.joint_limits import Limit
 from dhkit.planning.many import ManyProgress, SimilarMotions, solve_many
 from dhkit.planning.mesh import MIN_LEG_INTERVALS, Curve, Mesh
 from dhkit.planning.motion_program import MAX_SMALL_JOINTS, MotionProgram, curves_for
 from dhkit.planning.objectives import Objective, ObjectiveLike
 from dhkit.planning.obstacles import Scene
 from dhkit.planning.problem import Problem
-from dhkit.planning.report import BranchReport, PlanReport
+from dhkit.planning.report import BranchReport
 from dhkit.planning.request import (
     PlanRequest,
     check_options,
@@ -43,7 +42,7 @@ from dhkit.planning.request import (
     end_velocity,
     smoothed,
 )
-from dhkit.planning.search import RESOLUTION, PlannedMotion, Search, Work, coarser
+from dhkit.planning.search import RESOLUTION, PlannedMotion, Search, Work, coarser, report_of
 from dhkit.planning.solver import ProgressCall, delayed_interrupts
 from dhkit.planning.states import prepare
 from dhkit.planning.task import Task
@@ -188,7 +187,7 @@ class Planner:
         progress
             Called once in each iteration; an exception in it ends the search.
         compare
-            Whether the report includes the durations of classical motions and the cost on a coarser mesh.
+            Whether the report includes classical motions and the cost on a coarser mesh.
 
         Raises
         ------
@@ -220,27 +219,9 @@ class Planner:
             task, best, branches, work = self._best(request, routes, warm, deadline, progress)
         except PlanningError as error:
             raise self._with_reason(error, request, routes, deadline) from None
-        report = PlanReport(
-            objective=str(self.objective),
-            cost=best.cost,
-            duration=best.trajectory.duration,
-            certificate=best.certificate,
-            joints=tuple(joint.name for joint in description.joints),
-            intervals=len(best.trajectory.breaks) - 1,
-            iterations=work.iterations,
-            solves=work.solves,
-            build_seconds=work.build_seconds,
-            solve_seconds=time.perf_counter() - began - work.build_seconds,
-            slow_down=best.slow_down,
-            tightened=best.tightened,
-            branches=branches,
-            unlimited=request.limits.unlimited,
-            is_resolved=best.is_resolved,
-            is_converged=best.is_converged,
-            **task.avoidance.report(self.description, best.certificate.excess_of(Limit.CLEARANCE)),
-        )
+        report = replace(report_of(task, best, work, began), branches=branches)
         if compare and best.is_resolved:
-            report = replace(report, classical=classical_durations(task), coarse=self._coarse(task, best, deadline))
+            report = replace(report, classical=classical_motions(task), coarse=self._coarse(task, best, deadline))
         return replace(best.trajectory, report=report, payload=payload, friction=self.friction)
 
     def solve_many(

@@ -72,12 +72,6 @@ class Point:
         return casadi.jtimes(v, self.q, self.qd) + casadi.jtimes(v, self.qd, self.qdd)
 
     @property
-    def power_scale(self) -> Array:
-        """Scales of power, shape (n,), W: torque limit times speed limit, 1 where unlimited."""
-        torque, velocity = self.limits.torque, self.limits.velocity
-        return np.where(np.isfinite(torque), torque, 1.0) * np.where(np.isfinite(velocity), velocity, 1.0)
-
-    @property
     def gear(self) -> Array:
         """Gear ratios, shape (n,), without unit; 1 without a drive."""
         return gear_ratios(self.description)

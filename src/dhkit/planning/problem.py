@@ -68,6 +68,7 @@ class Problem:
         self.moving = tuple(pair for pair in others if pair[1].moving)
         self.places = tuple(pair for pair in others if not pair[1].moving)
         self.with_states = bool(self.moving) or objective.has_integral
+        self._power = objective.positive_parts(self.point)
 
     @property
     def jerk_counts(self) -> bool:
@@ -81,7 +82,7 @@ class Problem:
         """Indices of the program's variables."""
         curve = self.mesh.curve
         has_middles = self.with_states and self._states_at_middles
-        return Variables.of(
+        variables = Variables.of(
             self.n,
             self.mesh,
             middles=(
@@ -90,6 +91,10 @@ class Problem:
                 has_middles and curve is not Curve.QUADRATIC,
             ),
         )
+        if not self.with_states:
+            return variables
+        points = StatePoints.of(self.mesh, variables, with_middles=has_middles)
+        return variables.with_positive_parts(self._power.numel(), points.count)
 
     @property
     def _states_at_middles(self) -> bool:
@@ -98,8 +103,8 @@ class Problem:
             self.mesh.curve is Curve.JUMPING and has_constraints
         )
 
-    def vector(self, knots: Knots) -> Array:
-        """Return the variables of a motion, shape (variables,), SI units."""
+    def vector(self, knots: Knots, load: Array | None) -> Array:
+        """Return the variables of a motion, shape (variables,), SI units; a payload's parameters are shape (10,)."""
         at, interval = self.variables, knots.intervals(self.mesh)
         x = np.empty(at.count)
         middles = (interval.q_middle, interval.qd_middle, interval.b)
@@ -107,31 +112,48 @@ class Problem:
         x[at.durations] = knots.durations
         for indices, values in given:
             x[indices.ravel()] = values.T.ravel() if indices.size else []
+        if at.positive_parts.size:
+            points = self._state_points
+            states = (x[points.q], x[points.qd], x[points.qdd])
+            powers = self._powers(*states, np.zeros(0) if load is None else load).toarray()
+            x[at.positive_parts] = np.maximum(powers, 0.0)
         return x
+
+    @cached_property
+    def _powers(self) -> casadi.Function:
+        """The quantities whose positive parts are in the objective, as a function of states and payload."""
+        import casadi
+
+        point = self.point
+        return casadi.Function("powers", [point.q, point.qd, point.qdd, point.load], [self._power], {"cse": True})
 
     def knots(self, x: Array) -> Knots:
         """Return the motion of variables, shape (variables,), SI units."""
         at = self.variables
         return Knots(x[at.durations], x[at.q].T, x[at.qd].T, x[at.qdd].T)
 
-    def scaling(self, program: BlockProgram, guess: Knots) -> Scaling:
-        """Return units in which a small, fast or slow motion is of order one; SI units for others."""
+    def scaling(self, program: BlockProgram, guess: Knots, cost: float) -> Scaling:
+        """Return units in which a small, fast or slow motion is of order one; SI units for others.
+
+        Parameters
+        ----------
+        cost
+            Size of the guess's cost, in the unit of the objective.
+        """
         at, span = self.variables, float(np.ptp(guess.q, axis=0).max())
         total = float(guess.durations.sum())
         length = span if 0 < span < USUAL_MOVE else 1.0
         time = 1.0 if USUAL_DURATIONS[0] < total < USUAL_DURATIONS[1] else total
-        units = program.unscaled
-        if length == time == 1.0:
-            return units
+        units, rate = program.unscaled, cost / total
         for k, indices in enumerate((at.q, at.qd, at.qdd, *at.middles)):
             units.unit[indices] = length / time ** (k % 3)
-        units.unit[at.durations] = time
+        units.unit[at.durations], units.unit[at.positive_parts] = time, rate
         if length < 1.0:
             for indices in (at.q, at.middles[0]):
                 units.offset[indices] = guess.q[:1].T
         parts = [np.zeros(0)]
         for block in program.blocks:
-            each = [np.full(rows.count, _unit(rows, length, time)) for rows in block.rows]
+            each = [np.full(rows.count, _unit(rows, length, time, rate)) for rows in block.rows]
             parts.append(np.tile(np.concatenate([np.zeros(0), *each]), block.points))
         return Scaling(units.offset, units.unit, np.concatenate(parts))
 
@@ -306,9 +328,11 @@ class Problem:
         parameters = np.concatenate(self._parameter_indices[: len(symbols)])[:, None]
         parameters = np.tile(parameters, points.count)
         if self.objective.has_integral:
-            cost = scale * weight * duration * self.objective.integrand(point)
-            z.insert(0, duration)
-            variables.insert(0, self.variables.durations[points.leg][None])
+            power, parts = self._power, casadi.SX.sym("parts", self._power.numel())
+            rows.append((Rows(RowKind.POSITIVE_PART, "positive power", power.numel()), parts - power))
+            cost = scale * weight * duration * (self.objective.integrand(point) + casadi.sum1(parts))
+            z += [duration, parts]
+            variables += [self.variables.durations[points.leg][None], self.variables.positive_parts]
             *_, scale_at, _, _, weights_at = self._parameter_indices
             parameters = np.vstack([parameters, np.tile(scale_at, points.count)[None], weights_at[None]])
             p += [scale, weight]
@@ -347,8 +371,10 @@ class Problem:
         return [self.point.load, *(casadi.SX.sym(f"p{k}", size) for k, size in enumerate(sizes))]
 
 
-def _unit(rows: Rows, length: float, time: float) -> float:
-    """Return the unit of rows, for units of joint values and of time, s."""
+def _unit(rows: Rows, length: float, time: float, rate: float) -> float:
+    """Return the unit of rows, for units of joint values, of time (s) and of the cost over time."""
     if rows.kind is RowKind.DURATION:
         return time
+    if rows.kind is RowKind.POSITIVE_PART:
+        return rate
     return 1.0 if rows.order is None else length / time**rows.order

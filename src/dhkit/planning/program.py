@@ -97,8 +97,6 @@ def row_bounds(task: Task, blocks: BlockProgram, margins: Margins) -> tuple[Arra
             continue
         each = [_bounds(task, margins, block, rows) for rows in block.rows]
         low, high = (np.concatenate(side, axis=1) for side in zip(*each, strict=True))
-        if block.is_limited is not None:
-            low[~block.is_limited], high[~block.is_limited] = -np.inf, np.inf
         lows.append(low.ravel())
         highs.append(high.ravel())
     return np.concatenate(lows), np.concatenate(highs)
@@ -114,12 +112,16 @@ def _bounds(task: Task, margins: Margins, block: Block, rows: Rows) -> tuple[Arr
             shares = zero
             if block.intervals is not None and rows.limit in margins.shares:
                 shares = margins.at_points(rows.limit, rows.count, block.intervals)
-            return constraint.bounds(parameters, shares)
+            low, high = constraint.bounds(parameters, shares)
+            if block.is_limited is None:
+                return low, high
+            limited = block.is_limited[:, None]
+            return np.where(limited, low, -none), np.where(limited, high, none)
         case RowKind.DURATION if task.duration is not None:
             return zero + task.duration, zero + task.duration
         case RowKind.DURATION:
             return -none, none
-        case RowKind.PLANE:
+        case RowKind.PLANE | RowKind.POSITIVE_PART:
             return zero, none
         case RowKind.TIME:
             # For least time intervals may take less than their durations, which keeps the program convex.

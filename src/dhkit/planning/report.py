@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from dhkit.display import html_block, html_lines, html_table, repr_line
@@ -9,6 +10,8 @@ from dhkit.planning.certificate import Certificate
 
 MAX_LISTED_LIMITS = 3
 """Largest number of active limits that are listed as text."""
+SHORT_DURATION = 0.1
+"""Durations (s) below which 0.1 ms is too coarse."""
 
 
 @dataclass(frozen=True)
@@ -31,14 +34,29 @@ class BranchReport:
 
 
 @dataclass(frozen=True)
+class ClassicalMotion:
+    """A motion of textbooks along the straight joint path under the same limits."""
+
+    name: str
+    duration: float
+    """Duration, s: the given one, or else the least."""
+    cost: float
+    """Value of the objective."""
+
+
+@dataclass(frozen=True)
 class PlanReport:
     """Report of a planned motion: cost, certificate and how it was found."""
 
     objective: str
     cost: float
     """Value of the objective."""
+    unit: str
+    """Unit of the cost; empty for a sum of terms, and for terms of joints of both types."""
     duration: float
     """Duration of the motion, s."""
+    is_duration_given: bool
+    """Whether the duration was given."""
     certificate: Certificate
     joints: tuple[str, ...]
     intervals: int
@@ -54,8 +72,8 @@ class PlanReport:
     """Limits that were tightened for another solution, for the same reason."""
     coarse: tuple[int, float] | None = None
     """Number of intervals and cost on a coarser mesh."""
-    classical: tuple[tuple[str, float], ...] = ()
-    """Durations of classical motions along the straight joint path under the same limits, s."""
+    classical: tuple[ClassicalMotion, ...] = ()
+    """Motions of textbooks to compare with."""
     branches: tuple[BranchReport, ...] = ()
     unlimited: tuple[str, ...] = ()
     """Kinds of limits that the motion was planned without, such as ``acceleration``: these quantities may jump."""
@@ -89,7 +107,37 @@ class PlanReport:
             notes.append("not optimal to the solver's tolerance: it stopped at a motion that keeps all limits")
         if not self.is_resolved:
             notes.append("the move is too small to be optimized: a quintic that keeps the limits")
+        elif self.is_duration_given and self._is_time:
+            notes.append("the duration is given, so that least time has no choice left: one of many such motions")
         return notes
+
+    @property
+    def _is_time(self) -> bool:
+        return self.unit == "s"
+
+    @property
+    def cost_text(self) -> str:
+        """The cost as text, with its unit."""
+        return f"{self.cost:.6g} {self.unit}".rstrip()
+
+    @property
+    def title(self) -> str:
+        """The motion in a few words: its duration and what is least."""
+        aim = f"least {self.objective}" if self.is_resolved else "not optimized"
+        return f"{seconds_text(self.duration)}, {aim}"
+
+    @property
+    def comparisons(self) -> list[tuple[str, str, str]]:
+        """Names of the classical motions, what they take or cost, and how much more, as texts."""
+        rows = []
+        for motion in self.classical:
+            if self._is_time and not self.is_duration_given:
+                value, ratio = seconds_text(motion.duration), motion.duration / self.duration
+            else:
+                value = f"{motion.cost:.6g} {self.unit}".rstrip()
+                ratio = motion.cost / self.cost if self.cost > 0 else math.nan
+            rows.append((motion.name, value, "" if math.isnan(ratio) else more_text(ratio - 1)))
+        return rows
 
     def active_limits(self) -> list[tuple[str, float]]:
         """Return the active limits and their shares of time, the most active first."""
@@ -100,10 +148,10 @@ class PlanReport:
         return sorted(named, key=lambda item: -item[1])
 
     def __repr__(self) -> str:
-        return repr_line("PlanReport", summary=f"{self.duration:.4f} s, least {self.objective}, {self._certified}")
+        return repr_line("PlanReport", summary=f"{self.title}, {self._certified}")
 
     def _repr_html_(self) -> str:
-        facts = [("duration", f"{self.duration:.4f} s"), (f"cost ({self.objective})", f"{self.cost:.6g}")]
+        facts = [("duration", seconds_text(self.duration)), (f"cost ({self.objective})", self.cost_text)]
         facts.append(("some limit is active", f"{100 * self.certificate.any_active:.0f} % of the time"))
         facts += [
             (f"{name} active", f"{100 * share:.0f} % of the time")
@@ -114,14 +162,14 @@ class PlanReport:
         if self.slow_down > 1:
             facts.append(("slowed down by", f"{100 * (self.slow_down - 1):.3g} %"))
         if self.coarse is not None:
-            facts.append((f"{self.coarse[0]} intervals cost", f"{100 * (self.sensitivity or 0):.3g} % more"))
-        facts += [(f"{name}, straight joint path", f"{duration:.4f} s") for name, duration in self.classical]
+            facts.append((f"{self.coarse[0]} intervals cost", more_text(self.sensitivity or 0.0)))
+        facts += [(f"{name}, straight joint path", ", ".join(filter(None, of))) for name, *of in self.comparisons]
         facts.append(("solved in", f"{self.solve_seconds:.3f} s, {self.iterations} iterations"))
         branches = [
             (branch.branch, _duration_text(branch), "chosen" if branch.chosen else "") for branch in self.branches
         ]
         return html_block(
-            f"{self.duration:.4f} s, least {self.objective}, {self._certified}",
+            f"{self.title}, {self._certified}",
             html_table((), facts),
             html_table(("branch", "duration", ""), branches) if branches else "",
             html_lines([f"tightened: {', '.join(self.tightened)}"] * bool(self.tightened) + self.notes),
@@ -137,7 +185,9 @@ class PlanReport:
         return {
             "objective": self.objective,
             "cost": self.cost,
+            "unit": self.unit,
             "duration_s": self.duration,
+            "duration_given": self.is_duration_given,
             "certified": certificate.ok,
             "violation": certificate.violation,
             "reference": certificate.reference,
@@ -163,7 +213,8 @@ class PlanReport:
             "tightened": list(self.tightened),
             "intervals": self.intervals,
             "coarse": None if self.coarse is None else {"intervals": self.coarse[0], "cost": self.coarse[1]},
-            "classical_s": dict(self.classical),
+            "classical_s": {motion.name: motion.duration for motion in self.classical},
+            "classical_cost": {motion.name: motion.cost for motion in self.classical},
             "branches": [
                 {
                     "branch": b.branch,
@@ -182,7 +233,7 @@ class PlanReport:
 
     def __str__(self) -> str:
         certificate, lines = self.certificate, []
-        lines.append(f"{self.duration:.4f} s, least {self.objective}: {self.cost:.6g}")
+        lines.append(f"{self.title}: {self.cost_text}")
         kept = f"certified by {certificate.reference} in {certificate.states} states"
         if certificate.worst is None:
             lines.append(f"{kept}: nothing is limited")
@@ -205,11 +256,10 @@ class PlanReport:
             lines.append(f"not limited: {', '.join(self.unlimited)}")
         lines += self.notes
         if self.coarse is not None:
-            more = f"{100 * (self.sensitivity or 0):.3g} % more"
+            more = more_text(self.sensitivity or 0.0)
             lines.append(f"mesh: {self.coarse[0]} intervals cost {more} than {self.intervals}")
-        for name, duration in self.classical:
-            more = f"{100 * (duration / self.duration - 1):.1f} % more"
-            lines.append(f"{name} along the straight joint path: {duration:.4f} s, {more}")
+        for name, *of in self.comparisons:
+            lines.append(f"{name} along the straight joint path: {', '.join(filter(None, of))}")
         lines += [f"{'->' if branch.chosen else '  '} {branch}" for branch in self.branches]
         lines.append(
             f"{self.solves} program{'s' * (self.solves != 1)}, {self.iterations} iterations, "
@@ -218,6 +268,16 @@ class PlanReport:
         return "\n".join(lines)
 
 
+def seconds_text(duration: float) -> str:
+    """Return a duration (s) as text: to 0.1 ms, and short ones to four digits."""
+    return f"{duration:.4f} s" if duration >= SHORT_DURATION else f"{duration:.4g} s"
+
+
+def more_text(share: float) -> str:
+    """Return by how much something is more than another, as a share of it, in words."""
+    return f"{100 * abs(share):.3g} % {'less' if share < 0 else 'more'}"
+
+
 def _duration_text(branch: BranchReport) -> str:
     """Return a branch's duration as text, or the reason why it has none."""
-    return branch.reason or f"{'' if branch.solved else 'at least '}{branch.duration:.4f} s"
+    return branch.reason or f"{'' if branch.solved else 'at least '}{seconds_text(branch.duration)}"

@@ -15,6 +15,7 @@ from dhkit.planning.costs import cost_of
 from dhkit.planning.guess import leg_durations, straight_motion
 from dhkit.planning.joint_limits import Limit
 from dhkit.planning.program import Iterate, Program, Starts, row_bounds, worst_row
+from dhkit.planning.report import PlanReport
 from dhkit.planning.solver import ProgressCall, Solution, Stopped
 from dhkit.planning.states import States
 from dhkit.planning.task import Margins, Task
@@ -330,6 +331,31 @@ class Excess:
 
 class TimeLimitError(PlanningError):
     """The time limit was reached."""
+
+
+def report_of(task: Task, best: PlannedMotion, work: Work, began: float) -> PlanReport:
+    """Return the report of a task's motion; ``began`` is the time at which the search began, s."""
+    arm = task.arm
+    return PlanReport(
+        objective=str(task.objective),
+        cost=best.cost,
+        unit=task.objective.unit(arm.numbers.prismatic),
+        duration=best.trajectory.duration,
+        is_duration_given=task.duration is not None,
+        certificate=best.certificate,
+        joints=tuple(joint.name for joint in arm.joints),
+        intervals=best.intervals,
+        iterations=work.iterations,
+        solves=work.solves,
+        build_seconds=work.build_seconds,
+        solve_seconds=time.perf_counter() - began - work.build_seconds,
+        slow_down=best.slow_down,
+        tightened=best.tightened,
+        unlimited=task.limits.unlimited,
+        is_resolved=best.is_resolved,
+        is_converged=best.is_converged,
+        **task.avoidance.report(arm, best.certificate.excess_of(Limit.CLEARANCE)),
+    )
 
 
 def coarser(search: Search[Iterate], motion: Trajectory) -> tuple[int, float] | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,8 @@ class Variables:
     """Shape (n, columns), see :class:`Curve`."""
     middles: tuple[Indices, Indices, Indices]
     """Joint values, rates and accelerations at the middles of intervals, shape (n, intervals) each or empty."""
+    positive_parts: Indices
+    """Of the objective's quantities at the points of the states, shape (k, P)."""
 
     @classmethod
     def of(cls, n: int, mesh: Mesh, middles: tuple[bool, bool, bool]) -> Variables:
@@ -55,12 +57,18 @@ class Variables:
             np.arange(edge, edge + n * count).reshape(n, count, order="F")
             for edge, count in zip(edges[:-1], counts, strict=True)
         )
-        return cls(np.arange(len(mesh.legs)), q, qd, qdd, (rest[0], rest[1], rest[2]))
+        none = np.zeros((0, 0), dtype=int)
+        return cls(np.arange(len(mesh.legs)), q, qd, qdd, (rest[0], rest[1], rest[2]), none)
+
+    def with_positive_parts(self, quantities: int, points: int) -> Variables:
+        """Return the same with the positive parts of so many quantities at so many points of the states."""
+        indices = self.count + np.arange(quantities * points)
+        return replace(self, positive_parts=indices.reshape(quantities, points, order="F"))
 
     @property
     def count(self) -> int:
         """The number of variables."""
-        rest = (self.q, self.qd, self.qdd, *self.middles)
+        rest = (self.q, self.qd, self.qdd, *self.middles, self.positive_parts)
         return len(self.durations) + sum(indices.size for indices in rest)
 
 

@@ -22,14 +22,12 @@ from dhkit.planning.along.timing import TimingProgram
 from dhkit.planning.certificate import Checker
 from dhkit.planning.collision_avoidance import CollisionAvoidance
 from dhkit.planning.constraints import Constraint
-from dhkit.planning.joint_limits import Limit
 from dhkit.planning.loaded import loaded
 from dhkit.planning.objectives import Objective, ObjectiveLike
 from dhkit.planning.obstacles import Scene
 from dhkit.planning.program import Starts
-from dhkit.planning.report import PlanReport
 from dhkit.planning.request import check_options, checked_constraints, checked_limits, smoothed
-from dhkit.planning.search import TIME_SCALING_MARGIN, PlannedMotion, Search, Work
+from dhkit.planning.search import TIME_SCALING_MARGIN, PlannedMotion, Search, Work, report_of
 from dhkit.planning.solver import ProgressCall
 from dhkit.planning.task import Task
 from dhkit.symbolic import Friction
@@ -151,23 +149,7 @@ def along_path(
     task = Task(description, arm, wanted, path.q([0.0, 1.0]), still, still, duration, checker, path=path)
     work, deadline = Work(), began + time_limit
     found = _best_timing(task, intervals, work, deadline, progress)
-    report = PlanReport(
-        objective=str(wanted),
-        cost=found.cost,
-        duration=found.trajectory.duration,
-        certificate=found.certificate,
-        joints=tuple(joint.name for joint in description.joints),
-        intervals=found.intervals,
-        iterations=work.iterations,
-        solves=work.solves,
-        build_seconds=work.build_seconds,
-        solve_seconds=time.perf_counter() - began - work.build_seconds,
-        slow_down=found.slow_down,
-        tightened=found.tightened,
-        unlimited=limits.unlimited,
-        is_converged=found.is_converged,
-        **avoidance.report(description, found.certificate.excess_of(Limit.CLEARANCE)),
-    )
+    report = report_of(task, found, work, began)
     return replace(found.trajectory, description=description, report=report, payload=payload, friction=chosen)
 
 

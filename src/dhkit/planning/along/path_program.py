@@ -11,7 +11,7 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.planning.along.path_point import PathPoint
 from dhkit.planning.along.path_states import PathStates
-from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows
+from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows, Scaling
 from dhkit.planning.costs import size_of
 from dhkit.planning.joint_limits import Limit
 from dhkit.planning.program import Program, limit_rows
@@ -71,6 +71,9 @@ class PathProgram(Program[Profile]):
         K, of_interval = self.intervals, 1 + 2 * int(self.point.path.numel())
         self.sizes = [len(parameters) for _, parameters in task.checker.every]
         of_all = sum(self.sizes) + 1
+        self._power = task.objective.positive_parts(self.point)
+        self.powers = int(self._power.numel())
+        """Number of quantities of a state whose positive parts are in the objective."""
         own, common = of_interval * np.arange(K) + np.arange(of_interval)[:, None], K * of_interval + np.arange(of_all)
         self.parameters_at: Indices = np.vstack([own, np.tile(common[:, None], K)])
         """Indices of each interval's parameters, shape (parameters, K)."""
@@ -85,7 +88,9 @@ class PathProgram(Program[Profile]):
         return symbol("step"), symbol("left", size), symbol("right", size), given, symbol("scale")
 
     def at_state(self, given: list[casadi.SX]) -> tuple[casadi.Function, list[Rows]]:
-        """Return the rows and the integrand as a function of sdd, sd^2, sd, coefficients and ``given``; and the kinds.
+        """Return a state's rows and integrand as a function, and the kinds of the rows.
+
+        The function's arguments are sdd, sd^2, sd, the path's coefficients, positive parts of powers, and ``given``.
 
         Parameters
         ----------
@@ -95,10 +100,12 @@ class PathProgram(Program[Profile]):
         import casadi
 
         point, limits = self.point, limit_rows(self._limited, self.point, given)
-        rows = casadi.vertcat(casadi.SX(0, 1), *(row for _, row in limits))
-        inputs = [point.sdd, point.b, point.speed, point.path, *given]
-        results = [rows, self.task.objective.integrand(point)]
-        return casadi.Function("at_state", inputs, results, {"cse": True}), [kind for kind, _ in limits]
+        parts = casadi.SX.sym("parts", self.powers)
+        rows = casadi.vertcat(casadi.SX(0, 1), *(row for _, row in limits), parts - self._power)
+        inputs = [point.sdd, point.b, point.speed, point.path, parts, *given]
+        results = [rows, self.task.objective.integrand(point) + casadi.sum1(parts)]
+        kinds = [*(kind for kind, _ in limits), Rows(RowKind.POSITIVE_PART, "positive power", self.powers)]
+        return casadi.Function("at_state", inputs, results, {"cse": True}), kinds
 
     def program(
         self, interval: Callable[..., tuple[LocalFunction, tuple[Rows, ...]]], inner: Indices, variables: int
@@ -109,19 +116,23 @@ class PathProgram(Program[Profile]):
         ----------
         interval
             Returns the rows and the cost of an interval, with ``first=True`` or ``last=True`` of one at an end. Its
-            variables are its duration, and those of its knots that are inside the path.
+            variables are its duration, the positive parts at both its ends, and those of its knots that are inside the
+            path.
         inner
             Indices of the variables at the inner knots, shape (k, K-1); those of the durations come before them.
         variables
-            Number of variables.
+            Number of variables besides positive parts, which come last.
         """
         import casadi
 
         K = self.intervals
         step = np.arange(K)
+        self.positive_parts: Indices = variables + np.arange(2 * self.powers * K).reshape(2 * self.powers, K)
+        """Indices of the positive parts at the left and the right end of each interval, shape (2 powers, K)."""
+        own = np.vstack([step[None], self.positive_parts])
         each, total = np.stack([step, step], axis=1), casadi.SX.sym("total", K)
-        of_first, of_last = np.vstack([step[None, :1], inner[:, :1]]), np.vstack([step[None, -1:], inner[:, -1:]])
-        between = np.vstack([step[None, 1:-1], inner[:, :-1], inner[:, 1:]])
+        of_first, of_last = np.vstack([own[:, :1], inner[:, :1]]), np.vstack([own[:, -1:], inner[:, -1:]])
+        between = np.vstack([own[:, 1:-1], inner[:, :-1], inner[:, 1:]])
         blocks = [
             Block(function, indices, self.parameters_at[:, part], rows, each[part])
             for (function, rows), indices, part in (
@@ -133,13 +144,46 @@ class PathProgram(Program[Profile]):
         duration = LocalFunction(total, casadi.SX(0, 1), casadi.sum1(total))
         kinds = (Rows(RowKind.DURATION, "duration", 1),)
         blocks.append(Block(duration, step[:, None], np.zeros((0, 1), dtype=int), kinds))
-        return BlockProgram(variables, self.parameter_count, tuple(blocks))
+        return BlockProgram(variables + self.positive_parts.size, self.parameter_count, tuple(blocks))
 
-    def parameters(self, task: Task, guess: Profile) -> Array:
-        """Return the parameters, shape (parameters,); the guess's cost is the unit of the cost."""
-        cost = float(guess.times[-1])
-        if not task.objective.only_time:
-            cost = size_of(task.objective, self.trajectory(task, guess), task.loaded, task.friction)
+    def positive_powers(self, sd: Array, left: Array, right: Array) -> Array:
+        """Return positive parts of powers at both ends of each interval, shape (2 powers, K).
+
+        Parameters
+        ----------
+        sd
+            Speeds at the knots, shape (K+1,), 1/s.
+        left, right
+            Accelerations at the ends of the intervals, shape (K,), 1/s^2.
+        """
+        import casadi
+
+        point = self.point
+        inputs = [point.sdd, point.b, point.speed, point.path]
+        power = casadi.Function("power", inputs, [self._power], {"cse": True}).map(self.intervals)
+        ends = zip((left, right), (sd[:-1], sd[1:]), self.states.coefficients, strict=True)
+        values = [power(sdd[None], (v * v)[None], v[None], path.T).toarray() for sdd, v, path in ends]
+        positive: Array = np.maximum(np.vstack(values), 0.0)
+        return positive
+
+    def cost_unit(self, task: Task, guess: Profile) -> float:
+        """Return the size of a guess's cost, the unit of the cost."""
+        if task.objective.only_time:
+            return float(guess.times[-1])
+        return size_of(task.objective, self.trajectory(task, guess), task.loaded, task.friction)
+
+    def scaling(self, unit: float, rate: float) -> Scaling:
+        """Return units of durations, s, and of positive parts of powers; 1 for all others."""
+        scaling = self.blocks.unscaled
+        scaling.unit[: self.intervals], scaling.unit[self.positive_parts] = unit, rate
+        kinds = [np.tile([r.kind for r in b.rows for _ in range(r.count)], b.points) for b in self.blocks.blocks]
+        of_rows = np.concatenate(kinds)
+        for kind, size in ((RowKind.TIME, unit), (RowKind.DURATION, unit), (RowKind.POSITIVE_PART, rate)):
+            scaling.row_unit[of_rows == kind] = size
+        return scaling
+
+    def parameters(self, task: Task, cost: float) -> Array:
+        """Return the parameters, shape (parameters,), with a unit of the cost."""
         path = np.concatenate([self.states.steps[:, None], *self.states.coefficients], axis=1)
         given = [parameters for _, parameters in task.checker.every]
         return np.concatenate([path.ravel(), *given, [1 / cost]])

@@ -81,6 +81,7 @@ class SmoothTimingProgram(PathProgram[SmoothProfile]):
         import casadi
 
         h, known = casadi.SX.sym("duration"), [casadi.SX.sym(f"state{k}", 2) for k in range(2 - first - last)]
+        parts = [casadi.SX.sym(f"parts{k}", self.powers) for k in range(2)]
         step, left, right, given, scale = self.symbols()
         rest = [casadi.SX(2, 1)]
         begin, end = [*rest * first, *known, *rest * last]
@@ -89,15 +90,16 @@ class SmoothTimingProgram(PathProgram[SmoothProfile]):
         kinds = [Rows(RowKind.CONTINUITY, "continuity along the path", 2)]
         moved, gained = h * begin[0] + h * h * (2 * begin[1] + end[1]) / 6, h * (begin[1] + end[1]) / 2
         rows, rates = [casadi.vertcat(moved / step - 1, begin[0] + gained - end[0])], []
-        for (v, a), path in ((casadi.vertsplit(begin), left), (casadi.vertsplit(end), right)):
-            row, rate = at_state(a, v * v, v, path, *given)
+        for state, path, part in zip((begin, end), (left, right), parts, strict=True):
+            v, a = casadi.vertsplit(state)
+            row, rate = at_state(a, v * v, v, path, part, *given)
             qs, qss, qsss = path[n : 2 * n], path[2 * n : 3 * n], path[-n:]
             jerk = qs * (end[1] - begin[1]) / h + 3 * qss * v * a + qsss * v**3
             rows += [row, jerk * reciprocals]
             rates.append(rate)
             kinds += [*limits, Rows(RowKind.LIMIT, Limit.JERK.what, n, Limit.JERK, of_joints=True)]
         cost = scale * h * (self.task.objective.time_weight + (rates[0] + rates[1]) / 2)
-        z, p = casadi.vertcat(h, *known), casadi.vertcat(step, left, right, *given, scale)
+        z, p = casadi.vertcat(h, *parts, *known), casadi.vertcat(step, left, right, *given, scale)
         return LocalFunction(z, p, casadi.vertcat(*rows), cost), tuple(kinds)
 
     # Guesses
@@ -128,17 +130,18 @@ class SmoothTimingProgram(PathProgram[SmoothProfile]):
     def arguments(self, task: Task, guess: SmoothProfile, margins: Margins) -> Arguments:
         """Return the arguments of a solution; the unit of time is the guess's duration."""
         K, unit = self.intervals, float(guess.times[-1])
-        scaling = self.blocks.unscaled
-        scaling.unit[:K], scaling.unit[self._sd], scaling.unit[self._sdd] = unit, 1 / unit, unit**-2
+        cost = self.cost_unit(task, guess)
+        scaling = self.scaling(unit, cost / unit)
+        scaling.unit[self._sd], scaling.unit[self._sdd] = 1 / unit, unit**-2
         per_interval = sum(kind.count for kind in self.blocks.blocks[1].rows)
         scaling.row_unit[1 : K * per_interval : per_interval] = 1 / unit
-        scaling.row_unit[-1] = unit
-        low, high = np.full(3 * K - 2, -np.inf), np.full(3 * K - 2, np.inf)
+        low, high = np.full(self.blocks.variables, -np.inf), np.full(self.blocks.variables, np.inf)
         shares = margins.of(Limit.VELOCITY, task.arm.n)
-        low[:K], low[self._sd] = MIN_STEP * unit / K, 0.0
+        low[:K], low[self._sd], low[self.positive_parts] = MIN_STEP * unit / K, 0.0, 0.0
         high[self._sd] = np.sqrt(self.states.fastest(task.limits, shares)[1:-1])
-        x = np.concatenate([guess.durations, guess.sd[1:-1], guess.sdd[1:-1]])
-        return Arguments(x, self.parameters(task, guess), (low, high), scaling)
+        powers = self.positive_powers(guess.sd, guess.sdd[:-1], guess.sdd[1:])
+        x = np.concatenate([guess.durations, guess.sd[1:-1], guess.sdd[1:-1], powers.ravel()])
+        return Arguments(x, self.parameters(task, cost), (low, high), scaling)
 
     # Solutions
 

@@ -81,6 +81,7 @@ class TimingProgram(PathProgram[Profile]):
         import casadi
 
         duration, inner = casadi.SX.sym("duration"), casadi.SX.sym("b", 2 - first - last)
+        parts = [casadi.SX.sym(f"parts{k}", self.powers) for k in range(2)]
         step, left, right, given, scale = self.symbols()
         known = casadi.vertsplit(casadi.exp(inner) if self._logarithmic else inner)
         # At rest the speed is a constant: the square root has no derivative there.
@@ -91,13 +92,13 @@ class TimingProgram(PathProgram[Profile]):
         rows, rates = [2 * step / (speed[0] + speed[1]) - duration], []
         at_state, limits = self.at_state(given)
         sdd = (b[1] - b[0]) / (2 * step)
-        for x, v, coefficients in zip(b, speed, (left, right), strict=True):
-            row, rate = at_state(sdd, x, v, coefficients, *given)
+        for x, v, coefficients, part in zip(b, speed, (left, right), parts, strict=True):
+            row, rate = at_state(sdd, x, v, coefficients, part, *given)
             rows.append(row)
             rates.append(rate)
             kinds += limits
         cost = scale * duration * (self.task.objective.time_weight + (rates[0] + rates[1]) / 2)
-        z, p = casadi.vertcat(duration, inner), casadi.vertcat(step, left, right, *given, scale)
+        z, p = casadi.vertcat(duration, *parts, inner), casadi.vertcat(step, left, right, *given, scale)
         return LocalFunction(z, p, casadi.vertcat(*rows), cost), tuple(kinds)
 
     # Guesses
@@ -123,32 +124,41 @@ class TimingProgram(PathProgram[Profile]):
         lowest = MIN_SQUARED_SPEED / unit**2
         shares = margins.of(Limit.VELOCITY, task.arm.n)
         high = np.maximum(self.states.fastest(task.limits, shares)[1:-1], 2 * lowest)
-        scaling = self.blocks.unscaled
-        scaling.unit[:K] = unit
+        cost, speed = self.cost_unit(task, guess), np.sqrt(guess.b)
+        scaling = self.scaling(unit, cost / unit)
         if self._logarithmic:
-            scaling.offset[K:] = -2 * np.log(unit)
+            scaling.offset[K : 2 * K - 1] = -2 * np.log(unit)
         else:
-            scaling.unit[K:] = unit**-2
-        per_interval = sum(kind.count for kind in self.blocks.blocks[1].rows)
-        scaling.row_unit[: K * per_interval : per_interval] = unit
-        scaling.row_unit[-1] = unit
-        low = self._variables(np.zeros(K), np.full(K - 1, lowest))
+            scaling.unit[K : 2 * K - 1] = unit**-2
+        sdd, most = np.diff(guess.b) / (2 * np.diff(self.s)), np.full(self.positive_parts.shape, np.inf)
+        powers = self.positive_powers(speed, sdd, sdd)
+        low = self._variables(np.zeros(K), np.full(K - 1, lowest), 0 * powers)
         return Arguments(
-            self._variables(np.diff(guess.times), np.maximum(guess.b[1:-1], lowest)),
-            self.parameters(task, guess),
-            (low, self._variables(np.full(K, np.inf), high)),
+            self._variables(np.diff(guess.times), np.maximum(guess.b[1:-1], lowest), powers),
+            self.parameters(task, cost),
+            (low, self._variables(np.full(K, np.inf), high, most)),
             scaling,
         )
 
-    def _variables(self, durations: Array, b: Array) -> Array:
-        """Return the program's variables for durations of the intervals (K,) and b at the inner knots, (K-1,)."""
-        return np.concatenate([durations, np.log(b) if self._logarithmic else b])
+    def _variables(self, durations: Array, b: Array, powers: Array) -> Array:
+        """Return the program's variables.
+
+        Parameters
+        ----------
+        durations
+            Of the intervals, shape (K,), s.
+        b
+            At the inner knots, shape (K-1,), 1/s^2.
+        powers
+            Positive parts of powers at the ends of the intervals, shape (2 powers, K).
+        """
+        return np.concatenate([durations, np.log(b) if self._logarithmic else b, powers.ravel()])
 
     # Solutions
 
     def iterate(self, x: Array) -> Profile:
         """Return the profile of variables, shape (variables,)."""
-        inner = x[self.intervals :]
+        inner = x[self.intervals : 2 * self.intervals - 1]
         inside = np.exp(inner) if self._logarithmic else np.maximum(inner, 0.0)
         return Profile(self.s, np.concatenate([[0.0], inside, [0.0]]))
 
