@@ -80,7 +80,8 @@ class Planner:
         Further constraints, such as ``ToolSpeed(0.5)``.
     intervals
         Number of intervals of the mesh; by default 48 for six joints or more, and more for fewer joints; half of that
-        for objectives without time and with obstacles. Finer meshes find slightly better motions in more time.
+        for smooth objectives, for all without time of up to three joints, and with obstacles. Finer meshes find
+        slightly better motions in more time.
     friction
         Friction of the joints, as for inverse dynamics; a step is smoothed over 0.01 rad/s.
 
@@ -119,9 +120,11 @@ class Planner:
         self.limits = checked_limits(description, limits)
         self.constraints = checked_constraints(constraints)
         usual = SMALL_ARM_SIZE // description.n if description.n <= MAX_SMALL_JOINTS else DEFAULT_INTERVALS
-        # Smooth objectives need half as many intervals: their accelerations are parabolas.
+        # Smooth objectives need half as many intervals: their accelerations are parabolas. Meshes of arms of few joints
+        # are fine enough for half of them to find least energy, whose torques jump.
         self._requested_intervals = intervals
-        self.intervals = intervals or (usual if self.objective.has_time else usual // 2)
+        has_jumps = self.objective.has_time or (not self.objective.is_smooth and description.n > MAX_SMALL_JOINTS)
+        self.intervals = intervals or (usual if has_jumps else usual // 2)
         self.friction = smoothed(Friction.chosen(friction))
         self._programs: dict[tuple[object, ...], MotionProgram] = {}
         self._making = threading.Lock()
@@ -220,7 +223,8 @@ class Planner:
         except PlanningError as error:
             raise self._with_reason(error, request, routes, deadline) from None
         report = replace(report_of(task, best, work, began), branches=branches)
-        if compare and best.is_resolved:
+        is_choice = task.duration is None or not self.objective.only_time
+        if compare and best.is_resolved and is_choice:
             report = replace(report, classical=classical_motions(task), coarse=self._coarse(task, best, deadline))
         return replace(best.trajectory, report=report, payload=payload, friction=self.friction)
 

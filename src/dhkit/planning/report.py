@@ -12,6 +12,8 @@ MAX_LISTED_LIMITS = 3
 """Largest number of active limits that are listed as text."""
 SHORT_DURATION = 0.1
 """Durations (s) below which 0.1 ms is too coarse."""
+NO_DIFFERENCE, MANY_TIMES = 1e-6, 9.0
+"""Shares by which something is more than another that are told as none, and as a factor."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,7 @@ class PlanReport:
         """Names of the classical motions, what they take or cost, and how much more, as texts."""
         rows = []
         for motion in self.classical:
-            if self._is_time and not self.is_duration_given:
+            if self._is_time:
                 value, ratio = seconds_text(motion.duration), motion.duration / self.duration
             else:
                 value = f"{motion.cost:.6g} {self.unit}".rstrip()
@@ -275,6 +277,10 @@ def seconds_text(duration: float) -> str:
 
 def more_text(share: float) -> str:
     """Return by how much something is more than another, as a share of it, in words."""
+    if abs(share) < NO_DIFFERENCE:
+        return "0 % more"
+    if share >= MANY_TIMES:
+        return f"{1 + share:.3g} times as much"
     return f"{100 * abs(share):.3g} % {'less' if share < 0 else 'more'}"
 
 
