@@ -6,6 +6,7 @@ and evaluated at all its points; the derivatives of the program are these values
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -159,6 +160,14 @@ class BlockProgram:
         """The number of rows."""
         count: int = sum(block.count for block in self.blocks)
         return count
+
+    def row_units(self, unit_of: Callable[[Rows], float]) -> Array:
+        """Return the units of all rows, shape (rows,), from those of their kinds."""
+        units = [np.zeros(0)]
+        for block in self.blocks:
+            each = [np.full(rows.count, unit_of(rows)) for rows in block.rows]
+            units.append(np.tile(np.concatenate([np.zeros(0), *each]), block.points))
+        return np.concatenate(units)
 
     @property
     def unscaled(self) -> Scaling:

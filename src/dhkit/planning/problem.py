@@ -151,11 +151,8 @@ class Problem:
         if length < 1.0:
             for indices in (at.q, at.middles[0]):
                 units.offset[indices] = guess.q[:1].T
-        parts = [np.zeros(0)]
-        for block in program.blocks:
-            each = [np.full(rows.count, _unit(rows, length, time, rate)) for rows in block.rows]
-            parts.append(np.tile(np.concatenate([np.zeros(0), *each]), block.points))
-        return Scaling(units.offset, units.unit, np.concatenate(parts))
+        row_units = program.row_units(lambda rows: _unit(rows, length, time, rate))
+        return Scaling(units.offset, units.unit, row_units)
 
     # Arguments
 

@@ -59,6 +59,8 @@ class PlanReport:
     """Duration of the motion, s."""
     is_duration_given: bool
     """Whether the duration was given."""
+    is_least_time: bool
+    """Whether the duration is what is least."""
     certificate: Certificate
     joints: tuple[str, ...]
     intervals: int
@@ -109,18 +111,17 @@ class PlanReport:
             notes.append("not optimal to the solver's tolerance: it stopped at a motion that keeps all limits")
         if not self.is_resolved:
             notes.append("the move is too small to be optimized: a quintic that keeps the limits")
-        elif self.is_duration_given and self._is_time:
+        elif self.is_duration_given and self.is_least_time:
             notes.append("the duration is given, so that least time has no choice left: one of many such motions")
         return notes
 
     @property
-    def _is_time(self) -> bool:
-        return self.unit == "s"
-
-    @property
     def cost_text(self) -> str:
         """The cost as text, with its unit."""
-        return f"{self.cost:.6g} {self.unit}".rstrip()
+        return self._with_unit(self.cost)
+
+    def _with_unit(self, cost: float) -> str:
+        return f"{cost:.6g} {self.unit}".rstrip()
 
     @property
     def title(self) -> str:
@@ -133,10 +134,10 @@ class PlanReport:
         """Names of the classical motions, what they take or cost, and how much more, as texts."""
         rows = []
         for motion in self.classical:
-            if self._is_time:
+            if self.is_least_time:
                 value, ratio = seconds_text(motion.duration), motion.duration / self.duration
             else:
-                value = f"{motion.cost:.6g} {self.unit}".rstrip()
+                value = self._with_unit(motion.cost)
                 ratio = motion.cost / self.cost if self.cost > 0 else math.nan
             rows.append((motion.name, value, "" if math.isnan(ratio) else more_text(ratio - 1)))
         return rows

@@ -342,6 +342,7 @@ def report_of(task: Task, best: PlannedMotion, work: Work, began: float) -> Plan
         unit=task.objective.unit(arm.numbers.prismatic),
         duration=best.trajectory.duration,
         is_duration_given=task.duration is not None,
+        is_least_time=task.objective.only_time,
         certificate=best.certificate,
         joints=tuple(joint.name for joint in arm.joints),
         intervals=best.intervals,

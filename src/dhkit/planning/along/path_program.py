@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol, Self, TypeVar, cast
 
 import numpy as np
@@ -156,15 +157,19 @@ class PathProgram(Program[Profile]):
         left, right
             Accelerations at the ends of the intervals, shape (K,), 1/s^2.
         """
+        ends = zip((left, right), (sd[:-1], sd[1:]), self.states.coefficients, strict=True)
+        values = [self._powers(sdd[None], (v * v)[None], v[None], path.T).toarray() for sdd, v, path in ends]
+        positive: Array = np.maximum(np.vstack(values), 0.0)
+        return positive
+
+    @cached_property
+    def _powers(self) -> casadi.Function:
+        """The quantities whose positive parts are in the objective, as a function of states and coefficients."""
         import casadi
 
         point = self.point
         inputs = [point.sdd, point.b, point.speed, point.path]
-        power = casadi.Function("power", inputs, [self._power], {"cse": True}).map(self.intervals)
-        ends = zip((left, right), (sd[:-1], sd[1:]), self.states.coefficients, strict=True)
-        values = [power(sdd[None], (v * v)[None], v[None], path.T).toarray() for sdd, v, path in ends]
-        positive: Array = np.maximum(np.vstack(values), 0.0)
-        return positive
+        return casadi.Function("powers", inputs, [self._power], {"cse": True})
 
     def cost_unit(self, task: Task, guess: Profile) -> float:
         """Return the size of a guess's cost, the unit of the cost."""
@@ -176,11 +181,9 @@ class PathProgram(Program[Profile]):
         """Return units of durations, s, and of positive parts of powers; 1 for all others."""
         scaling = self.blocks.unscaled
         scaling.unit[: self.intervals], scaling.unit[self.positive_parts] = unit, rate
-        kinds = [np.tile([r.kind for r in b.rows for _ in range(r.count)], b.points) for b in self.blocks.blocks]
-        of_rows = np.concatenate(kinds)
-        for kind, size in ((RowKind.TIME, unit), (RowKind.DURATION, unit), (RowKind.POSITIVE_PART, rate)):
-            scaling.row_unit[of_rows == kind] = size
-        return scaling
+        units = {RowKind.TIME: unit, RowKind.DURATION: unit, RowKind.POSITIVE_PART: rate}
+        row_units = self.blocks.row_units(lambda rows: units.get(rows.kind, 1.0))
+        return Scaling(scaling.offset, scaling.unit, row_units)
 
     def parameters(self, task: Task, cost: float) -> Array:
         """Return the parameters, shape (parameters,), with a unit of the cost."""
