@@ -69,11 +69,12 @@ class SceneKind:
     @property
     def name(self) -> str:
         """The robot, and what is special."""
-        return f"{self.robot}, ten spheres and itself" if self.self_collision else self.robot
+        spheres = "" if self.has_boxes else f", {self.counts[1]} spheres"
+        return f"{self.robot}{spheres}{' and itself' * self.self_collision}"
 
 
-ITSELF = SceneKind("puma560", (10, 10), has_boxes=False, self_collision=True)
 KINDS = tuple(SceneKind(robot) for robot in ARMS)
+TEN_SPHERES = tuple(SceneKind(robot, (10, 10), has_boxes=False, self_collision=robot == "puma560") for robot in ARMS)
 
 
 @dataclass(frozen=True)
@@ -357,14 +358,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description="Motions among obstacles in scenes that OMPL solves.")
     parser.add_argument("--scenes", type=int, default=200, help="number of scenes (default: 200)")
     parser.add_argument("--compared", type=int, default=40, help="scenes compared with other starts (default: 40)")
-    parser.add_argument("--itself", action="store_true", help="ten spheres and self-collision of the PUMA instead")
+    parser.add_argument("--ten-spheres", action="store_true", help="ten spheres; the PUMA avoids itself too")
     parser.add_argument("--starts", type=int, default=20, help="number of other starts (default: 20)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--output", type=Path, default=RESULT, help="path of the results, without ending")
     chosen = parser.parse_args(arguments)
     report = compare_scenes(
         chosen.scenes,
-        kinds=(ITSELF,) if chosen.itself else KINDS,
+        kinds=TEN_SPHERES if chosen.ten_spheres else KINDS,
         compared=chosen.compared,
         starts=chosen.starts,
         seed=chosen.seed,
