@@ -23,9 +23,9 @@ from dhkit.planning.obstacles import (
     Separation,
     check_obstacles,
     distance,
-    distances_without,
     pair_distances,
     required_gaps,
+    smallest_distances,
 )
 from dhkit.planning.states import States
 from dhkit.trajectories import Limits
@@ -75,7 +75,10 @@ class CollisionAvoidance:
         """
         if not (math.isfinite(clearance) and clearance >= 0):
             raise ValueError(f"clearance is {clearance!r}; expected a number of at least 0, m")
-        return cls(check_obstacles(obstacles), clearance, self_collision)
+        obstacles = check_obstacles(obstacles)
+        # Of copies, one is kept.
+        unlike = {(item.geometry, item.placement) if isinstance(item, Obstacle) else item: item for item in obstacles}
+        return cls(tuple(unlike.values()), clearance, self_collision)
 
     def __bool__(self) -> bool:
         return bool(self.obstacles) or self.self_collision
@@ -154,7 +157,7 @@ class CollisionAvoidance:
     def _distances(self, description: Description, q: Array) -> Array:
         """Return the smallest distance of pairs whose clearance is not reduced, shape (N,), m."""
         without = [reduced.pair for reduced in self.reduced]
-        return np.asarray(distances_without(description, q, self.obstacles, self.self_collision, without).distance)
+        return smallest_distances(description, q, self.obstacles, self.self_collision, without)
 
     def _reduced_distances(self, description: Description, q: Array) -> Array:
         """Return the distances of the pairs whose clearance is reduced, shape (N, P), m."""

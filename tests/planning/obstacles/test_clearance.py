@@ -18,6 +18,7 @@ from dhkit.planning.obstacles import (
     world_axes,
 )
 from dhkit.planning.obstacles.segments import axis_bounds, segment_distances
+from dhkit.planning.obstacles.solid_arrays import Solids
 from dhkit.planning.obstacles.solids import capsule_distances, obstacle_distances
 
 COAL = 1e-7
@@ -108,7 +109,7 @@ def test_bounds_bound():
         axes[:, 0] + 0.5 * (axes[:, 1] - axes[:, 0]) / np.linalg.norm(np.diff(axes, axis=1)[:, 0], axis=1)[:, None]
     )
     for obstacle in (SCENE[0], SCENE[1], SCENE[3]):
-        low, high = axis_bounds(obstacle, axes)
+        low, high = axis_bounds(Solids.of([obstacle] * len(axes)), axes)
         exact = obstacle_distances(0.01, axes, obstacle) + 0.01
         assert np.all(low <= exact + COAL) and np.all(exact <= high + COAL)
 

@@ -9,10 +9,10 @@ from dhkit.description.frames import world_to_frames
 from dhkit.planning import Floor, Obstacle, distance
 from dhkit.planning.obstacles import (
     Separation,
-    distances_without,
     link_capsules,
     pair_distances,
     required_gaps,
+    smallest_distances,
     world_axes,
 )
 from dhkit.planning.obstacles.segments import nearest_on_box
@@ -137,5 +137,68 @@ def test_distances_of_single_pairs_are_those_of_all(ur5):
     each = np.stack([pair_distances(ur5, q, SCENE, pair) for pair in separation.pairs], axis=1)
     np.testing.assert_allclose(each.min(axis=1), distance(ur5, q, SCENE, self_collision=True).distance, atol=1e-8)
     left_out = separation.pairs[::2]
-    rest = distances_without(ur5, q, SCENE, True, left_out).distance
+    rest = smallest_distances(ur5, q, SCENE, True, left_out)
     np.testing.assert_allclose(each[:, 1::2].min(axis=1), rest, atol=1e-8)
+
+
+def heap(rng, count=60):
+    """Overlapping solids of all kinds in a small place, with copies."""
+    spread = lambda: np.array([0.5, 0.1, 0.5]) + rng.uniform(-0.2, 0.2, 3)  # noqa: E731
+    items = []
+    for _ in range(count // 3):
+        first, tilted = spread(), np.eye(4)
+        tilted[:3, :3], tilted[:3, 3] = Rotation.random(rng=rng).as_matrix(), spread()
+        items += [
+            Obstacle.sphere(rng.uniform(0.01, 0.08), spread()),
+            Obstacle.box(rng.uniform(0.02, 0.2, 3), tilted),
+            Obstacle.capsule(0.02, first, first + rng.uniform(-0.1, 0.1, 3)),
+        ]
+    return (*items, *items[:5], Floor(-0.1))
+
+
+@pytest.mark.parametrize("itself", [False, True])
+def test_the_smallest_distance_is_that_of_all_pairs(law, ur5, itself):
+    scene, q = heap(np.random.default_rng(1)), states(ur5, law.samples(2000), 1)
+    theirs = distance(ur5, q, scene, self_collision=itself).distance
+    ours = smallest_distances(ur5, q, scene, itself, ())
+    assert (theirs > 0.01).any() and (theirs < -0.01).any()
+    law.holds("m between the smallest and the smallest of all", np.abs(ours - theirs).max(), 1e-8, 0)
+
+
+def test_the_planes_that_are_kept_separate_all_solids(ur5):
+    rng = np.random.default_rng(2)
+    scene = heap(rng)
+    separation = Separation(ur5, scene)
+    q = states(ur5, 4000, 2)
+    q = q[separation.smallest(q) > 0.02][:40]
+    gaps = separation.gaps(q[:, None])
+    active, margins = np.isfinite(gaps.gap), np.full(gaps.gap.shape, 0.01)
+    rows = separation.rows(gaps, active, margins)
+    needed = {(row.knot, row.link, tuple(row.point)) for row in rows}
+    assert len(rows) < 0.3 * 2 * 2 * active.sum()
+    tried = kept = 0
+    for k, state in enumerate(q):
+        mine = [row for row in rows if row.knot == k]
+        assert {link for knot, link, _ in needed if knot == k} == {row.link for row in mine}
+        near = state + rng.uniform(-0.3, 0.3, (300, 6))
+        frames = world_to_frames(ur5, near)
+        clear = np.ones(len(near), dtype=bool)
+        for row in mine:
+            x = frames[:, row.link, :3, :3] @ row.point + frames[:, row.link, :3, 3]
+            clear &= x @ row.normal >= row.level
+        tried += len(near)
+        kept += clear.sum()
+        assert np.all(separation.smallest(near[clear]) >= 0.01 - 1e-8)
+    assert 0.05 < kept / tried < 0.95
+
+
+def test_copies_add_no_planes(ur5):
+    q = states(ur5, 200, 3)
+    once, thrice = Separation(ur5, SCENE), Separation(ur5, SCENE[:3] * 4 + SCENE[3:])
+    q = q[once.smallest(q) > 0.02]
+
+    def rows(separation):
+        gaps = separation.gaps(q[:, None])
+        return len(separation.rows(gaps, gaps.gap < 0.3, np.full(gaps.gap.shape, 0.01)))
+
+    assert rows(once) == rows(thrice)

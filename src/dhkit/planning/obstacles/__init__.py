@@ -1,7 +1,7 @@
 """Obstacles: scenes, capsules around links, exact distances, separating planes, and sampled paths."""
 
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, world_axes
-from dhkit.planning.obstacles.clearance import Distances, distance, distances_without, pair_distances
+from dhkit.planning.obstacles.clearance import Distances, distance, pair_distances, smallest_distances
 from dhkit.planning.obstacles.pairs import CheckedPairs, Pair, checked_pairs
 from dhkit.planning.obstacles.sampling import PathSampler
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
@@ -22,9 +22,9 @@ __all__ = [
     "check_obstacles",
     "checked_pairs",
     "distance",
-    "distances_without",
     "link_capsules",
     "pair_distances",
     "required_gaps",
+    "smallest_distances",
     "world_axes",
 ]

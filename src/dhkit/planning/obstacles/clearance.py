@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dhkit.description import Array, Description, joint_array, takes_robot
+from dhkit.description import Array, Box, Description, joint_array, takes_robot
 from dhkit.display import counted, repr_line
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, world_axes
 from dhkit.planning.obstacles.pairs import Pair, capsules_beside, checked_pairs, ends_above
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
 from dhkit.planning.obstacles.segments import Bounds, axis_bounds, segment_distances
+from dhkit.planning.obstacles.solid_arrays import Solids
 from dhkit.planning.obstacles.solids import capsule_distances, obstacle_distances
 
 ROUNDING = 1e-7
@@ -82,29 +83,18 @@ def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self
     >>> round(float(found.distance), 3)
     0.169
     """
-    return distances_without(description, q, check_obstacles(obstacles), self_collision, ())
-
-
-def distances_without(
-    description: Description,
-    q: ArrayLike,
-    obstacles: Sequence[Obstacle | Floor],
-    self_collision: bool,
-    without: Collection[Pair],
-) -> Distances:
-    """Return distances as :func:`distance`, without some pairs; q is (..., n), rad and m."""
+    obstacles = check_obstacles(obstacles)
     q = joint_array(description, q)
     rows = q.reshape(-1, description.n)
     finite = np.all(np.isfinite(rows), axis=1)
     capsules, axes = link_capsules(description), world_axes(description, rows[finite])
-    left_out = {(pair.capsule, pair.obstacle, pair.other) for pair in without}
     found, names = [], []
-    for k, obstacle in enumerate(obstacles):
-        found.append(_from_one(description, capsules, axes, obstacle, {i for i, j, _ in left_out if j == k}))
+    for obstacle in obstacles:
+        found.append(_from_one(description, capsules, axes, obstacle))
         names.append(_pair_names(description, capsules, obstacle))
     itself = np.full(len(axes), np.inf)
     if self_collision:
-        pairs = tuple((i, j) for i, j in checked_pairs(description).itself if (i, None, j) not in left_out)
+        pairs = checked_pairs(description).itself
         found.append(_from_itself(capsules, axes, pairs))
         names.append([(capsules[i].name, capsules[j].name) for i, j in pairs])
         itself = found[-1][0]
@@ -123,6 +113,71 @@ def distances_without(
     )
 
 
+def smallest_distances(
+    description: Description,
+    q: Array,
+    obstacles: Sequence[Obstacle | Floor],
+    self_collision: bool,
+    without: Collection[Pair],
+) -> Array:
+    """Return the smallest exact distance at finite states q (N, n), shape (N,), m, without those of some pairs.
+
+    As :func:`distance`, in less time: only the pairs that can be the nearest in a state are measured.
+    """
+    capsules, axes = link_capsules(description), world_axes(description, q)
+    left_out = {(pair.capsule, pair.obstacle, pair.other) for pair in without}
+    least = np.full(len(axes), np.inf)
+    for k, item in enumerate(obstacles):
+        if isinstance(item, Floor):
+            heights = _heights(description, capsules, axes, item, {i for i, j, _ in left_out if j == k})
+            least = np.minimum(least, heights.min(axis=1, initial=np.inf))
+    if self_collision:
+        pairs = tuple((i, j) for i, j in checked_pairs(description).itself if (i, None, j) not in left_out)
+        least = np.minimum(least, _from_itself(capsules, axes, pairs)[0])
+    solids = [(k, item) for k, item in enumerate(obstacles) if isinstance(item, Obstacle)]
+    for is_box in (False, True):
+        beside = [
+            (i, item)
+            for k, item in solids
+            if isinstance(item.geometry, Box) == is_box
+            for i in capsules_beside(description, item)
+            if (i, k, None) not in left_out
+        ]
+        if beside:
+            least = _nearer(capsules, axes, beside, least)
+    return least
+
+
+def _nearer(
+    capsules: tuple[LinkCapsule, ...], axes: Array, beside: Sequence[tuple[int, Obstacle]], least: Array
+) -> Array:
+    """Return the smaller of ``least`` (N,), m, and the distances of capsules from obstacles, all boxes or none."""
+    which = np.array([i for i, _ in beside])
+    solids, radii = Solids.of([item for _, item in beside]), np.array([capsules[i].radius for i in which])
+    half_lengths = np.array([capsules[i].length / 2 for i in which])
+    away = np.stack(
+        [
+            np.linalg.norm(axes[:, i].mean(axis=1) - centre, axis=1)
+            for i, centre in zip(which, solids.centres, strict=True)
+        ],
+        axis=1,
+    )
+    # Balls around the solids and the capsules bound the distances from below, their centres from above.
+    bound = np.minimum(least, (away - radii - solids.radii).min(axis=1))
+    low = away - radii - half_lengths - solids.bounds
+    rows, p = np.nonzero(low <= bound[:, None] + ROUNDING)
+    low, high = (bounds - radii[p] for bounds in axis_bounds(solids[p], axes[rows, which[p]]))
+    np.minimum.at(bound, rows, high)
+    is_candidate = low <= bound[rows] + ROUNDING
+    rows, p = rows[is_candidate], p[is_candidate]
+    result = least.copy()
+    for pair in np.unique(p):
+        at = rows[p == pair]
+        i, item = beside[pair]
+        result[at] = np.minimum(result[at], obstacle_distances(radii[pair], axes[at, i], item))
+    return result
+
+
 def pair_distances(description: Description, q: Array, obstacles: Sequence[Obstacle | Floor], pair: Pair) -> Array:
     """Return the exact distances of one pair at states q (N, n), shape (N,), m."""
     capsules, axes = link_capsules(description), world_axes(description, q)
@@ -138,28 +193,31 @@ def pair_distances(description: Description, q: Array, obstacles: Sequence[Obsta
 
 
 def _from_one(
-    description: Description,
-    capsules: tuple[LinkCapsule, ...],
-    axes: Array,
-    obstacle: Obstacle | Floor,
-    without: Collection[int],
+    description: Description, capsules: tuple[LinkCapsule, ...], axes: Array, obstacle: Obstacle | Floor
 ) -> Nearest:
-    """Return the distances from one obstacle, without some capsules; the candidates are those of `_pair_names`."""
+    """Return the distances from one obstacle; the candidates are those of `_pair_names`."""
     if isinstance(obstacle, Floor):
-        nothing = np.full(len(axes), np.inf)
-        heights = [
-            nothing if i in without else axes[:, i, end, 2] - capsules[i].radius - obstacle.height
-            for i, end in ends_above(description, obstacle.height)
-        ]
-        return _smallest(np.stack(heights, axis=1) if heights else np.full((len(axes), 0), np.inf))
+        return _smallest(_heights(description, capsules, axes, obstacle, ()))
     beside = capsules_beside(description, obstacle)
     radii = np.array([capsules[i].radius for i in beside])
     moving = axes[:, list(beside)]
-    low, high = axis_bounds(obstacle, moving)
-    far = np.where([i in without for i in beside], np.inf, 0.0)
-    return _exact(
-        (low - radii + far, high - radii + far), lambda i, rows: obstacle_distances(radii[i], moving[rows, i], obstacle)
-    )
+    low, high = axis_bounds(Solids.of([obstacle] * len(beside)), moving)
+    return _exact((low - radii, high - radii), lambda i, rows: obstacle_distances(radii[i], moving[rows, i], obstacle))
+
+
+def _heights(
+    description: Description,
+    capsules: tuple[LinkCapsule, ...],
+    axes: Array,
+    floor: Floor,
+    without: Collection[int],
+) -> Array:
+    """Return the heights of the checked ends of capsules above a floor, shape (N, m), m; inf for those left out."""
+    heights = [
+        np.full(len(axes), np.inf) if i in without else axes[:, i, end, 2] - capsules[i].radius - floor.height
+        for i, end in ends_above(description, floor.height)
+    ]
+    return np.stack(heights, axis=1) if heights else np.full((len(axes), 0), np.inf)
 
 
 def _from_itself(capsules: tuple[LinkCapsule, ...], axes: Array, pairs: tuple[tuple[int, int], ...]) -> Nearest:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dhkit.description import Array, Box
-from dhkit.planning.obstacles.scene import Obstacle
+from dhkit.description import Array
+from dhkit.planning.obstacles.solid_arrays import Solids
 
 POINTS = 9
 """Number of points of an axis at which its distance from a box is bounded."""
@@ -91,20 +91,27 @@ def nearest_on_box(axes: Array, T_world_box: Array, half_sizes: Array) -> tuple[
     return found[0][..., 0, :], found[1][..., 0, :]
 
 
-def axis_bounds(obstacle: Obstacle, axes: Array) -> Bounds:
-    """Return bounds of the signed distances of segments, shape (..., 2, 3), m, from an obstacle."""
-    if isinstance(obstacle.geometry, Box):
-        return _box_bounds(obstacle, axes)
-    distance = segment_distances(axes, obstacle.axis) - obstacle.radius
+def axis_bounds(solids: Solids, axes: Array) -> Bounds:
+    """Return bounds of the signed distances of segments from solids.
+
+    Parameters
+    ----------
+    solids
+        P solids.
+    axes
+        Ends of the segments, shape (..., P, 2, 3), m: the last batch axis goes with the solids.
+    """
+    if solids.are_boxes:
+        return _box_bounds(solids, axes)
+    distance = segment_distances(axes, solids.axes) - solids.radii
     return distance, distance
 
 
-def _box_bounds(obstacle: Obstacle, axes: Array) -> Bounds:
-    T = obstacle.T_world_obstacle
-    ends = (axes - T[:3, 3]) @ T[:3, :3]
+def _box_bounds(solids: Solids, axes: Array) -> Bounds:
+    ends = (axes - solids.centres[:, None]) @ solids.placements[:, :3, :3]
     share = np.linspace(0, 1, POINTS)[:, None]
     points = ends[..., :1, :] + share * (ends[..., 1:, :] - ends[..., :1, :])
-    beyond = np.abs(points) - obstacle.half_sizes
+    beyond = np.abs(points) - solids.half_sizes[:, None]
     signed = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + np.minimum(beyond.max(axis=-1), 0.0)
     length = np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1)
     least = signed.min(axis=-1)

@@ -19,6 +19,7 @@ from dhkit.planning.obstacles.capsules import link_capsules, world_axes
 from dhkit.planning.obstacles.pairs import Pair, capsules_beside, checked_pairs, ends_above
 from dhkit.planning.obstacles.scene import Floor, Obstacle
 from dhkit.planning.obstacles.segments import nearest_on_box, nearest_points
+from dhkit.planning.obstacles.solid_arrays import Solids, needed_planes
 
 Indices = NDArray[np.int_]
 
@@ -81,21 +82,29 @@ class Separation:
         self._half_lengths = np.array([capsule.length / 2 for capsule in self.capsules])
         self.pairs: list[Pair] = []
         self._groups: list[_Group] = []
+        solids = [(k, item) for k, item in enumerate(self.obstacles) if isinstance(item, Obstacle)]
+        for is_box in (False, True):
+            alike = [(k, item) for k, item in solids if isinstance(item.geometry, Box) == is_box]
+            self._add([Pair(i, k) for k, item in alike for i in capsules_beside(description, item)])
         for k, item in enumerate(self.obstacles):
             if isinstance(item, Floor):
                 above = ends_above(description, item.height)
                 ends = {i: tuple(end for j, end in above if j == i) for i, _ in above}
-                self._add([Pair(i, k, None, which) for i, which in ends.items()], item)
-            else:
-                self._add([Pair(i, k) for i in capsules_beside(description, item)], item)
+                self._add([Pair(i, k, None, which) for i, which in ends.items()])
         if self_collision:
-            self._add([Pair(i, None, j) for i, j in checked.itself], None)
+            self._add([Pair(i, None, j) for i, j in checked.itself])
 
-    def _add(self, pairs: list[Pair], obstacle: Obstacle | Floor | None) -> None:
-        if pairs:
-            begin = len(self.pairs)
-            self.pairs += pairs
-            self._groups.append(_Group(slice(begin, len(self.pairs)), obstacle, [pair.capsule for pair in pairs]))
+    def _add(self, pairs: list[Pair]) -> None:
+        """Append pairs of one kind: with boxes, with other solids, with the floor, or between links."""
+        if not pairs:
+            return
+        part = slice(len(self.pairs), len(self.pairs) + len(pairs))
+        capsules = np.array([pair.capsule for pair in pairs])
+        others = [None if pair.obstacle is None else self.obstacles[pair.obstacle] for pair in pairs]
+        solids = [item for item in others if isinstance(item, Obstacle)]
+        floor = others[0] if isinstance(others[0], Floor) else None
+        self._groups.append(_Group(part, capsules, Solids.of(solids) if solids else None, floor))
+        self.pairs += pairs
 
     def gaps(self, q: Array, near: float = np.inf) -> Gaps:
         """Return the gaps of K groups of states, shape (K, S, n), rad and m; infinite if surely above ``near``, m."""
@@ -128,7 +137,7 @@ class Separation:
             Knots whose joint values are given, without rows.
         """
         rows = []
-        for k, p in np.argwhere(active):
+        for k, p in np.argwhere(self._needed(gaps, active, margins)):
             pair, n = self.pairs[p], gaps.normal[k, p]
             capsule, need = self.capsules[pair.capsule], float(margins[k, p])
             if pair.other is None:
@@ -148,45 +157,65 @@ class Separation:
                 ]
         return rows
 
+    def _needed(self, gaps: Gaps, active: NDArray[np.bool_], margins: Array) -> NDArray[np.bool_]:
+        """Return the active pairs without those of obstacles behind the planes of others, shape (K, P)."""
+        needed = active.copy()
+        for group in self._groups:
+            if group.solids is None:
+                continue
+            for capsule in np.unique(group.capsules):
+                beside = np.flatnonzero(group.capsules == capsule)
+                for k in np.flatnonzero(active[:, beside + group.part.start].sum(axis=1) > 1):
+                    which = beside[active[k, beside + group.part.start]]
+                    which = which[np.argsort(gaps.gap[k, which + group.part.start], kind="stable")]
+                    p = which + group.part.start
+                    planes = gaps.normal[k, p], gaps.level[k, p], margins[k, p]
+                    needed[k, p] = needed_planes(group.solids, which, *planes)
+        return needed
+
     def _near(self, axes: Array, group: _Group, near: float) -> tuple[Indices, Indices]:
         """Return the groups of states and the pairs of a group whose balls around them come nearer than ``near``."""
-        capsules, item = group.capsules, group.obstacle
-        every = np.indices((len(axes), len(capsules))).reshape(2, -1)
-        if not isinstance(item, Obstacle) or np.isinf(near):
-            return every[0], every[1]
-        own = axes[:, :, capsules]
-        away = (own[..., 0, :] + own[..., 1, :]) / 2 - item.centre
-        reach = near + self.radii[capsules] + self._half_lengths[capsules] + item.radius
-        reach += float(np.linalg.norm(item.half_sizes))
-        k, p = np.nonzero(np.min(np.sum(away * away, axis=-1), axis=1) < np.maximum(reach, 0.0) ** 2)
+        capsules, solids = group.capsules, group.solids
+        if solids is None or np.isinf(near):
+            k, p = np.indices((len(axes), len(capsules))).reshape(2, -1)
+            return k, p
+        is_near = np.zeros((len(axes), len(capsules)), dtype=bool)
+        for capsule in np.unique(capsules):
+            beside = np.flatnonzero(capsules == capsule)
+            middles = axes[:, :, capsule].mean(axis=2)
+            away = middles[:, :, None] - solids.centres[beside]
+            reach = near + self.radii[capsule] + self._half_lengths[capsule] + solids.bounds[beside]
+            squares = np.min(np.einsum("kspx,kspx->ksp", away, away), axis=1)
+            is_near[:, beside] = squares < np.maximum(reach, 0.0) ** 2
+        k, p = np.nonzero(is_near)
         return k, p
 
     def _measure(self, axes: Array, group: _Group, at: tuple[Indices, Indices], found: Gaps) -> None:
         """Write the gaps of some groups of states and pairs, each at its smallest."""
         k, p = at
         pairs = self.pairs[group.part]
-        capsules = np.array(group.capsules)[p]
-        own, item = axes[k[:, None], np.arange(axes.shape[1]), capsules[:, None]], group.obstacle
+        capsules = group.capsules[p]
+        own, solids = axes[k[:, None], np.arange(axes.shape[1]), capsules[:, None]], group.solids
         radius = np.zeros(len(k))
         theirs = own
-        if item is None:
-            others = np.array([pair.other for pair in pairs])[p]
-            radius = self.radii[others]
-            theirs = axes[k[:, None], np.arange(axes.shape[1]), others[:, None]]
-            on_axis, nearest = nearest_points(own, theirs)
-        elif isinstance(item, Floor):
+        if group.floor is not None:
             is_checked = np.array([[end in pair.ends for end in (0, 1)] for pair in pairs])[p][:, None]
             low = np.argmin(np.where(is_checked, own[..., 2], np.inf), axis=-1)[..., None, None]
             nearest = np.take_along_axis(own, low, axis=-2)[..., 0, :]
             on_axis = nearest.copy()
-            nearest[..., 2] = item.height
+            nearest[..., 2] = group.floor.height
             # Gaps of axes are not negative: an axis below the floor counts as on it.
-            on_axis[..., 2] = np.maximum(on_axis[..., 2], item.height)
-        elif isinstance(item.geometry, Box):
-            on_axis, nearest = nearest_on_box(own, item.T_world_obstacle, item.half_sizes)
+            on_axis[..., 2] = np.maximum(on_axis[..., 2], group.floor.height)
+        elif solids is None:
+            others = np.array([pair.other for pair in pairs])[p]
+            radius = self.radii[others]
+            theirs = axes[k[:, None], np.arange(axes.shape[1]), others[:, None]]
+            on_axis, nearest = nearest_points(own, theirs)
+        elif solids.are_boxes:
+            on_axis, nearest = nearest_on_box(own, solids.placements[p][:, None], solids.half_sizes[p][:, None])
         else:
-            radius += item.radius
-            on_axis, nearest = nearest_points(own, item.axis)
+            radius = solids.radii[p]
+            on_axis, nearest = nearest_points(own, solids.axes[p][:, None])
         along = on_axis - nearest
         length = np.sqrt(np.sum(along * along, axis=-1))
         normal = along / np.maximum(length, ZERO)[..., None]
@@ -195,9 +224,9 @@ class Separation:
         level = np.sum(normal * nearest, axis=-1) + radius[:, None]
         gap = length - own_radius[:, None] - radius[:, None]
         # How far the first and the last state are on their sides of each state's plane, shape (pairs, states).
-        sides = own[:, [0, -1]] if not isinstance(item, Floor) else on_axis[:, [0, -1], None]
+        sides = own[:, [0, -1]] if group.floor is None else on_axis[:, [0, -1], None]
         beyond = np.einsum("msi,mkei->mske", normal, sides).min(axis=(2, 3)) - own_radius[:, None]
-        if item is None:
+        if solids is None and group.floor is None:
             behind = np.einsum("msi,mkei->mske", normal, theirs[:, [0, -1]]).max(axis=(2, 3)) + radius[:, None]
             margin = np.minimum(beyond - (level + gap / 2), level + gap / 2 - behind)
         else:
@@ -236,9 +265,12 @@ def required_gaps(gap: Array, clearance: float, at_start: Array, at_goal: Array,
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """Pairs with one obstacle, or between links."""
+    """Pairs of one kind: with boxes, with other solids, with the floor, or between links."""
 
     part: slice
     """Their indices."""
-    obstacle: Obstacle | Floor | None
-    capsules: list[int]
+    capsules: Indices
+    """Of each pair, shape (P,)."""
+    solids: Solids | None
+    """Of each pair."""
+    floor: Floor | None
