@@ -7,6 +7,7 @@ import math
 import re
 import time
 
+import casadi
 import numpy as np
 import pytest
 
@@ -14,7 +15,7 @@ import dhkit
 from acceptance import only_accepting
 from dhkit.description import library_robot, pose
 from dhkit.errors import DescriptionError, PlanningError, UnreachableError
-from dhkit.planning import MotorPower, Obstacle, Payload, Planner, ToolDirection, ToolOrientation, ToolSpeed
+from dhkit.planning import Constraint, MotorPower, Obstacle, Payload, Planner, ToolDirection, ToolOrientation, ToolSpeed
 from dhkit.trajectories import Limits, Trajectory
 from planning_reference import bare, slide
 
@@ -242,3 +243,27 @@ def test_what_is_no_wish(planner, options, message):
 )
 def test_what_is_of_another_type(planner, options, message):
     refused(re.escape(message), lambda: planner.solve(START, GOAL, **options), TypeError)
+
+
+def test_rows_that_are_not_numbers_are_named():
+    class Undefined(Constraint):
+        what = "undefined quantity"
+
+        def rows(self, point, parameters):
+            return casadi.log(-1 - point.q[0] ** 2)
+
+        def measured(self, states, parameters):
+            return np.zeros((len(states.times), 1))
+
+    motion = Planner(PUMA, intervals=16, constraints=[Undefined()]).solve(START, GOAL)
+    assert not motion.report.is_converged and motion.report.certificate.ok
+    assert "undefined quantity is not a number" in motion.report.failure
+    assert motion.report.notes == [
+        f"not optimal: the straight path, slowed down; the optimizer found nothing ({motion.report.failure})"
+    ]
+
+
+def test_payloads_with_impossible_inertia():
+    message = r"^payload: inertia has the eigenvalue -1 kg m\^2; expected none below 0$"
+    refused(message, lambda: Payload(1.0, inertia=np.diag([-1.0, 1, 1])), DescriptionError)
+    assert Payload(1.0, inertia=np.diag([-1e-13, 1, 1])).inertia[1][1] == 1.0

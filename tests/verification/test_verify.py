@@ -132,3 +132,8 @@ def test_reports_for_people_and_papers():
 
 def test_arm_verify():
     assert Arm.load("cart_pendulum").verify(samples=5, seed=4).ok
+
+
+def test_the_inertia_of_coupled_drives_is_said_to_be_added():
+    assert "the inertia of coupled drives was added to Pinocchio's M" in verify(library_robot("manutec_r3"), 5).notes
+    assert not verify(library_robot("puma560"), 5).notes

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dhkit.description.arrays import Array, number_array
-from dhkit.description.bodies import INERTIA_PLACES
+from dhkit.description.bodies import INERTIA_PLACES, eigenvalue_tolerance
 from dhkit.description.changes import is_asymmetric, with_payload
 from dhkit.description.robot import Description
 from dhkit.display import value_line
@@ -21,7 +21,7 @@ class Payload:
     Raises
     ------
     DescriptionError
-        Other shapes, numbers that are not finite, or a negative mass.
+        Other shapes, numbers that are not finite, a negative mass, or an inertia with a negative eigenvalue.
     TypeError
         Not numbers.
 
@@ -53,6 +53,11 @@ class Payload:
             object.__setattr__(self, name, None if name == "inertia" and not array.any() else value)
         if self.mass < 0:
             raise DescriptionError(f"payload: mass is {self.mass:g} kg; expected none below 0")
+        moments = np.linalg.eigvalsh(np.array(tensor, dtype=float))
+        if moments[0] < -eigenvalue_tolerance(float(moments[-1])):
+            raise DescriptionError(
+                f"payload: inertia has the eigenvalue {moments[0]:.6g} kg m^2; expected none below 0"
+            )
 
     def carried(self, description: Description) -> Description:
         """Return an arm with the load joined to its last link.
@@ -60,7 +65,7 @@ class Payload:
         Raises
         ------
         DescriptionError
-            The load's inertia is impossible, or the last link has no body.
+            The last link has no body.
         """
         return with_payload(description, self.mass, self.com, self.inertia)
 

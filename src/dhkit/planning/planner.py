@@ -400,9 +400,9 @@ class Planner:
                     return program
 
                 return AvoidingSearch(task, search, program, finer)(warm)
-            except PlanningError:
+            except PlanningError as error:
                 if is_last or time.perf_counter() > deadline:
-                    if (slow := PlannedMotion.slowed_straight(task, program.intervals)) is not None:
+                    if (slow := PlannedMotion.slowed_straight(task, program.intervals, error)) is not None:
                         return slow
                     raise
         raise AssertionError("no curve")

@@ -85,6 +85,8 @@ class PlanReport:
     """Whether the motion was optimized; a move below 1e-10 rad or m is a quintic that keeps the limits."""
     is_converged: bool = True
     """Whether the motion is optimal to the solver's tolerance; with friction or energy it may be only feasible."""
+    failure: str = ""
+    """Why the optimizer found nothing: the motion is then the straight path, slowed down."""
     clearance: float | None = None
     """Distance that was asked for from obstacles, m; None without obstacles."""
     spare_clearance: float = 0.0
@@ -107,7 +109,9 @@ class PlanReport:
         if self.reduced_clearances:
             less = ", ".join(self.reduced_clearances)
             notes[-1] += f", but less near the ends, until they are that far apart: {less}"
-        if not self.is_converged:
+        if self.failure:
+            notes.append(f"not optimal: the straight path, slowed down; the optimizer found nothing ({self.failure})")
+        elif not self.is_converged:
             notes.append("not optimal to the solver's tolerance: it stopped at a motion that keeps all limits")
         if not self.is_resolved:
             notes.append("the move is too small to be optimized: a quintic that keeps the limits")
@@ -212,6 +216,7 @@ class PlanReport:
             "reduced_clearances": list(self.reduced_clearances),
             "resolved": self.is_resolved,
             "converged": self.is_converged,
+            "failure": self.failure or None,
             "slow_down": self.slow_down,
             "tightened": list(self.tightened),
             "intervals": self.intervals,

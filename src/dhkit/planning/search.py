@@ -63,6 +63,8 @@ class PlannedMotion:
     """Whether it is optimal to the solver's tolerance, near where the search began."""
     attempt: int = 0
     """Index of the curve of accelerations of its program."""
+    failure: str = ""
+    """Why the optimizer found nothing, for the straight path slowed down that is returned then."""
 
     @classmethod
     def unresolved(cls, task: Task) -> PlannedMotion:
@@ -84,10 +86,11 @@ class PlannedMotion:
         return cls(trajectory, certificate, cost, 1, is_resolved=False)
 
     @classmethod
-    def slowed_straight(cls, task: Task, intervals: int) -> PlannedMotion | None:
+    def slowed_straight(cls, task: Task, intervals: int, failure: PlanningError) -> PlannedMotion | None:
         """Return cubics along the straight path, slowed down until they keep all limits; None if they cannot.
 
-        For constraints far below the joints' limits, which leave the optimizer a flat objective.
+        For constraints far below the joints' limits, which leave the optimizer a flat objective; ``failure`` is its
+        error.
         """
         if not (task.rests and task.duration is None and task.checker.constraints):
             return None
@@ -101,7 +104,7 @@ class PlannedMotion:
         if not certificate.ok:
             return None
         cost = cost_of(task.objective, trajectory, task.loaded, task.friction)
-        return cls(trajectory, certificate, cost, intervals, is_converged=False)
+        return cls(trajectory, certificate, cost, intervals, is_converged=False, failure=str(failure))
 
 
 @dataclass
@@ -310,10 +313,10 @@ class Search(Generic[Iterate]):
             self._last = solution
             return program.iterate(solution.x)
         worst, which, interval, misses = worst_row(solution, program.blocks, rows)
+        state = f"misses its bound by {misses:.2g}" if np.isfinite(misses) else "is not a number"
         raise PlanningError(
             f"not converged ({solution.status.replace('_', ' ').lower()}, {solution.iterations} iterations): "
-            f"{self._row_name(worst.what, which, of_joint=worst.of_joints)} misses its bound by {misses:.2g} "
-            f"at {program.place(interval)}"
+            f"{self._row_name(worst.what, which, of_joint=worst.of_joints)} {state} at {program.place(interval)}"
         )
 
     def _row_name(self, what: str, row: int, *, of_joint: bool) -> str:
@@ -355,6 +358,7 @@ def report_of(task: Task, best: PlannedMotion, work: Work, began: float) -> Plan
         unlimited=task.limits.unlimited,
         is_resolved=best.is_resolved,
         is_converged=best.is_converged,
+        failure=best.failure,
         **task.avoidance.report(arm, best.certificate.excess_of(Limit.CLEARANCE)),
     )
 

@@ -51,6 +51,9 @@ WARM_OPTIONS: dict[str, Any] = {
 }
 """Options from a solution with other bounds and its multipliers: half to a fifth of the iterations."""
 
+INVALID_NUMBER = "Invalid_Number_Detected"
+"""Ipopt's status where rows, costs or derivatives are NaN or infinite."""
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -100,7 +103,7 @@ class Solver:
         self.tolerance, self._unscaled = tolerance, program.unscaled
         function, derivatives = program.functions
         sizes = program.variables, program.rows, program.parameters + len(program.unscaled.vector)
-        self._watch = _watch(*sizes, legs)
+        self._watch, self._function = _watch(*sizes, legs), function
 
         def made(options: dict[str, Any]) -> casadi.Function:
             of_all: dict[str, Any] = {
@@ -159,9 +162,11 @@ class Solver:
             stats = function.stats()
         if raised is not None:
             raise raised
+        success, status, iterations = bool(stats["success"]), str(stats["return_status"]), int(stats["iter_count"])
+        if status == INVALID_NUMBER:  # Ipopt returns no rows then
+            found |= self._function(x=found["x"], p=p)
         x, g = np.array(found["x"]).ravel(), np.array(found["g"]).ravel()
         misses = max(_outside(x, lbx, ubx), _outside(g, lbg, ubg))
-        success, status, iterations = bool(stats["success"]), str(stats["return_status"]), int(stats["iter_count"])
         return Solution(
             units.variables(x),
             g * units.row_unit,

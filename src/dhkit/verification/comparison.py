@@ -68,6 +68,7 @@ def verify(description: Description, samples: int = 1000, seed: int = 0) -> Veri
     if missing:
         notes.append(f"dynamics not compared: no body on {', '.join(missing)}")
     else:
+        notes += reference.notes
         comparisons += _dynamics(description, reference, notes)
     import pinocchio as pin
 

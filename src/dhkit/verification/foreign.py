@@ -107,6 +107,7 @@ def verify_urdf(
     if not any(offset.frame is OffsetFrame.BASE for offset in offsets):
         notes += differences(description, model, tolerance)
     if all(joint.bodies for joint in description.joints):
+        notes += reference.notes
         comparisons += _dynamics(description, reference, tolerance)
     else:
         notes.append("dynamics not compared: the table has links without a body")

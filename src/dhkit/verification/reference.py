@@ -24,6 +24,11 @@ class PinocchioResults:
         self.coupling = np.zeros((model.nv, model.nv)) if coupling is None else coupling
         self._data = model.createData()
 
+    @property
+    def notes(self) -> list[str]:
+        """What was added to Pinocchio's results, a sentence each."""
+        return ["the inertia of coupled drives was added to Pinocchio's M"] if self.coupling.any() else []
+
     def frames(self, names: Sequence[str]) -> Array:
         """Return frames in the world, shape (N, names, 4, 4)."""
         import pinocchio as pin
