@@ -18,6 +18,7 @@ from dhkit.display import repr_line
 from dhkit.expressions import ZERO, Expression, cos, exact_angle, sin
 from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow, exact_arm
 from dhkit.symbolic.exact.naming import Naming, Symbols
+from dhkit.symbolic.exact.transforms import identity, inverse, rotation, translation
 from dhkit.symbolic.mistakes import MadeAt, Mistake, Subject, catalogue, check_mistake, has, made_at
 from dhkit.symbolic.ring import Direction, Element, Elements, Ring, RingError
 
@@ -155,7 +156,7 @@ class TextbookKinematics:
     @cached_property
     def T(self) -> Elements:
         """The tool in the world, shape (4, 4): base A_1 ... A_n tool, m."""
-        return _inverse(self._pose) if self._has("pose_inverted") else self._pose
+        return inverse(self._pose) if self._has("pose_inverted") else self._pose
 
     @cached_property
     def J(self) -> Elements:
@@ -168,7 +169,7 @@ class TextbookKinematics:
             linear, angular = (self.base[:3, :3].T @ rows for rows in (linear, angular))
         if self._has("angular_axes_unturned"):
             turning = [kind == "R" for kind in self.arm.ring.kinds]
-            angular = _identity(self.arm.ring)[:3, 2:3] * np.array(turning, dtype=int)
+            angular = identity(self.arm.ring)[:3, 2:3] * np.array(turning, dtype=int)
         if self._has("jacobian_x_y_exchanged"):
             linear = linear[[1, 0, 2]]
         halves = (angular, linear) if self._has("jacobian_halves_exchanged") else (linear, angular)
@@ -178,17 +179,17 @@ class TextbookKinematics:
     def base(self) -> Elements:
         """Frame 0 in the world."""
         if self._has("base_forgotten"):
-            return _identity(self.arm.ring)
+            return identity(self.arm.ring)
         base = _placement(self.arm, self.arm.description.base.placement)
-        return _inverse(base) if self._has("base_inverted") else base
+        return inverse(base) if self._has("base_inverted") else base
 
     @cached_property
     def tool(self) -> Elements:
         """The tool in frame n."""
         if self._has("tool_forgotten"):
-            return _identity(self.arm.ring)
+            return identity(self.arm.ring)
         tool = _placement(self.arm, self.arm.description.tool.placement)
-        return _inverse(tool) if self._has("tool_inverted") else tool
+        return inverse(tool) if self._has("tool_inverted") else tool
 
     @cached_property
     def _pose(self) -> Elements:
@@ -205,8 +206,8 @@ class TextbookKinematics:
     def _link(self, i: int) -> Elements:
         """Return A_i, i counted from 0, as the product of its four elementary motions."""
         ring, row = self.arm.ring, self._lengths(i, self._angles(i, self.arm.rows[i]))
-        Rz, Rx = _rotation(ring, 0, 1, row.theta), _rotation(ring, 1, 2, row.alpha)
-        Tz, Tx = _translation(ring, 2, row.d), _translation(ring, 0, row.a)
+        Rz, Rx = rotation(ring, 0, 1, row.theta), rotation(ring, 1, 2, row.alpha)
+        Tz, Tx = translation(ring, 2, row.d), translation(ring, 0, row.a)
         turned = Rz @ Rx if self._standard else Rx @ Rz
         if self._has("rotations_first", i):
             A = turned @ Tx @ Tz
@@ -274,7 +275,7 @@ class TextbookKinematics:
     def _axis(self, i: int) -> Elements:
         """Return the direction of joint i's axis in the world, shape (3,)."""
         if self._has("axis_unturned"):
-            return _identity(self.arm.ring)[:3, 2]
+            return identity(self.arm.ring)[:3, 2]
         own, neighbour = (i, i + 1) if self._standard else (i + 1, i)
         return self.frames[neighbour if self._has("axis_neighbour") else own][:3, 2]
 
@@ -384,7 +385,7 @@ def _placement(arm: ExactArm, placement: Placement) -> Elements:
     """Return a placement's matrix, shape (4, 4): Rz(yaw) Ry(pitch) Rx(roll), then the origin."""
     ring, naming = arm.ring, Naming(arm.description, arm.symbols)
     roll, pitch, yaw = (ring.direction(angle) for angle in _known_angles(arm, placement))
-    T: Elements = _rotation(ring, 0, 1, yaw) @ _rotation(ring, 2, 0, pitch) @ _rotation(ring, 1, 2, roll)
+    T: Elements = rotation(ring, 0, 1, yaw) @ rotation(ring, 2, 0, pitch) @ rotation(ring, 1, 2, roll)
     T[:3, 3] = [ring.read(naming.known(x)) for x in placement.xyz]
     return T
 
@@ -395,32 +396,6 @@ def _product(first: Elements, second: Elements, unrotated: bool) -> Elements:
     if unrotated:
         product[:3, 3] = first[:3, 3] + second[:3, 3]
     return product
-
-
-def _inverse(T: Elements) -> Elements:
-    """Return the inverse of a rigid transform, shape (4, 4)."""
-    inverse = T.copy()
-    inverse[:3, :3] = T[:3, :3].T
-    inverse[:3, 3] = -(T[:3, :3].T @ T[:3, 3])
-    return inverse
-
-
-def _identity(ring: Ring) -> Elements:
-    return np.array([[ring.one if i == j else ring.zero for j in range(4)] for i in range(4)], dtype=object)
-
-
-def _rotation(ring: Ring, first: int, second: int, direction: Direction) -> Elements:
-    """Return the rotation by an angle from one axis to another, shape (4, 4)."""
-    T, (c, s) = _identity(ring), direction
-    T[first, first], T[first, second], T[second, first], T[second, second] = c, -s, s, c
-    return T
-
-
-def _translation(ring: Ring, axis: int, length: Element) -> Elements:
-    """Return the translation along an axis, shape (4, 4)."""
-    T = _identity(ring)
-    T[axis, 3] = length
-    return T
 
 
 def _sum(first: Direction, second: Direction) -> Direction:

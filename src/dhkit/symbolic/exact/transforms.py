@@ -1,0 +1,34 @@
+"""Rigid transforms with exact entries: the elementary motions that derivations multiply, and the inverse."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dhkit.symbolic.ring import Direction, Element, Elements, Ring
+
+
+def identity(ring: Ring) -> Elements:
+    """Return the transform that moves nothing, shape (4, 4)."""
+    return np.array([[ring.one if i == j else ring.zero for j in range(4)] for i in range(4)], dtype=object)
+
+
+def rotation(ring: Ring, first: int, second: int, direction: Direction) -> Elements:
+    """Return the rotation by an angle (its cosine and sine) from one axis to another, shape (4, 4)."""
+    T, (c, s) = identity(ring), direction
+    T[first, first], T[first, second], T[second, first], T[second, second] = c, -s, s, c
+    return T
+
+
+def translation(ring: Ring, axis: int, length: Element) -> Elements:
+    """Return the translation by a length (m) along an axis, shape (4, 4)."""
+    T = identity(ring)
+    T[axis, 3] = length
+    return T
+
+
+def inverse(T: Elements) -> Elements:
+    """Return the inverse of a rigid transform, shape (4, 4)."""
+    result = T.copy()
+    result[:3, :3] = T[:3, :3].T
+    result[:3, 3] = -(T[:3, :3].T @ T[:3, 3])
+    return result

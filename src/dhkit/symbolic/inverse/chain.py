@@ -1,0 +1,199 @@
+"""An arm in the form from which inverse kinematics is derived, for both conventions of tables.
+
+T = E J_1 C_1 J_2 C_2 ... C_(n-1) J_n F with the joints J_i = Rz(theta_i) Tz(d_i), the links C_i = Tx(a_i) Rx(alpha_i)
+between them, and constant ends E and F. Standard tables have E = base, F = C_n tool; modified ones E = base C_0,
+F = tool. Angles of joints are the table's theta_i: joint value plus offset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from dhkit.description import Convention, Description
+from dhkit.description.parameters import resolved
+from dhkit.expressions import Expression, exact_angle, substitute
+from dhkit.symbolic.exact.naming import Naming
+from dhkit.symbolic.exact.transforms import identity, inverse, rotation, translation
+from dhkit.symbolic.ring import Direction, Element, Elements, Ring
+from dhkit.symbolic.ring.constants import Constants, value_of
+from dhkit.symbolic.ring.notation import distinct
+from dhkit.symbolic.ring.ring import Constant
+
+POSITION = ("px", "py", "pz")
+ROTATION = tuple(f"r{i}{j}" for i in "123" for j in "123")
+POSE = (*POSITION, *ROTATION)
+"""Names of the entries of the tool's pose in the world."""
+INNER = tuple(name.replace("p", "u").replace("r", "u") for name in POSE)
+"""Names of the entries of the pose without base and tool."""
+DEFINED = (*INNER, *"wx wy wz x y u v ax ay az nx ny nz ox oy oz cphi sphi".split())
+"""Names that steps may define."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """The exact chain of an arm.
+
+    Attributes
+    ----------
+    description
+        The robot.
+    ring
+        Of all elements: sines and cosines of theta_i, values of sliding joints, lengths, the pose's entries, and the
+        quantities that steps define.
+    names
+        The names of the pose's entries and of defined quantities in the ring: their own, unless the robot file has
+        parameters of those names.
+    first, last
+        The constant ends E and F, shape (4, 4), m.
+    a, alpha
+        Of the links C_1 ... C_(n-1): lengths, m, and cosine and sine of the twists.
+    d
+        Lengths of the joints, m; with the joint's value where it slides.
+    offsets
+        Offset of each joint: theta_i minus the joint value; of a sliding joint, its constant angle.
+    values
+        Values of the ring's constants that are no entries of poses and not defined by steps.
+    lengths
+        Values of the symbols, SI, by name.
+    notes
+        One sentence for each number that is a symbol because it has no exact form.
+    """
+
+    description: Description
+    ring: Ring
+    names: Mapping[str, str]
+    first: Elements
+    last: Elements
+    a: tuple[Element, ...]
+    alpha: tuple[Direction, ...]
+    d: tuple[Element, ...]
+    offsets: tuple[Expression, ...]
+    values: dict[str, float]
+    lengths: dict[str, float]
+    notes: tuple[str, ...]
+
+    @classmethod
+    def of(cls, description: Description, *, named: bool) -> Chain:
+        """Return an arm's chain; lengths that are numbers get names (a2, d3) if ``named``, else all are numbers."""
+        naming = Naming(description, "inertial" if named else "none")
+        joints, is_standard = description.joints, description.convention is Convention.STANDARD
+        lengths = [(naming.length(f"a{i}", j.a), naming.length(f"d{i}", j.d)) for i, j in enumerate(joints, start=1)]
+        angles = [tuple(exact_angle(naming.known(x)) for x in (j.alpha, j.theta)) for j in joints]
+        ends = [description.base.placement, description.tool.placement]
+        fixed = [[naming.known(x) for x in end.xyz] for end in ends]
+        turned = [[exact_angle(naming.known(x)) for x in end.rpy] for end in ends]
+        constants = Constants.of(
+            [*(x for row in lengths for x in row), *(x for xyz in fixed for x in xyz)],
+            [*(x for row in angles for x in row), *(x for rpy in turned for x in rpy)],
+        )
+        taken = {name for constant in constants.found.values() for name in constant.symbols}
+        names = distinct([*POSE, *DEFINED], taken)
+        ring = Ring(description.kinds, [*constants.found.values(), *map(Constant, names.values())])
+        base, tool = (
+            _placed(ring, [ring.read(x) for x in xyz], [ring.direction(x) for x in rpy])
+            for xyz, rpy in zip(fixed, turned, strict=True)
+        )
+        a, alpha = [ring.read(row[0]) for row in lengths], [ring.direction(row[0]) for row in angles]
+        outer = 0 if not is_standard else len(joints) - 1
+        link = translation(ring, 0, a[outer]) @ rotation(ring, 1, 2, alpha[outer])
+        del a[outer], alpha[outer]
+        d = [ring.read(row[1]) for row in lengths]
+        slides = [kind == "P" for kind in description.kinds]
+        return cls(
+            description,
+            ring,
+            names,
+            base if is_standard else base @ link,
+            link @ tool if is_standard else tool,
+            tuple(a),
+            tuple(alpha),
+            tuple(d_i + ring.position(i) if slides[i] else d_i for i, d_i in enumerate(d)),
+            tuple(row[1] for row in angles),
+            {text: value_of(constant, naming.values) for text, constant in constants.found.items()},
+            {name: float(naming.values[name]) for name in sorted(taken)},
+            tuple(constants.notes),
+        )
+
+    @property
+    def n(self) -> int:
+        """The number of joints."""
+        return len(self.d)
+
+    def number(self, expression: Expression) -> float:
+        """Return the value of an expression in the file's parameters, SI and rad."""
+        return float(substitute(expression, resolved(self.description.parameters)))
+
+    def symbol(self, name: str) -> Element:
+        """Return an entry of the pose or a defined quantity by its usual name."""
+        return self.ring.constant(self.names[name])
+
+    def cosine_and_sine(self, i: int) -> Direction:
+        """Return cosine and sine of theta_i, i from 1; of a sliding joint those of its constant angle."""
+        if self.description.kinds[i - 1] == "R":
+            return self.ring.cosine(i - 1), self.ring.sine(i - 1)
+        return self.ring.direction(self.offsets[i - 1])
+
+    def joint(self, i: int) -> Elements:
+        """Return J_i, i from 1, shape (4, 4)."""
+        return rotation(self.ring, 0, 1, self.cosine_and_sine(i)) @ translation(self.ring, 2, self.d[i - 1])
+
+    def link(self, i: int) -> Elements:
+        """Return C_i, i from 1 to n - 1, shape (4, 4)."""
+        return translation(self.ring, 0, self.a[i - 1]) @ rotation(self.ring, 1, 2, self.alpha[i - 1])
+
+    def part(self, first: int, last: int) -> Elements:
+        """Return J_first C_first ... J_last C_last, shape (4, 4); without C_n, the identity if ``last`` is smaller."""
+        T = identity(self.ring)
+        for i in range(first, last + 1):
+            T = T @ self.joint(i)
+            if i < self.n:
+                T = T @ self.link(i)
+        return T
+
+    @cached_property
+    def whole(self) -> Elements:
+        """J_1 C_1 ... J_n, shape (4, 4)."""
+        return self.part(1, self.n)
+
+    @cached_property
+    def tool_pose(self) -> Elements:
+        """The tool in the world by the table's own transforms, base A_1 ... A_n tool, shape (4, 4), m."""
+        T = self.first
+        for i in range(1, self.n + 1):
+            T = T @ self.joint(i) @ (self.link(i) if i < self.n else self.last)
+        return T
+
+    @cached_property
+    def given_pose(self) -> Elements:
+        """The pose that is given, shape (4, 4), of symbols."""
+        T = identity(self.ring)
+        T[:3, 3] = [self.symbol(name) for name in POSITION]
+        T[:3, :3] = np.array([self.symbol(name) for name in ROTATION], dtype=object).reshape(3, 3)
+        return T
+
+    def named(self, names: Iterable[str]) -> Elements:
+        """Return defined quantities by their usual names, shape (k,)."""
+        return np.array([self.symbol(name) for name in names], dtype=object)
+
+
+def is_identity(T: Elements) -> bool:
+    """Whether a transform moves nothing."""
+    return all(entry == (1 if i == j else 0) for (i, j), entry in np.ndenumerate(T))
+
+
+def undone(first: Elements, T: Elements, last: Elements) -> Elements:
+    """Return first^-1 T last^-1, shape (4, 4)."""
+    result: Elements = inverse(first) @ T @ inverse(last)
+    return result
+
+
+def _placed(ring: Ring, xyz: list[Element], rpy: list[Direction]) -> Elements:
+    """Return Rz(yaw) Ry(pitch) Rx(roll) with an origin, shape (4, 4)."""
+    roll, pitch, yaw = rpy
+    T: Elements = rotation(ring, 0, 1, yaw) @ rotation(ring, 2, 0, pitch) @ rotation(ring, 1, 2, roll)
+    T[:3, 3] = xyz
+    return T

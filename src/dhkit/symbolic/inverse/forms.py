@@ -1,0 +1,379 @@
+"""The forms of equations that derivations of inverse kinematics solve, each with its solution and the lemma behind it.
+
+A form has letters (A, B, C ...) that stand for known quantities. Its lemma, that the solution satisfies the equation
+and that there is no other one, is proved once, in a ring of the letters.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import ClassVar
+
+import numpy as np
+
+from dhkit.description import Array
+from dhkit.symbolic.exact.lagrangian import Proof
+from dhkit.symbolic.ring import Element, Elements, Ring
+from dhkit.symbolic.ring.ring import Constant
+
+ROUNDING = 1e-12
+"""Share of its terms by which the radicand of a root may be negative and counts as zero."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """What a step solves for.
+
+    Attributes
+    ----------
+    name
+        theta3, q3 of a sliding joint, or phi.
+    joint
+        The joint, from 0; None for phi, a sum of joint angles.
+    symbols
+        Cosine and sine of an angle, or the value of a sliding joint.
+    """
+
+    name: str
+    joint: int | None
+    symbols: tuple[Element, ...]
+
+    @property
+    def is_angle(self) -> bool:
+        """Whether it is an angle."""
+        return len(self.symbols) == 2
+
+    @property
+    def cosine(self) -> Element:
+        """The cosine of an angle."""
+        return self.symbols[0]
+
+    @property
+    def sine(self) -> Element:
+        """The sine of an angle."""
+        return self.symbols[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Form(ABC):
+    """An equation of a known form.
+
+    Attributes
+    ----------
+    unknown
+        What it is solved for.
+    letters
+        The known quantities by letter.
+    """
+
+    unknown: Unknown
+    letters: Mapping[str, Element]
+
+    has_two_roots: ClassVar[bool] = False
+    statement: ClassVar[str]
+    """The lemma in words."""
+    solution: ClassVar[str]
+    """The solution as text in the letters; {s} is the sign of the root, {x} the unknown."""
+    latex: ClassVar[str]
+    """The same in LaTeX."""
+    radicand: ClassVar[str] = ""
+    """What must not be negative, as text in the letters; empty without a root."""
+
+    @property
+    @abstractmethod
+    def equations(self) -> tuple[tuple[Element, Element], ...]:
+        """Both sides of the equations."""
+
+    @abstractmethod
+    def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
+        """Return the unknown and the radicand, as a share of its terms, at values of the letters; 1 without a root."""
+
+    @staticmethod
+    @abstractmethod
+    def lemma() -> Proof:
+        """Prove that the solution satisfies the equation, and that there is no other."""
+
+
+class Circle(Form):
+    """A cos x + B sin x = C."""
+
+    has_two_roots = True
+    statement = (
+        "A cos x + B sin x = C holds for x = atan2(B, A) +- atan2(sqrt(A^2 + B^2 - C^2), C), and for no other angle"
+    )
+    solution = "atan2(B, A) {s} atan2(sqrt(A^2 + B^2 - C^2), C)"
+    latex = r"\mathrm{atan2}(B, A) {s} \mathrm{atan2}\bigl(\sqrt{A^{2} + B^{2} - C^{2}},\, C\bigr)"
+    radicand = "A^2 + B^2 - C^2"
+
+    @property
+    def equations(self) -> tuple[tuple[Element, Element], ...]:
+        """A cos x + B sin x, and C."""
+        A, B, C = (self.letters[k] for k in "ABC")
+        return ((A * self.unknown.cosine + B * self.unknown.sine, C),)
+
+    def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
+        """Return the angle and the radicand."""
+        A, B, C = (letters[k] for k in "ABC")
+        size = A * A + B * B
+        square = size - C * C
+        angle = np.arctan2(B, A) + sign * np.arctan2(np.sqrt(np.maximum(square, 0.0)), C)
+        return angle, square / np.maximum(size, np.finfo(float).tiny)
+
+    @staticmethod
+    def lemma() -> Proof:
+        """Prove the solution, with N = A^2 + B^2 and R^2 = N - C^2; any solution has B cos x - A sin x = +-R."""
+        ring = _ring("A B C", {"R": "A^2 + B^2 - C^2"}, "X")
+        A, B, C, R = map(ring.constant, "ABCR")
+        c, s, N = ring.cosine(0), ring.sine(0), A * A + B * B
+        both = []
+        for sign in (1, -1):
+            # cos and sin of the sum of the two arc tangents, times N.
+            x, y = A * C - sign * B * R, B * C + sign * A * R
+            both += [A * x + B * y - C * N, x * x + y * y - N * N]
+        held = A * c + B * s
+        return Proof(Circle.statement, _column([*both, (B * c - A * s) ** 2 - (N - held * held)]))
+
+
+class Line(Form):
+    """X sin x = Y cos x."""
+
+    has_two_roots = True
+    statement = "X sin x = Y cos x holds for x = atan2(Y, X) and x = atan2(-Y, -X), and for no other angle"
+    solution = "atan2({s}Y, {s}X)"
+    latex = r"\mathrm{atan2}({s}Y,\, {s}X)"
+
+    @property
+    def equations(self) -> tuple[tuple[Element, Element], ...]:
+        """X sin x, and Y cos x."""
+        return ((self.letters["X"] * self.unknown.sine, self.letters["Y"] * self.unknown.cosine),)
+
+    def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
+        """Return the angle."""
+        return np.arctan2(sign * letters["Y"], sign * letters["X"]), np.array(1.0)
+
+    @staticmethod
+    def lemma() -> Proof:
+        """Prove it: (X, Y) is then (X cos x + Y sin x) times (cos x, sin x), so that x is its direction or opposite."""
+        return Proof(Line.statement, _along(["X", "Y"]))
+
+
+class Direction(Form):
+    """k cos x = X and k sin x = Y, with a known k that is not zero."""
+
+    statement = "k cos x = X, k sin x = Y hold for x = atan2(k Y, k X) alone, where k is not 0"
+    solution = "atan2({kY}, {kX})"
+    latex = r"\mathrm{atan2}({kY},\, {kX})"
+
+    @property
+    def equations(self) -> tuple[tuple[Element, Element], ...]:
+        """The two equations."""
+        k = self.letters["k"]
+        return (k * self.unknown.cosine, self.letters["X"]), (k * self.unknown.sine, self.letters["Y"])
+
+    def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
+        """Return the angle."""
+        k = letters["k"]
+        return np.arctan2(k * letters["Y"], k * letters["X"]), np.array(1.0)
+
+    @staticmethod
+    def lemma() -> Proof:
+        """Prove that (k X, k Y) is k^2 (cos x, sin x), whose direction is x."""
+        ring = _ring("k", {}, "X")
+        k, c, s = ring.constant("k"), ring.cosine(0), ring.sine(0)
+        return Proof(Direction.statement, _column([k * (k * c) - k * k * c, k * (k * s) - k * k * s]))
+
+
+class Flip(Form):
+    """k cos x = X and k sin x = Y, with a k that is not known yet."""
+
+    has_two_roots = True
+    statement = "k cos x = X, k sin x = Y hold for x = atan2(Y, X) if k > 0, and x = atan2(-Y, -X) if k < 0, alone"
+    solution = "atan2({s}Y, {s}X)"
+    latex = r"\mathrm{atan2}({s}Y,\, {s}X)"
+
+    @property
+    def equations(self) -> tuple[tuple[Element, Element], ...]:
+        """The two equations."""
+        k = self.letters["k"]
+        return (k * self.unknown.cosine, self.letters["X"]), (k * self.unknown.sine, self.letters["Y"])
+
+    def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
+        """Return the angle."""
+        return np.arctan2(sign * letters["Y"], sign * letters["X"]), np.array(1.0)
+
+    @staticmethod
+    def lemma() -> Proof:
+        """Prove that X sin x = Y cos x follows, of which the two angles are the only solutions."""
+        ring = _ring("k", {}, "X")
+        k, c, s = ring.constant("k"), ring.cosine(0), ring.sine(0)
+        return Proof(Flip.statement, np.concatenate([_column([(k * c) * s - (k * s) * c]), _along(["X", "Y"])]))
+
+
+class CosineAndSquare(Form):
+    """cos x = X and sin^2 x = S."""
+
+    has_two_roots = True
+    statement = "cos x = X, sin^2 x = S, with X^2 + S = 1, hold for x = atan2(+-sqrt(S), X), and for no other angle"
+    solution = "atan2({s}sqrt(S), X)"
+    latex = r"\mathrm{atan2}\bigl({s}\sqrt{S},\, X\bigr)"
+    radicand = "S"
+
+    @property
+    def equations(self) -> tuple[tuple[Element, Element], ...]:
+        """The two equations."""
+        return (self.unknown.cosine, self.letters["X"]), (self.unknown.sine**2, self.letters["S"])
+
+    def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
+        """Return the angle and the radicand, which is a sum of squares."""
+        S = letters["S"]
+        return np.arctan2(sign * np.sqrt(np.maximum(S, 0.0)), letters["X"]), S
+
+    @staticmethod
+    def lemma() -> Proof:
+        """Prove that the roots of sin^2 x = S are the sines of x and -x."""
+        ring = _ring("X", {"R": "1 - X^2"}, "X")
+        X, R, c, s = ring.constant("X"), ring.constant("R"), ring.cosine(0), ring.sine(0)
+        return Proof(CosineAndSquare.statement, _column([X * X + R * R - 1, s * s - (1 - c * c)]))
+
+
+class Turned(Form):
+    """(x, y) is (u, v) turned by an angle: u cos - v sin = x, u sin + v cos = y."""
+
+    statement = (
+        "u cos t - v sin t = x, u sin t + v cos t = y hold for t = atan2(u y - v x, u x + v y) alone, "
+        "where u, v are not both 0"
+    )
+    solution = "atan2(U*Y - V*X, U*X + V*Y)"
+    latex = r"\mathrm{atan2}(U Y - V X,\, U X + V Y)"
+
+    @property
+    def equations(self) -> tuple[tuple[Element, Element], ...]:
+        """The two equations."""
+        (c, s), (U, V, X, Y) = self.unknown.symbols, (self.letters[k] for k in "UVXY")
+        return (U * c - V * s, X), (U * s + V * c, Y)
+
+    def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
+        """Return the angle."""
+        U, V, X, Y = (letters[k] for k in "UVXY")
+        return np.arctan2(U * Y - V * X, U * X + V * Y), np.array(1.0)
+
+    @staticmethod
+    def lemma() -> Proof:
+        """Prove that (u x + v y, u y - v x) is (u^2 + v^2) (cos t, sin t)."""
+        ring = _ring("u v", {}, "X")
+        u, v, c, s = ring.constant("u"), ring.constant("v"), ring.cosine(0), ring.sine(0)
+        x, y, size = u * c - v * s, u * s + v * c, u * u + v * v
+        return Proof(Turned.statement, _column([u * x + v * y - size * c, u * y - v * x - size * s]))
+
+
+class Square(Form):
+    """(z + M)^2 = S for a sliding joint's value z."""
+
+    has_two_roots = True
+    statement = "(z + M)^2 = S holds for z = -M +- sqrt(S), and for no other number"
+    solution = "-M {s} sqrt(S)"
+    latex = r"-M {s} \sqrt{S}"
+    radicand = "S"
+
+    @property
+    def equations(self) -> tuple[tuple[Element, Element], ...]:
+        """(z + M)^2, and S."""
+        return (((self.unknown.symbols[0] + self.letters["M"]) ** 2, self.letters["S"]),)
+
+    def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
+        """Return the value and the radicand."""
+        M, S = letters["M"], letters["S"]
+        scale = letters["Q"] if "Q" in letters else np.abs(S) + M * M
+        return -M + sign * np.sqrt(np.maximum(S, 0.0)), S / np.maximum(scale, np.finfo(float).tiny)
+
+    @staticmethod
+    def lemma() -> Proof:
+        """Prove that (z + M)^2 - S is the product of its two factors."""
+        ring = _ring("z M R", {}, "")
+        z, M, R = map(ring.constant, "zMR")
+        return Proof(Square.statement, _column([(z + M) ** 2 - R * R - (z + M - R) * (z + M + R)]))
+
+
+class Sliding(Form):
+    """z = Z for a sliding joint's value."""
+
+    statement = "z = Z gives z"
+    solution = "Z"
+    latex = "Z"
+
+    @property
+    def equations(self) -> tuple[tuple[Element, Element], ...]:
+        """z, and Z."""
+        return ((self.unknown.symbols[0], self.letters["Z"]),)
+
+    def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
+        """Return the value."""
+        return letters["Z"], np.array(1.0)
+
+    @staticmethod
+    def lemma() -> Proof:
+        """Nothing is to be proved."""
+        ring = _ring("z", {}, "")
+        return Proof(Sliding.statement, _column([ring.zero]))
+
+
+class Remainder(Form):
+    """An angle that is what remains of a known sum of angles: cos x = X and sin x = Y."""
+
+    statement = "cos x = X, sin x = Y hold for x = atan2(Y, X), and for no other angle"
+    solution = "{sum}"
+    latex = "{sum}"
+
+    @property
+    def equations(self) -> tuple[tuple[Element, Element], ...]:
+        """The two equations."""
+        c, s = self.unknown.symbols
+        return (c, self.letters["X"]), (s, self.letters["Y"])
+
+    def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
+        """Return the angle."""
+        return np.arctan2(letters["Y"], letters["X"]), np.array(1.0)
+
+    @staticmethod
+    def lemma() -> Proof:
+        """Prove that (X, Y) then has length 1, so that its direction is the angle."""
+        ring = _ring("", {}, "X")
+        c, s = ring.cosine(0), ring.sine(0)
+        return Proof(Remainder.statement, _column([c * c + s * s - 1]))
+
+
+FORMS: tuple[type[Form], ...] = (
+    Circle, Line, Direction, Flip, CosineAndSquare, Turned, Square, Sliding, Remainder
+)  # fmt: skip
+
+
+@cache
+def lemmas() -> dict[str, Proof]:
+    """Return the lemma of every form, by the form's name."""
+    return {form.__name__: form.lemma() for form in FORMS}
+
+
+def _ring(names: str, roots: Mapping[str, str], angle: str) -> Ring:
+    """Return a ring of letters, roots of expressions in them, and an angle's cosine and sine if there is one."""
+    from dhkit.expressions import parse
+
+    constants = [Constant(name) for name in names.split()]
+    constants += [Constant(name, square=parse(text, names.split())) for name, text in roots.items()]
+    return Ring("R" if angle else "", constants)
+
+
+def _along(names: Sequence[str]) -> Elements:
+    """Return what is zero if X sin x = Y cos x makes (X, Y) a multiple of (cos x, sin x)."""
+    ring = _ring(" ".join(names), {}, "X")
+    (X, Y), c, s = (ring.constant(name) for name in names), ring.cosine(0), ring.sine(0)
+    along, across = X * c + Y * s, Y * c - X * s
+    return _column([X - (along * c - across * s), Y - (along * s + across * c)])
+
+
+def _column(elements: Sequence[Element]) -> Elements:
+    column = np.empty(len(elements), dtype=object)
+    column[:] = elements
+    return column

@@ -1,0 +1,108 @@
+"""Steps for the last three joints of six: a spherical wrist, and the wrist behind three parallel axes."""
+
+from __future__ import annotations
+
+from dhkit.symbolic.inverse.forms import CosineAndSquare, Direction, Flip
+from dhkit.symbolic.inverse.regions import into_axis_2
+from dhkit.symbolic.inverse.steps import Choice, Step, Workbench
+from dhkit.symbolic.ring import Element, Elements
+
+FLIPS = ("no-flip", "flip")
+"""Joint 5 turned to its positive side, from axis 4 (or the parallel axes) to axis 6, and to the other one."""
+
+
+def turn_spherical_wrist(bench: Workbench, R: Elements) -> None:
+    """Add the steps for joints 4, 5 and 6, whose axes meet.
+
+    Parameters
+    ----------
+    R
+        The axes of axis 4's frame before joint 4 turns, in those before joint 1, shape (3, 3), in known joints.
+    """
+    chain = bench.chain
+    s_alpha4, s_alpha5 = chain.alpha[3][1], chain.alpha[4][1]
+    (c4, s4), (_, s5) = chain.cosine_and_sine(4), chain.cosine_and_sine(5)
+    tool = R.T @ bench.T[:3, :3]
+    definitions, (ax, ay, az) = bench.define_all(ax=tool[0, 2], ay=tool[1, 2], az=tool[2, 2])
+    k = s_alpha5 * s5
+    bench.add(
+        Step(
+            "theta4",
+            "Joints 1 to 3 are known, and with them the axes of link 3. (ax, ay, az) is the direction of axis 6 in "
+            "them. Joint 4 turns about az until axis 6 lies in the plane that joint 5 swings it through.",
+            definitions,
+            Flip(bench.unknown(4), {"k": k, "X": ax, "Y": ay}),
+            "",
+            "axes 4 and 6 coincide (ax = ay = 0, theta5 is 0 or pi): only the sum or the difference of theta4 and "
+            "theta6 is determined, and theta4 may be chosen, 0 here",
+            Choice(FLIPS, (-s_alpha4 * (ax * c4 + ay * s4),)),
+        )
+    )
+    X, Y = -s_alpha4 * s_alpha5 * az, s_alpha5 * (c4 * ax + s4 * ay)
+    bench.add(
+        Step(
+            "theta5",
+            "In the plane that joint 5 swings axis 6 through, the direction of axis 6 gives cosine and sine.",
+            (),
+            Direction(bench.unknown(5), {"k": chain.ring.one, "X": X, "Y": Y}),
+        )
+    )
+    more, (nx, ny, ox, oy) = bench.define_all(nx=tool[0, 0], ny=tool[1, 0], ox=tool[0, 1], oy=tool[1, 1])
+    sign = s_alpha4 * s_alpha5
+    bench.add(
+        Step(
+            "theta6",
+            "Joint 4 has turned axis 5 into the direction (s4, -c4, 0) in the axes of link 3, up to its sense. "
+            "The tool's x and y axes, (nx, ny, nz) and (ox, oy, oz) in them, have its sine and cosine as components.",
+            more,
+            Direction(
+                bench.unknown(6),
+                {"k": chain.ring.one, "X": sign * (s4 * ox - c4 * oy), "Y": sign * (s4 * nx - c4 * ny)},
+            ),
+        )
+    )
+
+
+def turn_parallel_wrist(bench: Workbench, sense: Element) -> tuple[Element, Element, Element]:
+    """Add the steps for joints 5 and 6 behind the parallel axes 2, 3 and 4, and for phi, the sum of their angles.
+
+    Parameters
+    ----------
+    sense
+        1 if axis 4 has the direction of axis 2, else -1.
+
+    Returns
+    -------
+    tuple
+        x and y components of axis 6 in the frame of axis 2, and the sine of theta5 times that of alpha_5.
+    """
+    chain = bench.chain
+    s_alpha4, s_alpha5 = chain.alpha[3][1], chain.alpha[4][1]
+    s5 = chain.cosine_and_sine(5)[1]
+    n, o, a = (into_axis_2(bench, bench.T[:3, k]) for k in range(3))
+    definitions, (ax, ay, az) = bench.define_all(ax=a[0], ay=a[1], az=a[2])
+    bench.add(
+        Step(
+            "theta5",
+            "Joint 1 is known, and with it the axes of axis 2's frame. (ax, ay, az) is the direction of axis 6 in "
+            "them. Joints 2, 3 and 4 turn about az and leave az as it is: it gives the angle between axis 6 and the "
+            "parallel axes.",
+            definitions,
+            CosineAndSquare(bench.unknown(5), {"X": -sense * s_alpha4 * s_alpha5 * az, "S": ax * ax + ay * ay}),
+            "",
+            "axis 6 is parallel to axes 2, 3 and 4 (theta5 is 0 or pi): only the sum or the difference of theta6 and "
+            "phi is determined, and theta6 may be chosen",
+            Choice(FLIPS, (-sense * s_alpha4 * s_alpha5 * s5,)),
+        )
+    )
+    more, (nz, oz) = bench.define_all(nz=n[2], oz=o[2])
+    bench.add(
+        Step(
+            "theta6",
+            "nz and oz are the components of the tool's x and y axes along axis 2: the direction of axis 2, seen from "
+            "the tool.",
+            more,
+            Direction(bench.unknown(6), {"k": s5, "X": sense * s_alpha4 * nz, "Y": -sense * s_alpha4 * oz}),
+        )
+    )
+    return ax, ay, s_alpha5 * s5
