@@ -399,10 +399,20 @@ class Arm:
         return singularities(self._description)
 
     def export_c(self, folder: str | Path, name: str | None = None) -> tuple[Path, Path]:
-        """Write the kinematics as C99 source and header; see :func:`dhkit.kinematics.export_kinematics`."""
+        """Write the kinematics as C99 source and header; see :func:`dhkit.kinematics.export_kinematics`.
+
+        Inverse kinematics to be read: :meth:`export_ik`.
+        """
         from dhkit.kinematics import export_kinematics
 
         return export_kinematics(self._description, folder, name)
+
+    def export_ik(self, folder: str | Path, language: str = "c") -> tuple[Path, ...]:
+        """Write closed-form inverse kinematics in ``"c"``, ``"python"`` or ``"matlab"``, step by step as derived.
+
+        The files need no library; see :meth:`dhkit.symbolic.InverseDerivation.export`.
+        """
+        return self.symbolic.ik.export(folder, language)
 
     # Dynamics
 

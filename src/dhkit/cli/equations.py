@@ -15,7 +15,15 @@ from dhkit.cli.output import print_json, report_files
 from dhkit.description import Description, write_atomically
 from dhkit.description.files import check_place
 from dhkit.errors import DescriptionError
-from dhkit.symbolic import Lagrangian, SymbolicKinematics, Symbols, base_parameters, lagrangian, symbolic_kinematics
+from dhkit.symbolic import (
+    Lagrangian,
+    SymbolicKinematics,
+    Symbols,
+    base_parameters,
+    inverse_derivation,
+    lagrangian,
+    symbolic_kinematics,
+)
 from dhkit.symbolic.equations import (
     Quantity,
     equations_c,
@@ -34,6 +42,10 @@ from dhkit.symbolic.equations import (
 MAX_TITLE_LENGTH = 200
 Source: TypeAlias = Lagrangian | SymbolicKinematics
 """Where quantities come from."""
+
+INVERSE = "ik"
+"""The quantity that stands for the derivation of inverse kinematics."""
+CODE = ("python", "c", "matlab")
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -66,7 +78,10 @@ def _kinematics_of(description: Description, symbols: str, base: bool) -> Symbol
 def equations(
     robot: Robot,
     what: Annotated[
-        str, typer.Option(help="Quantities: any of M, C, h, g, tau, K, V; or any of A (A1 ... An), T, J.")
+        str,
+        typer.Option(
+            help="Quantities: any of M, C, h, g, tau, K, V; or any of A (A1 ... An), T, J; or ik, inverse kinematics."
+        ),
     ] = "M,C,g",
     form: Annotated[str, typer.Option("--format", help="Format: text, latex, python, c, matlab or html.")] = "text",
     symbols: Annotated[
@@ -86,10 +101,15 @@ def equations(
     uniform: Uniform = False,
     json: Json = False,
 ) -> None:
-    """Print a robot's equations of motion, exactly: M(q) qdd + C(q, qd) qd + g(q) = tau."""
+    """Print a robot's equations of motion, exactly: M(q) qdd + C(q, qd) qd + g(q) = tau. Or its kinematics."""
     arm = load_arm(robot, uniform)
     if form not in FORMATS:
         raise DescriptionError(f"--format: found {form!r}; expected {', '.join(FORMATS)}")
+    if what.strip() == INVERSE:
+        if base or symbols != "file":
+            raise DescriptionError("--what ik: names the lengths of the table itself; leave --symbols out")
+        _inverse(arm.description, form, output, json)
+        return
     if is_kinematic(what):
         kinematics = _kinematics_of(arm.description, symbols, base)
         lag: Source = kinematics
@@ -104,6 +124,34 @@ def equations(
     text = FORMATS[form](lag, shown)
     if json:
         print_json(_facts(lag, shown, form, text))
+    else:
+        sys.stdout.write(text)
+
+
+def _inverse(description: Description, form: str, output: Path | None, json: bool) -> None:
+    """Print or write the derivation of an arm's inverse kinematics."""
+    derivation = inverse_derivation(description)
+    if form in CODE and output is not None:
+        report_files(list(derivation.export(output, form)), json=json)
+        return
+    if form in CODE:
+        files = derivation.code(form)
+        text = "\n".join(files.values()) if len(files) == 1 else "\n".join(f"/* {k} */\n{v}" for k, v in files.items())
+    elif form == "latex":
+        text = latex_document(derivation.latex(), f"{description.name[:MAX_TITLE_LENGTH]}: inverse kinematics")
+    else:
+        text = derivation.html() if form == "html" else derivation.text()
+    if output is not None:
+        if output.is_dir() or output.suffix == ".toml":
+            raise DescriptionError(f"{output}: expected the name of a file that is no robot file")
+        check_place(output)
+        write_atomically(output, text)
+        report_files([output], json=json)
+    elif json:
+        facts = {"robot": description.name, "what": [INVERSE], "format": form, "text": text}
+        proof = derivation.prove()
+        facts |= {"family": derivation.family.name, "branches": list(derivation.branches)}
+        print_json({**facts, "proved": bool(proof), "proof": proof.statement, "notes": list(derivation.notes)})
     else:
         sys.stdout.write(text)
 

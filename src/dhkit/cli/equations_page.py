@@ -9,14 +9,15 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from dhkit.description import DHTable
-from dhkit.grading.reports.mathml import equation_mathml
 from dhkit.symbolic.equations import (
     QUANTITIES,
     Quantity,
     constant_latex,
     constants_of,
     displays,
+    equation_mathml,
     generators_of,
+    html_page,
     renamings,
     symbols_of,
 )
@@ -41,24 +42,6 @@ UNITS = {"m": "kg", "r": "kg m", "I": "kg m²", "Jm": "kg m²", "G": "", "a": "m
 """Units of the symbols that we name ourselves, by their first letters."""
 KINEMATIC_EQUATION = r"T = T_{\mathrm{base}}\, A_{1} A_{2} \cdots A_{n}\, T_{\mathrm{tool}}"
 EQUATION_OF_MOTION = r"M(q)\,\ddot{q} + C(q,\dot{q})\,\dot{q} + g(q) = \tau"
-STYLE = """
-body { font: 16px/1.5 "Source Sans 3", "Noto Sans", "DejaVu Sans", sans-serif; color: #1b1f24; background: #fff;
-       max-width: 66rem; margin: 2.5rem auto; padding: 0 1.5rem; }
-h1 { font-size: 1.7rem; margin-bottom: .2rem; } h2 { font-size: 1.15rem; margin: 2.2rem 0 .4rem; }
-.source, .note { color: #57606a; margin: .2rem 0; }
-.display { overflow-x: auto; overflow-y: hidden; padding: .5rem 0; }
-math { font-size: 1.08rem; font-family: "STIX Two Math", "Latin Modern Math", "Cambria Math", math; }
-math[display="block"] { width: fit-content; margin: 0; } .display { padding-left: 1.2rem; }
-mtd { padding: .18em .45em; } mtable[columnspacing] mtd { padding: .25em 0; }
-mtd[columnalign="left"] { text-align: left; } mtd[columnalign="right"] { text-align: right; }
-/* Brackets of matrices as borders: without a font for mathematics a browser cannot stretch them. */
-mo.bracket { display: none; }
-mtable.matrix { border: solid currentColor; border-width: 0 1.5px; border-radius: .9em / 50%;
-                padding: .2em .5em; margin-left: .35em; }
-table { border-collapse: collapse; margin: .8rem 0; } caption { text-align: left; color: #57606a; }
-th, td { text-align: left; padding: .25rem 1.1rem .25rem 0; border-bottom: 1px solid #d8dee4; font-weight: normal; }
-th { color: #57606a; } td.number { text-align: right; font-variant-numeric: tabular-nums; }
-"""
 
 
 def equations_page(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]) -> str:
@@ -76,13 +59,7 @@ def equations_page(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Qu
         *_constants(lag, quantities),
         *(f'<p class="note">{escape(note)}</p>' for note in [*lag.notes, *renamings(_elements(quantities))]),
     ]
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(description.name)}: {subject}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
-        + "\n".join(part for part in body if part)
-        + "\n</body>\n</html>\n"
-    )
+    return html_page(f"{description.name}: {subject}", "\n".join(part for part in body if part))
 
 
 def _sections(quantities: Sequence[Quantity]) -> Iterator[str]:

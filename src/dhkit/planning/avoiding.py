@@ -35,9 +35,6 @@ ROUNDING = 1e-6
 """Shortfall of a gap (m) that counts as none."""
 INFLATION_FACTOR = 1.2
 """Factor of a gap's shortfall between knots that is added to its margin."""
-LONGER = 3
-"""Factor of the number of intervals for which planes keep a clearance that is reduced at an end: the next motion may
-take more of them to reach the whole clearance."""
 FINER = 2.0
 """Factor of the number of intervals of a finer mesh."""
 MAX_SOLUTIONS = 16
@@ -143,11 +140,25 @@ class AvoidingSearch:
                 if best is not None:
                     break
         except TimeLimitError:
-            if best is None:
-                raise self._none_found(" within the time limit") from None
+            when = " within the time limit"
+        else:
+            when = ""
+        best = best or self._slowed_path()
         if best is None:
-            raise self._none_found("")
+            raise self._none_found(when) from None
         return best
+
+    def _slowed_path(self) -> PlannedMotion | None:
+        """Return the shortest sampled path, followed from rest to rest between its corners; None if there is none."""
+        paths = sorted((path for path in self._paths.values() if path is not None), key=self._length)
+        for path in paths:
+            corners = np.vstack([path[0][:1], *(leg[1:] for leg in path)])
+            task = replace(self.task, points=corners)
+            failure = self.search.failure or PlanningError("no motion found within the time limit")
+            slow = PlannedMotion.slowed_straight(task, self.program.mesh.intervals, failure)
+            if slow is not None:
+                return slow
+        return None
 
     def _none_found(self, when: str) -> PlanningError:
         failure = self.search.failure
@@ -262,8 +273,8 @@ class AvoidingSearch:
         """
         search, mesh = self.search, self.program.mesh
         guess = knots_along(start, mesh, ends)
-        gaps = self._gaps(start, guess, np.inf)
-        planes, margins = Planes.of(gaps, self._required(gaps, LONGER), 0.0), Margins(mesh.intervals)
+        gaps, required = self._measured(start, guess, np.inf)
+        planes, margins = Planes.of(self._with_planes_of_ends(gaps), required, 0.0), Margins(mesh.intervals)
         best: PlannedMotion | None = None
         turn = 0
         for _ in range(MAX_SOLUTIONS):
@@ -277,8 +288,7 @@ class AvoidingSearch:
                     return best
                 raise
             knots = self.program.knots_of(found.trajectory)
-            gaps = self._gaps(found.trajectory, knots, self.clearance + ACTIVE_GAP)
-            required = self._required(gaps)
+            gaps, required = self._measured(found.trajectory, knots, self.clearance + ACTIVE_GAP)
             short = float(np.max(required - gaps.gap, initial=-np.inf))
             missing = 0.0
             if isinstance(found, PlannedMotion) and short <= ROUNDING:
@@ -288,12 +298,13 @@ class AvoidingSearch:
                     best = found if saved > 0 else best
                     if saved < MIN_IMPROVEMENT * found.cost or found.cost - EXPECTED_ROUNDS * saved > best_cost:
                         break
-                    gaps = self._gaps(found.trajectory, knots, np.inf)
-                    planes = Planes.of(gaps, self._required(gaps, LONGER), planes.inflation)
+                    gaps, required = self._measured(found.trajectory, knots, np.inf)
+                    planes = Planes.of(self._with_planes_of_ends(gaps), required, planes.inflation)
                     guess = knots
                     continue
                 # The certificate's grid is finer.
                 missing = self._shortfall(found.certificate) - short
+            planes.required = np.where(required < planes.required, planes.required, required)
             is_new = planes.widened(gaps.gap - missing, required)
             if is_new and short > ACTIVE_GAP:
                 continue  # from the same guess: this motion went far astray
@@ -319,19 +330,40 @@ class AvoidingSearch:
         self.search.tightened += [Limit.CLEARANCE.what] * (Limit.CLEARANCE.what not in self.search.tightened)
         return Excess(found.trajectory, states, certificate)
 
+    def _with_planes_of_ends(self, gaps: Gaps) -> Gaps:
+        """Return gaps with the planes of the start and the goal in the first and the last interval.
+
+        Only for pairs that are within the clearance there: another plane leaves them less of the little room that they
+        have at the end itself, which cannot move.
+        """
+        pairs = self.separation.pairs
+        reduced = self.task.avoidance.at_ends(pairs) < self.clearance
+        ends = self.separation.gaps(self.task.points[[0, -1], None])
+        normal, level, middle = gaps.normal.copy(), gaps.level.copy(), gaps.middle.copy()
+        for end, interval in ((0, 0), (1, -1)):
+            which = reduced[:, end]
+            for own, at_end in ((normal, ends.normal), (level, ends.level), (middle, ends.middle)):
+                own[interval, which] = at_end[end, which]
+        return replace(gaps, normal=normal, level=level, middle=middle)
+
     def _shortfall(self, certificate: Certificate) -> float:
         """Return how much the smallest gap is below the clearance on the certificate's grid and between, m."""
         return max(0.0, certificate.excess_of(Limit.CLEARANCE)) * Clearance.unit(self.task.arm)
 
-    def _required(self, gaps: Gaps, longer: int = 1) -> Array:
-        """Return the required gaps in each interval, shape (K, P), m."""
-        return self.task.avoidance.required(gaps.gap, self.separation.pairs, longer)
+    def _measured(self, motion: Trajectory, knots: Knots, near: float) -> tuple[Gaps, Array]:
+        """Return the gaps in each interval of the mesh, those above ``near`` (m) perhaps infinite, and those required.
 
-    def _gaps(self, motion: Trajectory, knots: Knots, near: float) -> Gaps:
-        """Return the gaps in each interval of the mesh; those above ``near`` (m) may be infinite."""
+        Required gaps have shape (K, P), m: the largest of an interval.
+        """
+        inside = self._inside(motion, knots, POINTS)
+        avoidance, pairs = self.task.avoidance, self.separation.pairs
+        required = avoidance.required(self.task.arm, inside.reshape(-1, self.task.arm.n), pairs)
+        return self.separation.gaps(inside, near), required.reshape(*inside.shape[:2], -1).max(axis=1)
+
+    def _inside(self, motion: Trajectory, knots: Knots, points: int) -> Array:
+        """Return states of a motion in each interval of the mesh, both ends included, shape (K, points, n)."""
         times = self.program.mesh.times(knots.durations)
-        inside = times[:-1, None] + np.diff(times)[:, None] * np.linspace(0.0, 1.0, POINTS)
-        return self.separation.gaps(motion.q(inside), near)
+        return motion.q(times[:-1, None] + np.diff(times)[:, None] * np.linspace(0.0, 1.0, points))
 
 
 def _evenly(points: Array, share: Array) -> Array:

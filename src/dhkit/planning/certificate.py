@@ -30,8 +30,6 @@ MAX_POINTS = 20_000
 """Largest number of states in an interval."""
 ACCEPTED_EXCESS = 5e-7
 """Largest excess of a certified motion, as a share of the limit: half of the documented 1e-6."""
-ACTIVE_SHARE = 0.99
-"""Share of a limit from which it counts as active."""
 MAX_SLOW_DOWN, SLOW_DOWN_TOLERANCE = 1e9, 1e-9
 """Largest factor by which a motion is slowed down, and the tolerance of such factors."""
 MIN_SEARCHED_COEFFICIENTS = 3
@@ -238,7 +236,7 @@ class Checker:
         for k, use in self.peaks(states).items():
             constraint, _ = self.limiting[k]
             checks.append(_check(constraint, k, use - 1, states.times))
-            reached = use >= ACTIVE_SHARE
+            reached = use >= constraint.active_share
             if k == Limit.POSITION:
                 continue  # a joint may rest anywhere in its range
             anywhere |= reached.any(axis=1)

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -24,8 +25,8 @@ from dhkit.planning.obstacles import (
     check_obstacles,
     distance,
     pair_distances,
-    required_gaps,
     smallest_distances,
+    world_axes,
 )
 from dhkit.planning.states import States
 from dhkit.trajectories import Limits
@@ -37,6 +38,9 @@ BETWEEN, MIN_BETWEEN = 0.1, 1e-3
 KEPT_SHARE = 0.75
 """Share of a gap at an end of a motion to which the clearance is reduced there: a link may come a little nearer on its
 way out of a narrow place."""
+LEAVING = 10.0
+"""Travel of a link from its place at an end of a motion, as a multiple of the clearance, within which its clearance is
+reduced."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +51,7 @@ class ReducedClearance:
     names: tuple[str, str]
     """Names of the link and of what it is near."""
     start: float
-    """Distance to keep near the start, m; above the clearance it has no effect."""
+    """Distance to keep near the start, m; without effect where it is above the clearance."""
     goal: float
 
     def __str__(self) -> str:
@@ -63,6 +67,10 @@ class CollisionAvoidance:
     """Smallest distance, m."""
     self_collision: bool = False
     reduced: tuple[ReducedClearance, ...] = ()
+    ends: Array | None = None
+    """Joint values at the start and the goal, shape (2, n), rad and m, where clearances are reduced."""
+    is_reduced_throughout: bool = False
+    """Whether they are reduced during the whole motion, not only near the ends."""
 
     @classmethod
     def of(cls, obstacles: Scene, clearance: float, self_collision: bool) -> CollisionAvoidance:
@@ -70,15 +78,19 @@ class CollisionAvoidance:
 
         Raises
         ------
-        ValueError
-            A clearance that is negative or not finite.
+        ValueError, TypeError
+            A clearance that is negative, not finite or no number; a choice that is neither True nor False.
         """
+        if isinstance(clearance, bool) or not isinstance(clearance, Real):
+            raise TypeError(f"clearance is {clearance!r}; expected a number of at least 0, m")
+        if not isinstance(self_collision, bool | np.bool_):
+            raise TypeError(f"self_collision is {self_collision!r}; expected True or False")
         if not (math.isfinite(clearance) and clearance >= 0):
             raise ValueError(f"clearance is {clearance!r}; expected a number of at least 0, m")
         obstacles = check_obstacles(obstacles)
         # Of copies, one is kept.
         unlike = {(item.geometry, item.placement) if isinstance(item, Obstacle) else item: item for item in obstacles}
-        return cls(tuple(unlike.values()), clearance, self_collision)
+        return cls(tuple(unlike.values()), float(clearance), bool(self_collision))
 
     def __bool__(self) -> bool:
         return bool(self.obstacles) or self.self_collision
@@ -95,8 +107,12 @@ class CollisionAvoidance:
             return {}
         return {
             "clearance": self.clearance,
+            "clear_of": " and ".join(
+                ["from obstacles"] * bool(self.obstacles) + ["between links"] * self.self_collision
+            ),
             "spare_clearance": -excess * Clearance.unit(arm),
             "reduced_clearances": tuple(str(reduced) for reduced in self.reduced),
+            "is_clearance_reduced_throughout": self.is_reduced_throughout,
         }
 
     def between(self, description: Description, start: Array, goal: Array) -> CollisionAvoidance:
@@ -117,17 +133,33 @@ class CollisionAvoidance:
             other = separation.capsules[pair.other].name if pair.other is not None else ""
             names = separation.capsules[pair.capsule].name, other or self.obstacles[pair.obstacle or 0].name
             reduced.append(ReducedClearance(pair, names, *(KEPT_SHARE * ends[:, p]).tolist()))
-        return replace(self, reduced=tuple(reduced))
+        return replace(self, reduced=tuple(reduced), ends=np.stack([start, goal]))
+
+    @property
+    def reduced_throughout(self) -> CollisionAvoidance:
+        """The same, with clearances that are reduced at an end reduced during the whole motion."""
+        return replace(self, is_reduced_throughout=True)
 
     def at_ends(self, pairs: Sequence[Pair]) -> Array:
         """Return the reduced clearances of pairs at the start and the goal, shape (P, 2), m; inf if not reduced."""
         ends = {reduced.pair: (reduced.start, reduced.goal) for reduced in self.reduced}
         return np.array([ends.get(pair, (np.inf, np.inf)) for pair in pairs]).reshape(-1, 2)
 
-    def required(self, gap: Array, pairs: Sequence[Pair], longer: int = 1) -> Array:
-        """Return the required gaps of pairs along a motion, shape (N, P), m, see :func:`required_gaps`."""
-        at_start, at_goal = self.at_ends(pairs).T
-        return required_gaps(gap, self.clearance, at_start, at_goal, longer)
+    def required(self, description: Description, q: Array, pairs: Sequence[Pair]) -> Array:
+        """Return the required gaps of pairs at states q (N, n), shape (N, P), m.
+
+        A pair that is nearer than the clearance at an end keeps less while its links are near where they are there.
+        """
+        need = np.full((len(q), len(pairs)), self.clearance)
+        if self.reduced and self.ends is not None:
+            axes, at_ends = world_axes(description, q), world_axes(description, self.ends)
+            for p, kept in zip(range(len(pairs)), self.at_ends(pairs), strict=True):
+                links = [link for link in (pairs[p].capsule, pairs[p].other) if link is not None]
+                for end in np.flatnonzero(kept < self.clearance):
+                    travel = np.linalg.norm(axes[:, links] - at_ends[end, links], axis=-1).max(axis=(1, 2))
+                    near = (travel < LEAVING * self.clearance) | self.is_reduced_throughout
+                    need[near, p] = np.minimum(need[near, p], kept[end])
+        return need
 
     def shortfalls(self, states: States) -> Array:
         """Return how much is missing of the required distances along a motion, shape (N,), m; by coal.
@@ -139,7 +171,7 @@ class CollisionAvoidance:
         usual, each = self._distances(description, states.q), self._reduced_distances(description, states.q)
         short = self.clearance - usual
         if pairs:
-            short = np.maximum(short, np.max(self.required(each, pairs) - each, axis=1))
+            short = np.maximum(short, np.max(self.required(description, states.q, pairs) - each, axis=1))
 
         def nearest(gaps: Array) -> Array:
             return np.asarray(gaps.min(axis=1, initial=np.inf))
@@ -190,6 +222,7 @@ class Clearance(Constraint):
 
     avoidance: CollisionAvoidance
     moving = False
+    active_share = 0.999
 
     @property
     def what(self) -> str:

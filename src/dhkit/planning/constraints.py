@@ -33,6 +33,8 @@ class Constraint:
     """Whether the quantity must stay between -1 and 1, not only below 1."""
     of_joints: ClassVar[bool] = False
     """Whether there is one row for each joint."""
+    active_share: ClassVar[float] = 0.99
+    """Share of the limit from which a report calls the constraint active."""
 
     @property
     def what(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -46,6 +46,7 @@ from dhkit.planning.search import RESOLUTION, PlannedMotion, Search, Work, coars
 from dhkit.planning.solver import ProgressCall, delayed_interrupts
 from dhkit.planning.states import prepare
 from dhkit.planning.task import Task
+from dhkit.planning.variables import Knots
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 from dhkit.trajectories.timing import check_duration
@@ -359,7 +360,7 @@ class Planner:
                     for k, point in enumerate(route.points[1:], start=1):
                         require_place(self.description, request, point, "goal" if k == last else f"via {k}")
                 task = self._task(request, route.points)
-                found = self._route_motion(task, warm, deadline, progress, work)
+                task, found = self._route_motion(task, warm, deadline, progress, work)
             except PlanningError as error:
                 failure = failure or error
                 reports.append(BranchReport(route.label, float("inf"), solved=True, reason=str(error)))
@@ -378,10 +379,10 @@ class Planner:
 
     def _route_motion(
         self, task: Task, warm: Trajectory | None, deadline: float, progress: ProgressCall | None, work: Work
-    ) -> PlannedMotion:
-        """Return the best motion of a task, and count the work."""
+    ) -> tuple[Task, PlannedMotion]:
+        """Return the best motion of a task, with the task whose clearance it keeps, and count the work."""
         if task.rests and task.span < RESOLUTION:
-            return PlannedMotion.unresolved(task)
+            return task, PlannedMotion.unresolved(task)
         for attempt in range(count := len(self._curves(task))):
             program, seconds = self.program(task, attempt)
             work.build_seconds += seconds
@@ -389,42 +390,73 @@ class Planner:
             search = Search(task.without_obstacles, program, deadline, work, progress, is_last)
             try:
                 found = replace(search(warm), attempt=attempt)
-                if not task.avoidance:
-                    return found
-                if (certificate := task.checker.check(found.trajectory)).ok:
-                    return replace(found, certificate=certificate)
 
                 def finer(attempt: int = attempt) -> MotionProgram:
                     program, seconds = self.program(task, attempt, FINER)
                     work.build_seconds += seconds
                     return program
 
-                return AvoidingSearch(task, search, program, finer)(warm)
+                return self._around(task, found, search, program, finer, warm)
             except PlanningError as error:
                 if is_last or time.perf_counter() > deadline:
-                    if (slow := PlannedMotion.slowed_straight(task, program.intervals, error)) is not None:
-                        return slow
+                    slow = None
+                    if task.checker.constraints:  # which may leave the optimizer a flat objective
+                        slow = PlannedMotion.slowed_straight(task, program.intervals, error)
+                    if slow is not None:
+                        return task, slow
                     raise
         raise AssertionError("no curve")
+
+    def _around(
+        self,
+        task: Task,
+        free: PlannedMotion,
+        search: Search[Knots],
+        program: MotionProgram,
+        finer: Callable[[], MotionProgram],
+        warm: Trajectory | None,
+    ) -> tuple[Task, PlannedMotion]:
+        """Return the best motion among obstacles, with the task whose clearance it keeps.
+
+        A clearance that is reduced at an end is reduced during the whole motion first: the motion then found is the
+        start of the search for one that keeps the clearance farther away, and the result if there is none.
+        """
+        if not task.avoidance:
+            return task, free
+        if (certificate := task.checker.check(free.trajectory)).ok:
+            return task, replace(free, certificate=certificate)
+        if not task.avoidance.reduced or task.avoidance.is_reduced_throughout:
+            return task, AvoidingSearch(task, search, program, finer)(warm)
+        easier = task.avoiding(task.avoidance.reduced_throughout)
+        _, near = self._around(easier, free, search, program, finer, warm)
+        search.program = program
+        if (certificate := task.checker.check(near.trajectory)).ok:
+            return task, replace(near, certificate=certificate)
+        try:
+            return task, AvoidingSearch(task, search, program, finer)(near.trajectory)
+        except PlanningError:
+            return easier, near
 
     def _with_reason(
         self, error: PlanningError, request: PlanRequest, routes: Sequence[Route], deadline: float
     ) -> PlanningError:
         """Return the error for a motion that was not found: a duration below that of the fastest motion, if so."""
-        if time.perf_counter() > deadline or request.duration is None or len(routes) > 1 or request.avoidance:
+        if time.perf_counter() > deadline or request.duration is None or len(routes) > 1:
             return error
         quickest = Planner(
             self.description, "time", request.limits, self.constraints, MIN_DEFAULT_INTERVALS, self.friction or False
         )
         try:
-            program, _ = quickest.program(quick := quickest._task(replace(request, duration=None), routes[0].points))
+            task = quickest._task(replace(request, duration=None), routes[0].points)
+            program, _ = quickest.program(quick := task.without_obstacles)
             least = Search(quick, program, deadline, Work())().trajectory.duration
         except PlanningError:
             return error
         if least <= request.duration * (1 + DURATION_TOLERANCE):
             return error
         return PlanningError(
-            f"a duration of {request.duration:.6g} s is too short: the fastest motion found takes {least:.6g} s"
+            f"a duration of {request.duration:.6g} s is too short: the fastest motion found"
+            f"{' without the obstacles' * bool(request.avoidance)} takes {least:.6g} s"
         )
 
     def _coarse(self, task: Task, best: PlannedMotion, deadline: float) -> tuple[int, float] | None:

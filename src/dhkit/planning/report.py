@@ -86,13 +86,17 @@ class PlanReport:
     is_converged: bool = True
     """Whether the motion is optimal to the solver's tolerance; with friction or energy it may be only feasible."""
     failure: str = ""
-    """Why the optimizer found nothing: the motion is then the straight path, slowed down."""
+    """Why the optimizer found nothing: the motion is then a path slowed down, the straight one or a sampled one."""
     clearance: float | None = None
     """Distance that was asked for from obstacles, m; None without obstacles."""
+    clear_of: str = ""
+    """What it is kept from: obstacles, or between links."""
     spare_clearance: float = 0.0
     """Smallest distance beyond that, m."""
     reduced_clearances: tuple[str, ...] = ()
     """Distances at the start or the goal that are below the clearance, which is reduced to them there."""
+    is_clearance_reduced_throughout: bool = False
+    """Whether it is reduced to them during the whole motion: none was found that keeps the clearance farther away."""
 
     @property
     def sensitivity(self) -> float | None:
@@ -105,12 +109,14 @@ class PlanReport:
         notes = []
         if self.clearance is not None:
             asked, spare = 1000 * self.clearance, 1000 * max(self.spare_clearance, 0.0)
-            notes.append(f"clearance: {asked:.3g} mm kept from obstacles, and at least {spare:.3g} mm more")
+            notes.append(f"clearance: {asked:.3g} mm kept {self.clear_of}, and at least {spare:.3g} mm more")
         if self.reduced_clearances:
             less = ", ".join(self.reduced_clearances)
-            notes[-1] += f", but less near the ends, until they are that far apart: {less}"
+            where = "all the way" if self.is_clearance_reduced_throughout else "near the ends"
+            notes[-1] += f", but less {where}: {less}"
         if self.failure:
-            notes.append(f"not optimal: the straight path, slowed down; the optimizer found nothing ({self.failure})")
+            path = "the straight path" if self.clearance is None else "a sampled path around the obstacles"
+            notes.append(f"not optimal: {path}, slowed down; the optimizer found nothing ({self.failure})")
         elif not self.is_converged:
             notes.append("not optimal to the solver's tolerance: it stopped at a motion that keeps all limits")
         if not self.is_resolved:
@@ -149,7 +155,7 @@ class PlanReport:
     def active_limits(self) -> list[tuple[str, float]]:
         """Return the active limits and their shares of time, the most active first."""
         named = [
-            (f"{limit.what} of {self.joints[limit.row] if limit.of_joint else 'the tool'}", limit.share)
+            (f"{limit.what} of {self.joints[limit.row]}" if limit.of_joint else limit.what, limit.share)
             for limit in self.certificate.active
         ]
         return sorted(named, key=lambda item: -item[1])
@@ -214,6 +220,7 @@ class PlanReport:
             "clearance_m": self.clearance,
             "spare_clearance_m": None if self.clearance is None else self.spare_clearance,
             "reduced_clearances": list(self.reduced_clearances),
+            "clearance_reduced_throughout": self.is_clearance_reduced_throughout,
             "resolved": self.is_resolved,
             "converged": self.is_converged,
             "failure": self.failure or None,

@@ -64,7 +64,7 @@ class PlannedMotion:
     attempt: int = 0
     """Index of the curve of accelerations of its program."""
     failure: str = ""
-    """Why the optimizer found nothing, for the straight path slowed down that is returned then."""
+    """Why the optimizer found nothing, for a given path slowed down that is returned then."""
 
     @classmethod
     def unresolved(cls, task: Task) -> PlannedMotion:
@@ -87,12 +87,11 @@ class PlannedMotion:
 
     @classmethod
     def slowed_straight(cls, task: Task, intervals: int, failure: PlanningError) -> PlannedMotion | None:
-        """Return cubics along the straight path, slowed down until they keep all limits; None if they cannot.
+        """Return cubics between the task's points, slowed down until they keep all limits; None if they cannot.
 
-        For constraints far below the joints' limits, which leave the optimizer a flat objective; ``failure`` is its
-        error.
+        For tasks in which the optimizer finds nothing; ``failure`` is its error.
         """
-        if not (task.rests and task.duration is None and task.checker.constraints):
+        if not task.rests or task.duration is not None:
             return None
         durations = np.maximum(leg_durations(task.loaded, task.limits, task.points), SHORTEST_DURATION)
         straight = straight_motion(task, durations)

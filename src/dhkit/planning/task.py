@@ -55,10 +55,14 @@ class Task:
         """The obstacles."""
         return self.checker.avoidance
 
+    def avoiding(self, avoidance: CollisionAvoidance) -> Task:
+        """Return the same motion among other obstacles."""
+        return replace(self, checker=replace(self.checker, avoidance=avoidance))
+
     @property
     def without_obstacles(self) -> Task:
         """The same motion in free space."""
-        return replace(self, checker=replace(self.checker, avoidance=NO_AVOIDANCE))
+        return self.avoiding(NO_AVOIDANCE)
 
     @property
     def is_loaded(self) -> bool:

@@ -43,6 +43,11 @@ from .exact.exact_arm import ExactArm as ExactArm, exact_arm as exact_arm
 from .exact.lagrangian import Lagrangian as Lagrangian, Proof as Proof, lagrangian as lagrangian
 from .exact.naming import Symbols as Symbols
 from .exact.regressor import Regressor as Regressor
+from .inverse.derivation import (
+    InverseDerivation as InverseDerivation,
+    InverseProof as InverseProof,
+    inverse_derivation as inverse_derivation,
+)
 from .kinematics import (
     SymbolicKinematics as SymbolicKinematics,
     SymbolicMatrix as SymbolicMatrix,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +18,9 @@ from dhkit.symbolic.ring import Element, Elements
 from dhkit.symbolic.ring.elements import READABLE
 from dhkit.symbolic.ring.notation import notation
 from dhkit.symbolic.textbook_kinematics import TextbookKinematics, derive_kinematics
+
+if TYPE_CHECKING:
+    from dhkit.symbolic.inverse import InverseDerivation
 
 LANGUAGES = ("python", "c", "matlab")
 
@@ -141,6 +144,19 @@ class SymbolicKinematics:
     def J(self) -> SymbolicMatrix:
         """The Jacobian (6, n): linear velocity of the tool's origin, then angular velocity, in the world's axes."""
         return self.matrix("J")
+
+    @cached_property
+    def ik(self) -> InverseDerivation:
+        """Inverse kinematics derived step by step; see :func:`dhkit.symbolic.inverse_derivation`.
+
+        Raises
+        ------
+        DescriptionError
+            No closed form is known: says which axes do not meet or are not parallel.
+        """
+        from dhkit.symbolic.inverse import inverse_derivation
+
+        return inverse_derivation(self.description)
 
     def matrix(self, name: str) -> SymbolicMatrix:
         """Return one of A1 ... An, T and J by its name."""

@@ -20,7 +20,7 @@ from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow, exact_arm
 from dhkit.symbolic.exact.naming import Naming, Symbols
 from dhkit.symbolic.exact.transforms import identity, inverse, rotation, translation
 from dhkit.symbolic.mistakes import MadeAt, Mistake, Subject, catalogue, check_mistake, has, made_at
-from dhkit.symbolic.ring import Direction, Element, Elements, Ring, RingError
+from dhkit.symbolic.ring import Direction, Elements, RingError
 
 ROW = "Look again at this row: which axis does it turn about, and which lengths lie along which axis?"
 ZERO_POSE = "Look again at where each joint's angle is zero: draw the arm with all joint values zero."

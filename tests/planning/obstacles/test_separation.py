@@ -11,7 +11,6 @@ from dhkit.planning.obstacles import (
     Separation,
     link_capsules,
     pair_distances,
-    required_gaps,
     smallest_distances,
     world_axes,
 )
@@ -119,16 +118,6 @@ def test_floor_counts_only_ends_that_change_their_height(ur5):
     below = separation.smallest(np.array([[0, 1.2, 0, 0, 0, 0.0]]))
     assert below[0] < 0
     assert Separation(ur5, []).smallest(np.zeros((2, 6))).tolist() == [np.inf, np.inf]
-
-
-def test_required_gaps_are_lower_only_until_the_clearance_is_reached():
-    gap = np.array([[4, 30, 4], [9, 5, 4], [25, 30, 4], [9, 30, 4], [25, 30, 4], [8, 30, 4.0]])
-    at_start, at_goal = np.array([3.0, 30, 3]), np.array([6.0, 30, 3])
-    need = required_gaps(gap, 20.0, at_start, at_goal)
-    assert need[:, 0].tolist() == [3, 3, 20, 20, 20, 6]
-    assert need[:, 1].tolist() == [20] * 6
-    assert need[:, 2].tolist() == [3] * 6
-    assert required_gaps(gap, 20.0, at_start, at_goal, longer=2)[:, 0].tolist() == [3, 3, 3, 3, 6, 6]
 
 
 def test_distances_of_single_pairs_are_those_of_all(ur5):

@@ -10,8 +10,7 @@ import pytest
 from conftest import require
 from dhkit.description import library_robot
 from dhkit.expressions import parse
-from dhkit.grading.reports.mathml import equation_mathml
-from dhkit.symbolic.equations import displays, equations_latex, latex_document, latex_text, quantities
+from dhkit.symbolic.equations import displays, equation_mathml, equations_latex, latex_document, latex_text, quantities
 from dhkit.symbolic.equations.latex_names import latex_names
 from dhkit.symbolic.equations.latex_width import latex_width
 from dhkit.symbolic.exact.lagrangian import lagrangian

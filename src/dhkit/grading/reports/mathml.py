@@ -1,4 +1,4 @@
-"""LaTeX as MathML: of our own equations, and of students' answers, in which nothing but mathematics is kept."""
+"""LaTeX of students' answers as MathML, in which nothing but mathematics is kept."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from xml.etree.ElementTree import Element, SubElement, fromstring, tostring
 
 MAX_CHARACTERS = 4000
 """Longest LaTeX of an answer that is converted: nobody reads a longer equation, and converting it takes seconds."""
-EQUATION = re.compile(r"\\begin\{equation\*\}\n(.*)\n\\end\{equation\*\}", re.DOTALL)
-MATRIX = re.compile(r"<mo>(\(|&#x00028;)</mo><mtable>(.*?)</mtable><mo>(\)|&#x00029;)</mo>", re.DOTALL)
 NAMESPACE = re.compile(r"\{.*?\}")
 ELEMENTS = re.compile(
     "math|mrow|mi|mn|mo|mtext|mspace|mfrac|msqrt|mroot|msub|msup|msubsup|munder|mover|munderover|mtable|mtr|mtd|"
@@ -20,20 +18,6 @@ ATTRIBUTES = re.compile(
     "columnalign|rowspacing|columnspacing"
 )
 VALUE = re.compile(r"[A-Za-z0-9.%+ -]{0,60}")
-
-
-def equation_mathml(latex: str) -> str:
-    """Return a displayed equation that dhkit printed as MathML, brackets of matrices marked for a style sheet.
-
-    Not for LaTeX of strangers: latex2mathml passes on text and links as they are; see :func:`mathml`.
-    """
-    from latex2mathml.converter import convert
-
-    display = EQUATION.fullmatch(latex)
-    converted: str = convert(display[1] if display else latex, display="block")
-    return MATRIX.sub(
-        r'<mo class="bracket">\1</mo><mtable class="matrix">\2</mtable><mo class="bracket">\3</mo>', converted
-    )
 
 
 def mathml(latex: str) -> str | None:

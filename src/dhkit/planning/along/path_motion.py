@@ -164,7 +164,10 @@ def _best_timing(
 
     def searched(task: Task, program: PathProgram[Profile], start: Profile | None) -> tuple[PlannedMotion, Profile]:
         search = Search(task, program, deadline, work, progress)
-        found = search(starts=None if start is None else Starts([lambda: program.again(start, start)]))
+        starts = program.starts(task, None)
+        if start is not None:
+            starts = Starts([lambda: program.again(start, start), *starts.guesses])
+        found = search(starts=starts)
         return found, cast("Profile", search.found)
 
     def best(kind: Callable[[Task, Array], PathProgram[Profile]]) -> PlannedMotion:

@@ -19,6 +19,8 @@ from dhkit.planning.solver import Solver
 from dhkit.planning.task import Margins, Task
 from dhkit.trajectories import Trajectory
 
+END_SHARE = 0.01
+"""Share of the path at each end in which a guess of even speed speeds up or slows down."""
 MIN_SQUARED_SPEED = 1e-7
 """Smallest b at inner knots, relative to about the path's mean: Ipopt relaxes bounds by a tenth of it."""
 TIME_TOLERANCE, SMOOTH_TOLERANCE = 1e-7, 1e-8
@@ -104,8 +106,12 @@ class TimingProgram(PathProgram[Profile]):
     # Guesses
 
     def starts(self, task: Task, warm: Trajectory | None) -> Starts[Profile]:
-        """Return a guess that is about half as fast as the limits allow."""
-        return Starts([self.usual_profile])
+        """Return guesses: about half as fast as the limits allow, or of even speed where a duration is given."""
+        duration = task.duration
+        if duration is None:
+            return Starts([self.usual_profile])
+        ends = np.minimum(1.0, np.minimum(self.s, 1 - self.s) / END_SHARE)
+        return Starts([lambda: Profile(self.s, np.square(ends / duration)), self.usual_profile])
 
     def usual_profile(self) -> Profile:
         """Return a guess: b = 4 beta s (1 - s), whose duration is pi / (2 sqrt beta)."""

@@ -5,7 +5,7 @@ from dhkit.planning.obstacles.clearance import Distances, distance, pair_distanc
 from dhkit.planning.obstacles.pairs import CheckedPairs, Pair, checked_pairs
 from dhkit.planning.obstacles.sampling import PathSampler
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
-from dhkit.planning.obstacles.separation import Gaps, PlaneRow, Separation, required_gaps
+from dhkit.planning.obstacles.separation import Gaps, PlaneRow, Separation
 
 __all__ = [
     "CheckedPairs",
@@ -24,7 +24,6 @@ __all__ = [
     "distance",
     "link_capsules",
     "pair_distances",
-    "required_gaps",
     "smallest_distances",
     "world_axes",
 ]

@@ -29,6 +29,8 @@ STANDING_SAMPLES = 400
 """Number of configurations in which an arm that stands in an obstacle overlaps it."""
 NEAR_SHARE = 0.05
 """Smallest distance over all configurations, as a share of the reach, beyond which an optimizer ignores a pair."""
+MAX_OBSTACLES = 65_536
+"""Number of obstacles whose capsules are remembered; of more, every call would find them anew."""
 
 
 @dataclass(frozen=True)
@@ -100,15 +102,19 @@ def capsules_beside(description: Description, obstacle: Obstacle) -> tuple[int, 
     return _capsules_beside(description, description.mesh_folder, obstacle)
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=MAX_OBSTACLES)
 def _capsules_beside(description: Description, mesh_folder: Path | None, obstacle: Obstacle) -> tuple[int, ...]:
     capsules = link_capsules(description)
     axes = world_axes(description, _configurations(description)[:STANDING_SAMPLES])
 
     def stands_in(i: int) -> bool:
         radius = capsules[i].radius
-        is_slight = np.ptp(axes[:, i], axis=0).max() <= radius
-        return bool(is_slight and (obstacle_distances(radius, axes[:, i], obstacle) < 0).all())
+        if np.ptp(axes[:, i], axis=0).max() > radius or not overlaps(axes[:1, i], radius):
+            return False
+        return overlaps(axes[:, i], radius)
+
+    def overlaps(states: Array, radius: float) -> bool:
+        return bool((obstacle_distances(radius, states, obstacle) < 0).all())
 
     return tuple(i for i in checked_pairs(description).moving if not stands_in(i))
 

@@ -238,31 +238,6 @@ class Separation:
         found.middle[here] = (level + gap / 2)[which]
 
 
-def required_gaps(gap: Array, clearance: float, at_start: Array, at_goal: Array, longer: int = 1) -> Array:
-    """Return the gaps that are required of pairs along a motion, shape (N, P), m.
-
-    A pair that begins within the clearance keeps less until it has reached the clearance; likewise before the goal.
-
-    Parameters
-    ----------
-    gap
-        Gaps along the motion, shape (N, P), m.
-    clearance
-        Distance to keep, m.
-    at_start, at_goal
-        Distances to keep near the ends, shape (P,), m; without effect where they are above the clearance.
-    longer
-        Factor of the number of states for which the lower gaps are required.
-    """
-    need = np.full(gap.shape, clearance)
-    N, steps = len(gap), np.arange(len(gap))[:, None]
-    kept, is_kept = gap >= clearance, (gap >= clearance).any(axis=0)
-    before = steps < longer * np.where(is_kept, kept.argmax(axis=0), N)
-    after = steps >= N - longer * np.where(is_kept, kept[::-1].argmax(axis=0), N)
-    need = np.where(before, np.minimum(need, at_start), need)
-    return np.where(after, np.minimum(need, at_goal), need)
-
-
 @dataclass(frozen=True, eq=False)
 class _Group:
     """Pairs of one kind: with boxes, with other solids, with the floor, or between links."""

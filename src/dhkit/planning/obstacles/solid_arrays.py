@@ -50,12 +50,12 @@ class Solids:
     def of(cls, items: Sequence[Obstacle]) -> Solids:
         """Return obstacles of one kind as arrays."""
         return cls(
-            isinstance(items[0].geometry, Box),
-            np.array([item.centre for item in items]),
+            bool(items) and isinstance(items[0].geometry, Box),
+            np.array([item.centre for item in items]).reshape(-1, 3),
             np.array([item.radius for item in items]),
-            np.array([item.half_sizes for item in items]),
-            np.array([item.T_world_obstacle for item in items]),
-            np.array([item.axis for item in items]),
+            np.array([item.half_sizes for item in items]).reshape(-1, 3),
+            np.array([item.T_world_obstacle for item in items]).reshape(-1, 4, 4),
+            np.array([item.axis for item in items]).reshape(-1, 2, 3),
         )
 
     @property

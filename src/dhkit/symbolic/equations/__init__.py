@@ -1,6 +1,7 @@
 """Readable equations: one collected form, printed as text, LaTeX, sympy objects, Python, C and MATLAB."""
 
 from dhkit.symbolic.equations.c_code import equations_c
+from dhkit.symbolic.equations.html import equation_mathml, html_page
 from dhkit.symbolic.equations.latex import constant_latex, displays, equations_latex, latex_lines, latex_text
 from dhkit.symbolic.equations.latex_document import latex_document
 from dhkit.symbolic.equations.matlab_code import equations_matlab, matlab_files
@@ -25,6 +26,7 @@ __all__ = [
     "constant_latex",
     "constants_of",
     "displays",
+    "equation_mathml",
     "equations_c",
     "equations_latex",
     "equations_matlab",
@@ -32,6 +34,7 @@ __all__ = [
     "equations_sympy",
     "equations_text",
     "generators_of",
+    "html_page",
     "is_kinematic",
     "kinematic_quantities",
     "latex_document",

@@ -91,7 +91,7 @@ def equations_text(quantities: Sequence[Quantity]) -> str:
     elements = [element for quantity in quantities for element in quantity.elements.flat]
     angles = [f"{angle.name} = {angle.function}({angle.text})" for angle in angles_of(generators_of(elements))]
     if angles:
-        blocks.append("\n".join(_filled("where ", angles)))
+        blocks.append("\n".join(filled_lines("where ", angles)))
     if notes := renamings(elements):
         blocks.append("\n".join(f"note: {note}" for note in notes))
     return "\n\n".join(blocks)
@@ -100,14 +100,14 @@ def equations_text(quantities: Sequence[Quantity]) -> str:
 def _entry_lines(quantity: Quantity) -> list[str]:
     lines: list[str] = []
     for heads, element in quantity.entries:
-        lines += _broken(f"{' = '.join(heads)} = ", plain_text(element))
+        lines += broken_lines(f"{' = '.join(heads)} = ", plain_text(element))
     if zeros := quantity.zeros:
-        lines += _filled("", [f"{head} =" for head in zeros], "0", separator=" ")
+        lines += filled_lines("", [f"{head} =" for head in zeros], "0", separator=" ")
     return lines
 
 
-def _broken(head: str, text: str) -> list[str]:
-    """Break a line in front of terms, and inside those that are longer than a line."""
+def broken_lines(head: str, text: str) -> list[str]:
+    """Return a sum behind a head, broken in front of terms, and inside those that are longer than a line."""
     lines, line = [], head
     for term in _terms(text):
         room = WIDTH - len(line)
@@ -137,7 +137,8 @@ def _terms(text: str) -> list[str]:
     return [term for term in terms if term]
 
 
-def _filled(head: str, words: Sequence[str], tail: str = "", separator: str = ", ") -> list[str]:
+def filled_lines(head: str, words: Sequence[str], tail: str = "", separator: str = ", ") -> list[str]:
+    """Return words behind a head, with as many on a line as it holds."""
     lines, line = [], head + words[0]
     for word in [*words[1:], *([tail] if tail else [])]:
         if len(line) + len(separator) + len(word) > WIDTH:

@@ -29,7 +29,11 @@ POSE = (*POSITION, *ROTATION)
 """Names of the entries of the tool's pose in the world."""
 INNER = tuple(name.replace("p", "u").replace("r", "u") for name in POSE)
 """Names of the entries of the pose without base and tool."""
-DEFINED = (*INNER, *"wx wy wz x y u v ax ay az nx ny nz ox oy oz cphi sphi".split())
+DEFINED = (
+    *INNER,
+    *(f"{letter}{axis}" for letter in "wano" for axis in "xyz"),
+    *("x", "y", "u", "v", "cphi", "sphi"),
+)
 """Names that steps may define."""
 
 
@@ -92,7 +96,8 @@ class Chain:
         )
         taken = {name for constant in constants.found.values() for name in constant.symbols}
         names = distinct([*POSE, *DEFINED], taken)
-        ring = Ring(description.kinds, [*constants.found.values(), *map(Constant, names.values())])
+        # The pose and defined quantities come first, so that they are written first.
+        ring = Ring(description.kinds, [*map(Constant, names.values()), *constants.found.values()])
         base, tool = (
             _placed(ring, [ring.read(x) for x in xyz], [ring.direction(x) for x in rpy])
             for xyz, rpy in zip(fixed, turned, strict=True)

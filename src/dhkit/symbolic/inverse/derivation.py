@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, takes_robot, world_to_tool
+from dhkit.description import Array, Description, takes_robot, world_to_tool, write_atomically
 from dhkit.display import repr_line
 from dhkit.errors import DescriptionError
 from dhkit.formats import format_function
 from dhkit.symbolic.exact.lagrangian import Proof
 from dhkit.symbolic.inverse.chain import POSE, Chain
 from dhkit.symbolic.inverse.families import Derivable, family_of
-from dhkit.symbolic.inverse.forms import ROUNDING, lemmas
+from dhkit.symbolic.inverse.forms import ROUNDING, Unknown, lemmas
 from dhkit.symbolic.inverse.missing import why_not
 from dhkit.symbolic.inverse.steps import Choice, Condition, Step, Workbench, names_in, without_unused
 from dhkit.symbolic.inverse.wrists import FLIPS
@@ -73,7 +74,9 @@ class InverseProof:
         )
         if failed:
             return f"NOT TRUE: {'; '.join(failed)}. {sampled}"
-        return f"proved: {proved} (the equations hold for T = base A_1 ... A_n tool; their solutions are all). {sampled}"
+        return (
+            f"proved: {proved} (the equations hold for T = base A_1 ... A_n tool; their solutions are all). {sampled}"
+        )
 
     def __str__(self) -> str:
         return self.statement
@@ -98,6 +101,8 @@ class InverseDerivation:
         Equations that a pose has to satisfy besides: an arm in a plane.
     notes
         What is not as in the robot file: names of lengths, numbers in place of symbols.
+    sum
+        The joints whose angles add up to phi, from 1, each with 1 or -1; empty without phi.
     meanings
         What each name of the pose and of a defined quantity is if the pose is that of the arm itself.
 
@@ -116,6 +121,7 @@ class InverseDerivation:
     steps: tuple[Step, ...]
     conditions: tuple[Condition, ...]
     notes: tuple[str, ...]
+    sum: tuple[tuple[int, int], ...]
     meanings: dict[str, Element]
 
     @property
@@ -128,6 +134,14 @@ class InverseDerivation:
         """The number of joints."""
         return self.chain.n
 
+    @property
+    def geometry(self) -> str:
+        """How the arm's axes lie, in words."""
+        kinds = self.description.kinds
+        if self.family.name != "parallel_chain":
+            return self.family.geometry
+        return f"{kinds.count('R')} parallel revolute axes{', a slide along them' * ('P' in kinds)}"
+
     @cached_property
     def choices(self) -> tuple[Choice, ...]:
         """The rules that name branches, in the order of their names: shoulder, elbow, wrist."""
@@ -137,7 +151,7 @@ class InverseDerivation:
     @property
     def branches(self) -> tuple[str, ...]:
         """Names of the branches, as those of ``arm.ik``."""
-        return tuple(" ".join(names) for names in product(*(_in_order(choice) for choice in self.choices)))
+        return tuple(" ".join(names) for names in product(*(in_branch_order(choice) for choice in self.choices)))
 
     # Reading
 
@@ -171,11 +185,29 @@ class InverseDerivation:
         files: dict[str, str] = format_function(f"inverse_{language}")(self)
         return files
 
+    def export(self, folder: str | Path, language: str = "c") -> tuple[Path, ...]:
+        """Write the files of :meth:`code` into a folder, which is made if there is none; return their paths.
+
+        Raises
+        ------
+        ValueError
+            Another language.
+        DescriptionError
+            The folder is a file.
+        """
+        files = self.code(language)
+        place = Path(folder)
+        if place.exists() and not place.is_dir():
+            raise DescriptionError(f"{place} is a file; expected a folder")
+        for name, text in files.items():
+            write_atomically(place / name, text)
+        return tuple(place / name for name in files)
+
     def __str__(self) -> str:
         return self.text()
 
     def __repr__(self) -> str:
-        return repr_line("InverseDerivation", self.description.name, f"{self.family.geometry}, {len(self.steps)} steps")
+        return repr_line("InverseDerivation", self.description.name, f"{self.geometry}, {len(self.steps)} steps")
 
     def _repr_html_(self) -> str:
         return str(format_function("inverse_body")(self))
@@ -217,7 +249,7 @@ class InverseDerivation:
         )
 
     def _closes(self, found: Array, T: Array) -> bool:
-        valid = np.isfinite(found).all(axis=-1)
+        valid = np.asarray(np.isfinite(found).all(axis=-1))
         reached = world_to_tool(self.description, np.where(valid[..., None], found, 0.0))
         scale = max(self.description.reach, 1e-9)
         gap = np.abs(reached - T[:, None])[..., :3, :]
@@ -251,68 +283,78 @@ class InverseDerivation:
         """
         T = np.asarray(T, dtype=float)
         poses = T.reshape(-1, 4, 4)
-        given = {self.chain.names[name]: entry for name, entry in zip(POSE, _entries(poses), strict=True)}
         result = np.full((len(poses), len(self.branches), self.n), np.nan)
-        rooted = [step for step in self.steps if step.form is not None and step.form.has_two_roots]
         with np.errstate(all="ignore"):
-            for signs in product((1.0, -1.0), repeat=len(rooted)):
-                q, is_solved, branch = self._branch(given, dict(zip(map(id, rooted), signs, strict=True)), len(poses))
+            for values, is_solved in self.candidates(poses):
                 rows = np.flatnonzero(is_solved)
-                result[rows, branch[rows]] = q[rows]
+                result[rows, self._named(values)[rows]] = self._joints(values)[rows]
         return result.reshape((*T.shape[:-2], len(self.branches), self.n))
 
-    def _branch(
-        self, given: dict[str, Array], signs: dict[int, float], count: int
-    ) -> tuple[Array, Array, Array]:
-        """Return joint values (N, n) for signs of roots, whether they are solutions, and the index of their branch."""
-        values = _Values(self.chain, given)
+    def candidates(self, T: Array) -> Iterator[tuple[Values, Array]]:
+        """Yield for each choice of roots the values of all quantities at poses (N, 4, 4), and which are solutions."""
+        rooted = [k for k, step in enumerate(self.steps) if step.form is not None and step.form.has_two_roots]
+        for signs in product((1.0, -1.0), repeat=len(rooted)):
+            yield self._branch(T, dict(zip(rooted, signs, strict=True)))
+
+    def _branch(self, T: Array, signs: Mapping[int, float]) -> tuple[Values, Array]:
+        """Return the values of all quantities for signs of roots, and whether they are solutions, shape (N,)."""
+        count = len(T)
+        values = Values(self.chain, T)
         is_solved = np.ones(count, dtype=bool)
-        for step in self.steps:
+        for k, step in enumerate(self.steps):
             for definition in step.definitions:
                 values.set_constant(definition.name, values.of(definition.element))
             if step.form is None:
                 continue
             letters = {letter: values.of(element) for letter, element in step.form.letters.items()}
-            found, radicand = step.form.solve(letters, signs.get(id(step), 1.0))
+            found, radicand = step.form.solve(letters, signs.get(k, 1.0))
             is_solved &= np.broadcast_to(radicand >= -ROUNDING, count)
-            values.set_unknown(step, np.broadcast_to(found, count))
+            values.set_unknown(step.form.unknown, np.broadcast_to(found, count))
         for condition in self.conditions:
             off = np.abs(values.of(condition.left) - values.of(condition.right))
             is_solved &= np.broadcast_to(off <= IN_PLANE * max(self.description.reach, 1e-9), count)
+        return values, is_solved
+
+    def _joints(self, values: Values) -> Array:
+        """Return joint values (N, n), rad in (-pi, pi] and m."""
         q = np.stack([values.joints[i] for i in range(self.n)], axis=1)
         for i, offset in enumerate(self.chain.offsets):
             if self.description.kinds[i] == "R":
                 turned = q[:, i] - self.chain.number(offset)
                 q[:, i] = turned - 2 * np.pi * np.ceil((turned - np.pi) / (2 * np.pi))
-        return q, is_solved, self._named(values, count)
+        return q
 
-    def _named(self, values: _Values, count: int) -> Array:
+    def _named(self, values: Values) -> Array:
+        """Return the indices of branches by the rules that name them, shape (N,)."""
+        count = len(values.joints[0])
         index = np.zeros(count, dtype=int)
         for choice in self.choices:
             sign = np.ones(count)
             for factor in choice.factors:
                 sign = sign * np.where(values.of(factor) < 0, -1.0, 1.0)
-            first = np.where(sign > 0, choice.names[0], choice.names[1]) == _in_order(choice)[0]
+            first = np.where(sign > 0, choice.names[0], choice.names[1]) == in_branch_order(choice)[0]
             index = 2 * index + np.where(first, 0, 1)
         return index
 
 
-class _Values:
-    """Values of a ring's generators at N poses."""
+class Values:
+    """Values of a ring's generators at N poses: what is given, and then what step after step finds."""
 
-    def __init__(self, chain: Chain, given: dict[str, Array]) -> None:
+    def __init__(self, chain: Chain, T: Array) -> None:
         self._chain, ring = chain, chain.ring
         self._values: list[Any] = [chain.values.get(g.text, np.nan) for g in ring.generators]
         self.joints: dict[int, Array] = {}
-        for name, value in given.items():
-            self.set_constant(name, value)
+        """theta_i or q_i by joint, from 0, shape (N,) each."""
+        for name, value in zip(POSE, [*T[:, :3, 3].T, *T[:, :3, :3].reshape(-1, 9).T], strict=True):
+            self.set_constant(chain.names[name], value)
 
     def set_constant(self, name: str, value: Array) -> None:
+        """Set a defined quantity."""
         self._values[self._chain.ring.place("constant", name)] = value
 
-    def set_unknown(self, step: Step, value: Array) -> None:
-        unknown, ring = step.unknown, self._chain.ring
-        assert unknown is not None
+    def set_unknown(self, unknown: Unknown, value: Array) -> None:
+        """Set what a step solves for."""
+        ring = self._chain.ring
         if unknown.joint is None:
             self.set_constant(self._chain.names["cphi"], np.cos(value))
             self.set_constant(self._chain.names["sphi"], np.sin(value))
@@ -325,19 +367,16 @@ class _Values:
             self._values[ring.place("position", unknown.joint)] = value
 
     def of(self, element: Element) -> Array:
+        """Return an element's values, shape (N,) or ()."""
         return np.asarray(element.value(self._values))
 
 
 SHOULDERS = {frozenset(("left", "right")): ("left", "right")}
 
 
-def _in_order(choice: Choice) -> tuple[str, str]:
+def in_branch_order(choice: Choice) -> tuple[str, str]:
     """Return the names of a choice in the order of branches: left before right."""
     return SHOULDERS.get(frozenset(choice.names), choice.names)
-
-
-def _entries(T: Array) -> Sequence[Array]:
-    return [*T[:, :3, 3].T, *T[:, :3, :3].reshape(-1, 9).T]
 
 
 def _proof(bench: Workbench, what: str, sides: Sequence[tuple[Element, Element]]) -> Proof:
@@ -379,4 +418,6 @@ def inverse_derivation(description: Description) -> InverseDerivation:
     if own:
         notes.append(f"lengths of the table by the numbers of their rows, m: {', '.join(own)}")
     notes += chain.notes
-    return InverseDerivation(chain, family, tuple(steps), tuple(bench.conditions), tuple(notes), bench.meanings)
+    return InverseDerivation(
+        chain, family, tuple(steps), tuple(bench.conditions), tuple(notes), bench.sum, bench.meanings
+    )

@@ -1,21 +1,21 @@
 """Families of arms whose inverse kinematics is derived: how each is recognized in the exact table, and its steps.
 
-The families are those of ``dhkit.kinematics.closed_form``, read anew from the table: axes i and i + 1 are parallel where
-sin(alpha_i) is 0, at right angles where cos(alpha_i) is 0, and meet where a_i is 0.
+The families are those of ``dhkit.kinematics.closed_form``, read anew from the table: axes i and i + 1 are parallel
+where sin(alpha_i) is 0, at right angles where cos(alpha_i) is 0, and meet where a_i is 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from dhkit.symbolic.exact.transforms import rotation
 from dhkit.symbolic.inverse.chain import Chain
-from dhkit.symbolic.inverse.forms import Circle
-from dhkit.symbolic.inverse.forms import Direction as Directed
-from dhkit.symbolic.inverse.forms import Turned
+from dhkit.symbolic.inverse.forms import Circle, Direction as Directed, Turned
 from dhkit.symbolic.inverse.regions import (
     Plane,
     height_of_slide,
@@ -114,7 +114,7 @@ def _spherical(chain: Chain) -> bool:
 def _wrist_centre(bench: Workbench) -> Elements:
     """Return the wrist centre before joint 1, shape (3,), m: the origin behind joint 5, which joint 6 leaves alone."""
     T, d6 = bench.T, bench.chain.d[5]
-    place = T[:3, 3] - T[:3, 2] * d6
+    place: Elements = T[:3, 3] - T[:3, 2] * d6
     if d6.is_zero:
         return place
     definitions, symbols = bench.define_all(wx=place[0], wy=place[1], wz=place[2])
@@ -149,7 +149,8 @@ def _elbow(bench: Workbench) -> None:
     turned = chain.part(2, 3)
     sense = _sense(chain, 2)
     definitions, (c, s) = bench.define_all(cphi=turned[0, 0], sphi=turned[1, 0])
-    bench.add(Step("The rotation of link 3", _sum_text(chain, [(2, 1), (3, int(number(chain, sense)))]), definitions))
+    bench.sum = (2, 1), (3, int(number(chain, sense)))
+    bench.add(Step("The rotation of link 3", _sum_text(bench.sum), definitions))
     R = rotation(chain.ring, 0, 1, (c, s))[:3, :3] @ _flipped(chain, sense) @ chain.link(3)[:3, :3]
     turn_spherical_wrist(bench, _turn_1(bench) @ R)
 
@@ -184,7 +185,7 @@ def _flipped(chain: Chain, sense: Element) -> Elements:
     return R
 
 
-def _sum_text(chain: Chain, senses: list[tuple[int, int]]) -> str:
+def _sum_text(senses: Sequence[tuple[int, int]]) -> str:
     terms = "".join(f" {'+' if sense > 0 else '-'} theta{i}" for i, sense in senses)
     return f"Angles about parallel axes add up: phi = {terms[3:]}."
 
@@ -248,11 +249,11 @@ def _three_parallel(bench: Workbench) -> None:
     sense = _sense(chain, 2) * _sense(chain, 3)
     senses = _parallel_senses(chain)
     ax, ay, k = turn_parallel_wrist(bench, sense)
-    phi = bench.phi(arm[0, 0], arm[1, 0])
+    phi = bench.phi(arm[0, 0], arm[1, 0], senses)
     bench.add(
         Step(
             "phi",
-            f"{_sum_text(chain, senses)} Joints 2, 3 and 4 turn axis 6 about their axes by phi.",
+            f"{_sum_text(senses)} Joints 2, 3 and 4 turn axis 6 about their axes by phi.",
             (),
             Directed(phi, {"k": k, "X": ax, "Y": ay}),
         )
@@ -312,13 +313,13 @@ def _known_rotation(
     chain = bench.chain
     joints = [i for i, _ in senses]
     turned = chain.part(joints[0], joints[-1])
-    phi = bench.phi(turned[0, 0], turned[1, 0])
+    phi = bench.phi(turned[0, 0], turned[1, 0], senses)
     definitions, (ax, ay) = bench.define_all(ax=seen[0], ay=seen[1])
     U, V = own[0], sense * own[1]
     bench.add(
         Step(
             "phi",
-            f"{_sum_text(chain, senses)} The parallel joints turn the tool's {'xyz'[column]} axis by phi: it is seen at "
+            f"{_sum_text(senses)} The parallel joints turn the tool's {'xyz'[column]} axis by phi: it is seen at "
             "(ax, ay) in the plane.",
             definitions,
             Turned(phi, {"U": U, "V": V, "X": ax, "Y": ay}),
@@ -368,7 +369,7 @@ def _end(chain: Chain, i: int) -> Elements:
 def _chain_vectors(chain: Chain) -> list[Elements]:
     """Return the constant vectors of the two links behind the first two revolute joints, shape (3,) each, m."""
     turning = _revolute(chain)
-    parts = [_between(chain, i, j) for i, j in zip(turning[:-1], turning[1:], strict=True)] + [_end(chain, turning[-1])]
+    parts = [_between(chain, i, j) for i, j in pairwise(turning)] + [_end(chain, turning[-1])]
     return [_origin(part) for part in parts[:2]]
 
 
@@ -382,7 +383,7 @@ def _parallel_chain(bench: Workbench) -> None:
     point = R.T @ (_origin(bench.T)[:2] - _origin(before)[:2])
     first = _between(chain, a, b)
     end = _end(chain, turning[-1])
-    up = chain.first[2, :3] @ before[:3, 2]
+    up: Any = chain.first[2, :3] @ before[:3, 2]
     side = chain.ring.number(1 if number(chain, up) >= 0 else -1)
     x, y = point
     last = end
@@ -440,7 +441,7 @@ def _chain_rotation(
     still = first @ middle
     whole = chain.joint(a) @ first @ chain.joint(b) @ middle @ chain.joint(c)
     turned = whole[:2, :2] @ still[:2, :2].T
-    phi = bench.phi(turned[0, 0], turned[1, 0])
+    phi = bench.phi(turned[0, 0], turned[1, 0], _chain_senses(chain, turning))
     at_zero = (before @ still @ end)[:3, :3]
     sizes = [sum(number(chain, at_zero[i, k]) ** 2 for i in range(2)) for k in range(3)]
     column = int(np.argmax(np.round(sizes, 12)))
@@ -450,7 +451,7 @@ def _chain_rotation(
     bench.add(
         Step(
             "phi",
-            f"{_sum_text(chain, _chain_senses(chain, turning))} The joints turn the tool's {'xyz'[column]} axis by phi: "
+            f"{_sum_text(_chain_senses(chain, turning))} The joints turn the tool's {'xyz'[column]} axis by phi: "
             "it is seen at (ax, ay) in the plane.",
             definitions,
             Turned(phi, {"U": own[0], "V": own[1], "X": ax, "Y": ay}),
@@ -499,7 +500,7 @@ def _slider(bench: Workbench) -> None:
             (),
             Circle(bench.unknown(2), {"A": A, "B": B, "C": seen[0] - start[0] - rest}),
             "the pose is farther beside the slide than the tool is from axis 2",
-            "both solutions coincide",
+            "the tool is straight beside axis 2, at right angles to the slide: both solutions coincide",
             Choice(("ahead", "behind"), (chain.alpha[0][1] * own[1],)),
         )
     )

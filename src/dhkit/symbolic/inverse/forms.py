@@ -75,12 +75,19 @@ class Form(ABC):
     has_two_roots: ClassVar[bool] = False
     statement: ClassVar[str]
     """The lemma in words."""
-    solution: ClassVar[str]
-    """The solution as text in the letters; {s} is the sign of the root, {x} the unknown."""
-    latex: ClassVar[str]
+    text: ClassVar[tuple[str, ...]]
+    """The solution as text, in one or two alternatives; <A> stands for the letter A or what it is."""
+    latex: ClassVar[tuple[str, ...]]
     """The same in LaTeX."""
-    radicand: ClassVar[str] = ""
-    """What must not be negative, as text in the letters; empty without a root."""
+    code: ClassVar[str]
+    """The same as code, where <s> is 1 or -1, and root(x) the square root of x, or 0 if x is negative."""
+    guard: ClassVar[tuple[str, str]] = ("", "")
+    """What must not be negative, and what its size is compared with, as code; empty without a root."""
+
+    @property
+    def derived(self) -> dict[str, tuple[str, Element]]:
+        """Further quantities in the solution, by their placeholders: in the letters, and what they are."""
+        return {}
 
     @property
     @abstractmethod
@@ -104,9 +111,17 @@ class Circle(Form):
     statement = (
         "A cos x + B sin x = C holds for x = atan2(B, A) +- atan2(sqrt(A^2 + B^2 - C^2), C), and for no other angle"
     )
-    solution = "atan2(B, A) {s} atan2(sqrt(A^2 + B^2 - C^2), C)"
-    latex = r"\mathrm{atan2}(B, A) {s} \mathrm{atan2}\bigl(\sqrt{A^{2} + B^{2} - C^{2}},\, C\bigr)"
-    radicand = "A^2 + B^2 - C^2"
+    text = ("atan2(<B>, <A>) ± atan2(sqrt(<D>), <C>)",)
+    latex = (r"\mathrm{atan2}(<B>,\, <A>) \pm \mathrm{atan2}\bigl(\sqrt{<D>},\, <C>\bigr)",)
+    code = "atan2(<B>, <A>) + <s>*atan2(root(<D>), <C>)"
+    guard = "<D>", "<A>*<A> + <B>*<B>"
+
+    @property
+    def derived(self) -> dict[str, tuple[str, Element]]:
+        """The radicand."""
+        A, B, C = (self.letters[k] for k in "ABC")
+        words = " + ".join(f"{k}^2" for k in "AB" if not self.letters[k].is_zero)
+        return {"D": (f"{words} - C^2", A * A + B * B - C * C)}
 
     @property
     def equations(self) -> tuple[tuple[Element, Element], ...]:
@@ -142,8 +157,14 @@ class Line(Form):
 
     has_two_roots = True
     statement = "X sin x = Y cos x holds for x = atan2(Y, X) and x = atan2(-Y, -X), and for no other angle"
-    solution = "atan2({s}Y, {s}X)"
-    latex = r"\mathrm{atan2}({s}Y,\, {s}X)"
+    text = ("atan2(<Y>, <X>)", "atan2(<mY>, <mX>)")
+    latex = (r"\mathrm{atan2}(<Y>,\, <X>)", r"\mathrm{atan2}(<mY>,\, <mX>)")
+    code = "atan2(<s>*<Y>, <s>*<X>)"
+
+    @property
+    def derived(self) -> dict[str, tuple[str, Element]]:
+        """The opposite direction."""
+        return {f"m{k}": (f"-{k}", -self.letters[k]) for k in "XY"}
 
     @property
     def equations(self) -> tuple[tuple[Element, Element], ...]:
@@ -164,8 +185,16 @@ class Direction(Form):
     """k cos x = X and k sin x = Y, with a known k that is not zero."""
 
     statement = "k cos x = X, k sin x = Y hold for x = atan2(k Y, k X) alone, where k is not 0"
-    solution = "atan2({kY}, {kX})"
-    latex = r"\mathrm{atan2}({kY},\, {kX})"
+    text = ("atan2(<kY>, <kX>)",)
+    latex = (r"\mathrm{atan2}(<kY>,\, <kX>)",)
+    code = "atan2(<kY>, <kX>)"
+
+    @property
+    def derived(self) -> dict[str, tuple[str, Element]]:
+        """The products with k, without a k of 1 or -1."""
+        k = self.letters["k"]
+        words = "" if k == 1 else "-" if k == -1 else "k*"
+        return {f"k{letter}": (f"{words}{letter}", k * self.letters[letter]) for letter in "XY"}
 
     @property
     def equations(self) -> tuple[tuple[Element, Element], ...]:
@@ -191,8 +220,14 @@ class Flip(Form):
 
     has_two_roots = True
     statement = "k cos x = X, k sin x = Y hold for x = atan2(Y, X) if k > 0, and x = atan2(-Y, -X) if k < 0, alone"
-    solution = "atan2({s}Y, {s}X)"
-    latex = r"\mathrm{atan2}({s}Y,\, {s}X)"
+    text = ("atan2(<Y>, <X>)", "atan2(<mY>, <mX>)")
+    latex = (r"\mathrm{atan2}(<Y>,\, <X>)", r"\mathrm{atan2}(<mY>,\, <mX>)")
+    code = "atan2(<s>*<Y>, <s>*<X>)"
+
+    @property
+    def derived(self) -> dict[str, tuple[str, Element]]:
+        """The opposite direction."""
+        return {f"m{k}": (f"-{k}", -self.letters[k]) for k in "XY"}
 
     @property
     def equations(self) -> tuple[tuple[Element, Element], ...]:
@@ -217,9 +252,9 @@ class CosineAndSquare(Form):
 
     has_two_roots = True
     statement = "cos x = X, sin^2 x = S, with X^2 + S = 1, hold for x = atan2(+-sqrt(S), X), and for no other angle"
-    solution = "atan2({s}sqrt(S), X)"
-    latex = r"\mathrm{atan2}\bigl({s}\sqrt{S},\, X\bigr)"
-    radicand = "S"
+    text = ("atan2(±sqrt(<S>), <X>)",)
+    latex = (r"\mathrm{atan2}\bigl(\pm\sqrt{<S>},\, <X>\bigr)",)
+    code = "atan2(<s>*root(<S>), <X>)"
 
     @property
     def equations(self) -> tuple[tuple[Element, Element], ...]:
@@ -246,8 +281,15 @@ class Turned(Form):
         "u cos t - v sin t = x, u sin t + v cos t = y hold for t = atan2(u y - v x, u x + v y) alone, "
         "where u, v are not both 0"
     )
-    solution = "atan2(U*Y - V*X, U*X + V*Y)"
-    latex = r"\mathrm{atan2}(U Y - V X,\, U X + V Y)"
+    text = ("atan2(<UY>, <UX>)",)
+    latex = (r"\mathrm{atan2}(<UY>,\, <UX>)",)
+    code = "atan2(<UY>, <UX>)"
+
+    @property
+    def derived(self) -> dict[str, tuple[str, Element]]:
+        """Sine and cosine, times the square of the length."""
+        U, V, X, Y = (self.letters[k] for k in "UVXY")
+        return {"UY": ("U*Y - V*X", U * Y - V * X), "UX": ("U*X + V*Y", U * X + V * Y)}
 
     @property
     def equations(self) -> tuple[tuple[Element, Element], ...]:
@@ -270,13 +312,19 @@ class Turned(Form):
 
 
 class Square(Form):
-    """(z + M)^2 = S for a sliding joint's value z."""
+    """(z + M)^2 = S for a sliding joint's value z; Q is the squared length that S is small or large against."""
 
     has_two_roots = True
     statement = "(z + M)^2 = S holds for z = -M +- sqrt(S), and for no other number"
-    solution = "-M {s} sqrt(S)"
-    latex = r"-M {s} \sqrt{S}"
-    radicand = "S"
+    text = ("<mM> ± sqrt(<S>)",)
+    latex = (r"<mM> \pm \sqrt{<S>}",)
+    code = "<mM> + <s>*root(<S>)"
+    guard = "<S>", "<Q>"
+
+    @property
+    def derived(self) -> dict[str, tuple[str, Element]]:
+        """-M."""
+        return {"mM": ("-M", -self.letters["M"])}
 
     @property
     def equations(self) -> tuple[tuple[Element, Element], ...]:
@@ -286,8 +334,7 @@ class Square(Form):
     def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
         """Return the value and the radicand."""
         M, S = letters["M"], letters["S"]
-        scale = letters["Q"] if "Q" in letters else np.abs(S) + M * M
-        return -M + sign * np.sqrt(np.maximum(S, 0.0)), S / np.maximum(scale, np.finfo(float).tiny)
+        return -M + sign * np.sqrt(np.maximum(S, 0.0)), S / np.maximum(letters["Q"], np.finfo(float).tiny)
 
     @staticmethod
     def lemma() -> Proof:
@@ -301,8 +348,9 @@ class Sliding(Form):
     """z = Z for a sliding joint's value."""
 
     statement = "z = Z gives z"
-    solution = "Z"
-    latex = "Z"
+    text = ("<Z>",)
+    latex = ("<Z>",)
+    code = "<Z>"
 
     @property
     def equations(self) -> tuple[tuple[Element, Element], ...]:
@@ -320,12 +368,21 @@ class Sliding(Form):
         return Proof(Sliding.statement, _column([ring.zero]))
 
 
+@dataclass(frozen=True, eq=False)
 class Remainder(Form):
-    """An angle that is what remains of a known sum of angles: cos x = X and sin x = Y."""
+    """An angle that is what remains of a known sum of angles: cos x = X and sin x = Y.
+
+    Attributes
+    ----------
+    terms
+        The known angles of the sum's remainder: names with 1 or -1.
+    """
+
+    terms: tuple[tuple[str, int], ...] = ()
 
     statement = "cos x = X, sin x = Y hold for x = atan2(Y, X), and for no other angle"
-    solution = "{sum}"
-    latex = "{sum}"
+    text = latex = ("<sum>",)
+    code = "<sum>"
 
     @property
     def equations(self) -> tuple[tuple[Element, Element], ...]:

@@ -34,7 +34,9 @@ def _missing(chain: Chain) -> str:
         found.append(_angle(chain, 2))
     if not (chain.alpha[3][0].is_zero and chain.alpha[4][0].is_zero):
         found += [_angle(chain, i) for i in (4, 5) if not chain.alpha[i - 1][0].is_zero]
-    found += [f"axes {i} and {i + 1} miss each other by {_length(chain, chain.a[i - 1])}" for i in (4, 5) if chain.a[i - 1]]
+    found += [
+        f"axes {i} and {i + 1} miss each other by {_length(chain, chain.a[i - 1])}" for i in (4, 5) if chain.a[i - 1]
+    ]
     if chain.d[4]:
         found.append(f"axes 4 and 6 meet axis 5 {_length(chain, chain.d[4])} apart")
     return ", ".join(found) or "its links have no length where two axes are parallel"

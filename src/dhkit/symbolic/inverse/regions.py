@@ -10,7 +10,7 @@ import numpy as np
 
 from dhkit.symbolic.inverse.chain import Chain
 from dhkit.symbolic.inverse.forms import Circle, Form, Line, Remainder, Sliding, Square, Turned
-from dhkit.symbolic.inverse.steps import Choice, Definition, Figure, Step, Workbench
+from dhkit.symbolic.inverse.steps import Choice, Definition, Figure, Step, View, Workbench
 from dhkit.symbolic.ring import Element, Elements
 from dhkit.symbolic.ring.elements import element_array
 
@@ -78,7 +78,8 @@ def turn_the_plane(bench: Workbench, point: Elements, inside: Elements, who: str
         form = Circle(unknown, {"A": -py, "B": px, "C": tilt * beside})
         look = (
             f"Axes 1 and 2 are at right angles. {who.capitalize()} lies {inside[2]} along axis 2 beside axis 1, "
-            "whatever the later joints are: seen along axis 1, this is its distance from the line in which the arm points."
+            "whatever the later joints are: seen along axis 1, this is its distance from the line in which the arm "
+            "points."
         )
         nothing = (
             f"{who} is nearer to axis 1 than {missing}: the missing distance is {missing} - sqrt({px * px + py * py})"
@@ -96,7 +97,7 @@ def turn_the_plane(bench: Workbench, point: Elements, inside: Elements, who: str
             nothing,
             f"{who} is on axis 1" if not offset else f"{who} is {missing} from axis 1: both solutions coincide",
             Choice(names, (forward,)),
-            Figure.TOP,
+            Figure(View.TOP, ("axis 1", who)),
         )
     )
     x, y = c * px + s * py - chain.a[0], tilt * (pz - chain.d[0])
@@ -149,7 +150,7 @@ def reach_with_two_links(
             "the two links are stretched out or folded: both solutions coincide",
             # The elbow is on the left of the line to the point where first x both is negative.
             Choice(names, (first[1] * both[0] - first[0] * both[1], above)),
-            Figure.TRIANGLE,
+            Figure(View.TRIANGLE, (f"axis {a}", f"axis {b}", who), tuple(first[:2])),
         )
     )
     definitions, (u, v) = bench.define_all(u=both[0], v=both[1])
@@ -178,9 +179,7 @@ def turn_into_place(
     )
 
 
-def reach_with_slide(
-    bench: Workbench, i: int, vector: Elements, place: tuple[Element, Element], who: str
-) -> None:
+def reach_with_slide(bench: Workbench, i: int, vector: Elements, place: tuple[Element, Element], who: str) -> None:
     """Add the steps for a slide behind a turning joint i, from 1, that put a point in place."""
     x, y = place
     unknown = bench.unknown(i + 1)
@@ -193,11 +192,11 @@ def reach_with_slide(
             f"Joint {i + 1} slides at right angles to axis {i}: the distance of {who} from axis {i} depends on "
             f"q{i + 1} alone (Pythagoras).",
             (),
-            Square(unknown, {"M": middle, "S": S}),
-            f"{who} is nearer to axis {i} than the line in which it slides",
-            "both solutions coincide",
+            Square(unknown, {"M": middle, "S": S, "Q": x * x + y * y}),
+            f"{who} is nearer to axis {i} than the line along which it slides",
+            f"{who} is as near to axis {i} as the slide allows: both solutions coincide",
             Choice(("out", "in"), (unknown.symbols[0] + middle,)),
-            Figure.SLIDE,
+            Figure(View.SLIDE, (f"axis {i}", who)),
         )
     )
     definitions, (u, v) = bench.define_all(u=vector[0], v=vector[1])
@@ -218,7 +217,8 @@ def remaining_angle(bench: Workbench, i: int, before: Elements, senses: Sequence
     c, s = before
     own = senses[-1][1]
     X, Y = cosine * c + sine * s, own * (sine * c - cosine * s)
-    bench.add(Step(f"theta{i}", look, (), Remainder(bench.unknown(i), {"X": X, "Y": Y})))
+    terms = (("phi", own), *((f"theta{j}", -own * sense) for j, sense in senses[:-1]))
+    bench.add(Step(f"theta{i}", look, (), Remainder(bench.unknown(i), {"X": X, "Y": Y}, terms)))
 
 
 def linear_parts(element: Element, i: int) -> tuple[Element, Element, Element]:
@@ -254,10 +254,9 @@ def quadratic_parts(element: Element, i: int) -> tuple[Element, Element]:
 
 
 def height_of_slide(bench: Workbench, i: int, given: Element, arm: Element, look: str) -> None:
-    """Add the step for a slide i, from 1, that alone changes a coordinate: ``given``, which is ``arm`` in the joints."""
+    """Add the step for a slide i, from 1, that alone changes a coordinate: ``given``, and ``arm`` in the joints."""
     place = bench.chain.ring.place("position", i - 1)
     unit = tuple(int(k == place) for k in range(len(bench.chain.ring.generators)))
     sense = arm.terms[unit]
     rest = arm - sense * bench.chain.ring.position(i - 1)
     bench.add(Step(f"q{i}", look, (), Sliding(bench.unknown(i), {"Z": sense * (given - rest)})))
-

@@ -13,7 +13,7 @@ from dhkit.symbolic.ring.elements import element_array
 from dhkit.symbolic.ring.ring import translated
 
 
-class Figure(Enum):
+class View(Enum):
     """What the figure of a step shows."""
 
     TOP = "top"
@@ -22,6 +22,25 @@ class Figure(Enum):
     """Two links and the point that they reach, seen along their axes."""
     SLIDE = "slide"
     """A slide and the point that it reaches, seen along the axis that turns it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """The figure of a step.
+
+    Attributes
+    ----------
+    view
+        What it shows.
+    labels
+        Names of the axes, and of the point.
+    first
+        Of a triangle: the first link before it turns, x and y, m.
+    """
+
+    view: View
+    labels: tuple[str, ...]
+    first: tuple[Element, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +96,7 @@ class Step:
     choice
         The rule that names the roots, where there are two.
     figure
-        What its figure shows.
+        Its figure.
     """
 
     title: str
@@ -132,6 +151,9 @@ class Workbench:
     conditions: list[Condition] = field(default_factory=list)
     meanings: dict[str, Element] = field(default_factory=dict)
     """What the names of the pose and of defined quantities are if the pose is that of the arm."""
+
+    sum: tuple[tuple[int, int], ...] = ()
+    """The joints whose angles add up to phi, from 1, each with 1 or -1; empty without phi."""
 
     def __post_init__(self) -> None:
         chain = self.chain
@@ -191,8 +213,9 @@ class Workbench:
             return Unknown(f"theta{i}", i - 1, chain.cosine_and_sine(i))
         return Unknown(f"q{i}", i - 1, (chain.ring.position(i - 1),))
 
-    def phi(self, cosine: Element, sine: Element) -> Unknown:
+    def phi(self, cosine: Element, sine: Element, senses: Sequence[tuple[int, int]]) -> Unknown:
         """Return the angle phi as an unknown, with what its cosine and sine are for the arm itself."""
+        self.sum = tuple(senses)
         self._mean(("cphi", "sphi"), (cosine, sine))
         return Unknown("phi", None, tuple(self.chain.named(("cphi", "sphi"))))
 

@@ -29,7 +29,8 @@ def turn_spherical_wrist(bench: Workbench, R: Elements) -> None:
         Step(
             "theta4",
             "Joints 1 to 3 are known, and with them the axes of link 3. (ax, ay, az) is the direction of axis 6 in "
-            "them. Joint 4 turns about az until axis 6 lies in the plane that joint 5 swings it through.",
+            "them. Joint 4 turns until axis 6 lies in the plane that joint 5 swings it through; the sine of theta5 is "
+            "not known yet, and either sign of it gives a solution.",
             definitions,
             Flip(bench.unknown(4), {"k": k, "X": ax, "Y": ay}),
             "",
@@ -85,8 +86,8 @@ def turn_parallel_wrist(bench: Workbench, sense: Element) -> tuple[Element, Elem
         Step(
             "theta5",
             "Joint 1 is known, and with it the axes of axis 2's frame. (ax, ay, az) is the direction of axis 6 in "
-            "them. Joints 2, 3 and 4 turn about az and leave az as it is: it gives the angle between axis 6 and the "
-            "parallel axes.",
+            "them. Joints 2, 3 and 4 turn about its z axis and leave az as it is: it gives the angle between axis 6 "
+            "and the parallel axes.",
             definitions,
             CosineAndSquare(bench.unknown(5), {"X": -sense * s_alpha4 * s_alpha5 * az, "S": ax * ax + ay * ay}),
             "",

@@ -1,0 +1,207 @@
+"""Figures of derivations of inverse kinematics as SVG, drawn from an arm's numbers at one pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from html import escape
+
+import numpy as np
+
+from dhkit.description import Array
+from dhkit.symbolic.inverse.derivation import InverseDerivation, Values
+from dhkit.symbolic.inverse.forms import Circle, Form
+from dhkit.symbolic.inverse.steps import Figure, Step, View
+
+WIDTH, HEIGHT, MARGIN = 340, 250, 46
+"""Of a figure, in pixels."""
+FIRST, SECOND, PLAIN, FAINT = "#0b5cad", "#c2570c", "#1b1f24", "#8c959f"
+"""Colours of the two solutions, of points, and of helping lines."""
+SHORT = 1e-9
+"""Share of the figure's size below which a length is not drawn."""
+
+
+@dataclass
+class Drawing:
+    """Lines, circles and labels in the arm's metres."""
+
+    points: list[Array] = field(default_factory=list)
+    items: list[tuple[str, tuple[Array, ...], str, str]] = field(default_factory=list)
+
+    def line(self, a: Array, b: Array, colour: str, style: str = "") -> None:
+        """Add a line."""
+        self.points += [a, b]
+        self.items.append(("line", (a, b), colour, style))
+
+    def dot(self, at: Array, label: str, colour: str = PLAIN) -> None:
+        """Add a point with its name."""
+        self.points.append(at)
+        self.items.append(("dot", (at,), colour, label))
+
+    def label(self, a: Array, b: Array, text: str, colour: str) -> None:
+        """Add a text beside the middle of a line."""
+        self.items.append(("label", (a, b), colour, text))
+
+    def circle(self, centre: Array, radius: float) -> None:
+        """Add a dashed circle."""
+        self.points += [centre - radius, centre + radius]
+        self.items.append(("circle", (centre, np.array([radius, 0.0])), FAINT, ""))
+
+    def svg(self, title: str) -> str:
+        """Return the picture."""
+        low, high = np.min(self.points, axis=0), np.max(self.points, axis=0)
+        size = np.maximum(high - low, max(float((high - low).max()), 1e-9) * 0.05)
+        scale = float(min((WIDTH - 2 * MARGIN) / size[0], (HEIGHT - 2 * MARGIN) / size[1]))
+        middle = (low + high) / 2
+
+        def at(point: Array) -> tuple[float, float]:
+            x, y = (point - middle) * scale
+            return round(WIDTH / 2 + x, 1), round(HEIGHT / 2 - y, 1)
+
+        parts = [
+            f'<svg class="figure" role="img" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" '
+            f'xmlns="http://www.w3.org/2000/svg"><title>{escape(title)}</title>'
+        ]
+        for kind, points, colour, text in self.items:
+            places = [at(point) for point in points]
+            if kind == "line":
+                (x1, y1), (x2, y2) = places
+                dash = ' stroke-dasharray="5 4"' if text == "dashed" else ""
+                width = 1.2 if text == "dashed" else 3
+                parts.append(f'<path d="M{x1} {y1}L{x2} {y2}" stroke="{colour}" stroke-width="{width}"{dash}/>')
+            elif kind == "circle":
+                (x, y), radius = places[0], round(float(points[1][0]) * scale, 1)
+                parts.append(
+                    f'<circle cx="{x}" cy="{y}" r="{radius}" fill="none" stroke="{colour}" stroke-dasharray="3 3"/>'
+                )
+            elif kind == "dot":
+                ((x, y),) = places
+                parts.append(f'<circle cx="{x}" cy="{y}" r="4.5" fill="{colour}"/>')
+                parts.append(_text(x, y, text, colour, y > HEIGHT / 2))
+            else:
+                (x1, y1), (x2, y2) = places
+                parts.append(_beside((x1, y1), (x2, y2), text, colour))
+        return "".join([*parts, "</svg>"])
+
+
+def figure_of(derivation: InverseDerivation, step: Step, T: Array) -> str:
+    """Return the figure of a step at a pose T (4, 4), m; empty if it has none, or the pose has no solution."""
+    if step.figure is None or step.form is None:
+        return ""
+    found = [values for values, solved in derivation.candidates(T[None]) if solved[0]]
+    if not found:
+        return ""
+    draw = {View.TOP: _top, View.TRIANGLE: _triangle, View.SLIDE: _slide}[step.figure.view]
+    return draw(derivation, step.form, step.figure, found[0]).svg(f"{step.title}: {', '.join(step.figure.labels)}")
+
+
+def sample_pose(derivation: InverseDerivation) -> Array:
+    """Return a pose that the figures show, shape (4, 4), m: of a typical configuration."""
+    from dhkit.description import world_to_tool
+
+    description = derivation.description
+    named = description.numbers.configurations
+    q = named.get("nominal")
+    if q is None or not np.all(np.abs(q) > 0.05):
+        q = 0.35 + 0.3 * np.cos(np.arange(description.n) * 2.0)
+        q = np.where(description.numbers.prismatic, 0.4 * max(description.reach, 0.1), q)
+        q = q - np.array([_offset(derivation, i) for i in range(description.n)])
+    return world_to_tool(description, np.asarray(q))
+
+
+def _offset(derivation: InverseDerivation, i: int) -> float:
+    is_turning = derivation.description.kinds[i] == "R"
+    return derivation.chain.number(derivation.chain.offsets[i]) if is_turning else 0.0
+
+
+def _letters(form: Form, values: Values) -> dict[str, float]:
+    return {letter: float(np.ravel(values.of(element))[0]) for letter, element in form.letters.items()}
+
+
+def _top(derivation: InverseDerivation, form: Form, figure: Figure, values: Values) -> Drawing:
+    drawing, letters, origin = Drawing(), _letters(form, values), np.zeros(2)
+    axis, who = figure.labels
+    is_beside = isinstance(form, Circle)
+    point = np.array([letters["B"], -letters["A"]] if is_beside else [letters["X"], letters["Y"]])
+    beside = abs(letters["C"]) if is_beside else 0.0
+    for sign, colour in ((1.0, FIRST), (-1.0, SECOND)):
+        angle, _ = form.solve({k: np.array(v) for k, v in letters.items()}, sign)
+        ahead = np.array([np.cos(angle), np.sin(angle)])
+        foot = point - (point @ ahead) * ahead
+        if beside > SHORT * float(np.linalg.norm(point)):
+            drawing.line(origin, foot, colour, "dashed")
+            drawing.line(foot, point, colour)
+        elif sign > 0:
+            drawing.line(origin, point, colour)
+        tip = foot + 0.35 * float(np.linalg.norm(point)) * ahead
+        drawing.line(foot, tip, colour, "dashed")
+        drawing.label(foot, tip, "theta1" + (" + pi" if sign < 0 and not is_beside else ""), colour)
+    if beside:
+        drawing.circle(origin, beside)
+    drawing.dot(origin, axis)
+    drawing.dot(point, who)
+    return drawing
+
+
+def _place(derivation: InverseDerivation, values: Values) -> Array:
+    return np.array([float(np.ravel(values.of(derivation.chain.symbol(name)))[0]) for name in "xy"])
+
+
+def _triangle(derivation: InverseDerivation, form: Form, figure: Figure, values: Values) -> Drawing:
+    drawing, letters, origin = Drawing(), _letters(form, values), np.zeros(2)
+    point = _place(derivation, values)
+    R, N = float(np.linalg.norm(point)), float(np.hypot(letters["A"], letters["B"]))
+    L1 = float(np.hypot(*(np.ravel(values.of(element))[0] for element in figure.first)))
+    L2 = N / (2 * L1)
+    opening = np.arccos(np.clip((L1 * L1 + R * R - L2 * L2) / (2 * L1 * R), -1.0, 1.0))
+    first_axis, second_axis, who = figure.labels
+    for sign, colour in ((1.0, FIRST), (-1.0, SECOND)):
+        elbow = _turned(point, sign * opening) * L1 / R
+        drawing.line(origin, elbow, colour)
+        drawing.line(elbow, point, colour)
+        drawing.dot(elbow, second_axis, colour)
+    drawing.line(origin, point, FAINT, "dashed")
+    drawing.label(origin, point, "sqrt(x^2 + y^2)", FAINT)
+    drawing.dot(origin, first_axis)
+    drawing.dot(point, who)
+    return drawing
+
+
+def _slide(derivation: InverseDerivation, form: Form, figure: Figure, values: Values) -> Drawing:
+    drawing, letters, origin = Drawing(), _letters(form, values), np.zeros(2)
+    point = _place(derivation, values)
+    R, near = float(np.linalg.norm(point)), float(np.sqrt(max(letters["Q"] - letters["S"], 0.0)))
+    axis, who = figure.labels
+    if near > SHORT * R:
+        for sign, colour in ((1.0, FIRST), (-1.0, SECOND)):
+            foot = _turned(point, sign * np.arccos(near / R)) * near / R
+            drawing.line(origin, foot, colour, "dashed")
+            drawing.line(foot, point, colour)
+        drawing.line(origin, point, FAINT, "dashed")
+    else:
+        drawing.line(origin, point, FIRST)
+    drawing.label(origin, point, "sqrt(x^2 + y^2)", FAINT)
+    drawing.dot(origin, axis)
+    drawing.dot(point, who)
+    return drawing
+
+
+def _turned(vector: Array, angle: float) -> Array:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]])
+
+
+def _text(x: float, y: float, text: str, colour: str, below: bool) -> str:
+    anchor = "start" if x < WIDTH / 3 else "end" if x > 2 * WIDTH / 3 else "middle"
+    y += 18 if below else -10
+    return f'<text x="{x}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}">{escape(text)}</text>'
+
+
+def _beside(a: Sequence[float], b: Sequence[float], text: str, colour: str) -> str:
+    """Return a text beside the middle of a line, on its right where it rises and on its left where it falls."""
+    (x1, y1), (x2, y2) = a, b
+    x, y = (x1 + x2) / 2, (y1 + y2) / 2
+    length = max(float(np.hypot(x2 - x1, y2 - y1)), 1.0)
+    nx, ny = 12 * (y2 - y1) / length, -12 * (x2 - x1) / length
+    anchor = "start" if nx > 4 else "end" if nx < -4 else "middle"
+    return f'<text x="{x + nx:.1f}" y="{y + ny + 4:.1f}" text-anchor="{anchor}" fill="{colour}">{escape(text)}</text>'

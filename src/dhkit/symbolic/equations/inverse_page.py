@@ -1,0 +1,106 @@
+"""A derivation of inverse kinematics as a page of HTML with MathML and figures, without scripts or other files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from html import escape
+
+from dhkit.description import DHTable
+from dhkit.symbolic.equations.html import equation_mathml, html_page
+from dhkit.symbolic.equations.inverse_figures import figure_of, sample_pose
+from dhkit.symbolic.equations.inverse_text import GIVEN, branches_sentence, introduction, rule_in_dollars
+from dhkit.symbolic.equations.inverse_writing import Phrases, solved_before
+from dhkit.symbolic.inverse.derivation import InverseDerivation
+from dhkit.symbolic.inverse.steps import Step
+
+STYLE = """<style>
+.ik-step { display: flow-root; }
+.ik-step svg.figure { float: right; max-width: 100%; height: auto; margin: 0 0 .5rem 1.5rem; }
+svg.figure text { font: 13px sans-serif; } .ik-step .solution { background: #f3f6fa; border-left: 3px solid #0b5cad; }
+.ik-step .display + .display { padding-top: 0; } .ik-step p { margin: .35rem 0; }
+.ik-known { color: #57606a; }
+</style>"""
+ANGLE = re.compile(r"\b(theta)(\d+)\b|\bphi\b")
+
+
+def inverse_page(derivation: InverseDerivation) -> str:
+    """Return a derivation as one page of HTML."""
+    name = derivation.description.name
+    source = derivation.description.source
+    head = [
+        f"<h1>{escape(name)}: inverse kinematics, step by step</h1>",
+        f'<p class="source">{escape(source)}</p>' if source else "",
+        "<h2>Denavit-Hartenberg table</h2>",
+        DHTable.of(derivation.description)._repr_html_(),
+    ]
+    return html_page(f"{name}: inverse kinematics", "\n".join([*filter(None, head), inverse_body(derivation)]))
+
+
+def inverse_body(derivation: InverseDerivation) -> str:
+    """Return a derivation as HTML to stand inside a page or a notebook."""
+    write, T = Phrases(derivation, latex=True), sample_pose(derivation)
+    first, given, angles = introduction(derivation)
+    parts = [STYLE, f"<p>{escape(first)} {escape(given or GIVEN)}</p>", f"<p>{_words(angles)}</p>"]
+    for number, step in enumerate(derivation.steps, start=1):
+        title = _words(step.unknown.name if step.unknown else step.title)
+        parts.append(f'<section class="ik-step"><h2>{number}. {title}</h2>')
+        parts.append(figure_of(derivation, step, T))
+        parts += [*_step(derivation, write, step), "</section>"]
+    joints = list(write.joint_values())
+    if joints:
+        parts.append("<h2>Joint values</h2><p>Turned into (−π, π]:</p>")
+        parts += [_display(f"{name} = {value}") for name, value in joints]
+    for condition in derivation.conditions:
+        parts.append(f"<p>{escape(condition.look)}</p>")
+        parts.append(_display(f"{write.element(condition.left)} = {write.element(condition.right)}"))
+    parts.append(f"<p>{escape(branches_sentence(derivation))}</p>")
+    parts += [f'<p class="note">{escape(note)}</p>' for note in derivation.notes]
+    return "\n".join(filter(None, parts))
+
+
+def _step(derivation: InverseDerivation, write: Phrases, step: Step) -> Iterator[str]:
+    yield f"<p>{_words(step.look)}</p>"
+    for definition in step.definitions:
+        yield _display(f"{write.name(definition.name)} = {write.element(definition.element)}")
+    if step.form is None:
+        return
+    if used := solved_before(derivation, step):
+        yield f'<p class="ik-known">Known from before: {_words(", ".join(used))}.</p>'
+    solution = write.solution(step.form)
+    solved = (solution.unknown, solution.alternatives[0])
+    for left, right in write.equations(step):
+        if (left, right) != solved:
+            yield _display(f"{left} = {right}")
+    alternatives = r" \quad\text{or}\quad ".join(solution.alternatives)
+    yield _display(f"{solution.unknown} = {alternatives}", "display solution")
+    for letter, value in solution.letters:
+        yield _display(f"{letter} = {value}")
+    if step.choice:
+        yield f"<p>The two solutions: {_sentence(rule_in_dollars(write, step.choice))}.</p>"
+    for head, text in (("No solution where", step.nothing), ("Singular where", step.singular)):
+        if text:
+            yield f"<p>{head} {_words(text)}.</p>"
+
+
+def _display(latex: str, kind: str = "display") -> str:
+    return f'<div class="{kind}">{equation_mathml(latex)}</div>'
+
+
+def _sentence(text: str) -> str:
+    """Return a sentence with its formulas between dollar signs as MathML in the line."""
+    parts = text.split("$")
+    return "".join(_inline(part) if k % 2 else escape(part) for k, part in enumerate(parts))
+
+
+def _inline(latex: str) -> str:
+    return equation_mathml(latex).replace('display="block"', 'display="inline"')
+
+
+def _words(text: str) -> str:
+    """Return words with the names of angles as MathML."""
+    parts, at = [], 0
+    for match in ANGLE.finditer(text):
+        parts += [escape(text[at : match.start()]), _inline(rf"\theta_{{{match[2]}}}" if match[1] else r"\varphi")]
+        at = match.end()
+    return "".join([*parts, escape(text[at:])])

@@ -1,0 +1,295 @@
+"""A derivation of inverse kinematics as a program: the statements that code in any language consists of."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from dhkit.symbolic.equations.collected import collected
+from dhkit.symbolic.equations.inverse_writing import PLACEHOLDER
+from dhkit.symbolic.equations.programs import RESERVED, harmless, identifier
+from dhkit.symbolic.equations.writing import Printer
+from dhkit.symbolic.inverse.chain import POSE
+from dhkit.symbolic.inverse.derivation import IN_PLANE, InverseDerivation, in_branch_order
+from dhkit.symbolic.inverse.forms import ROUNDING, Form, Remainder
+from dhkit.symbolic.inverse.steps import Choice, Step
+from dhkit.symbolic.ring import Element, Generator
+from dhkit.symbolic.ring.notation import constants_of, generators_of, symbols_of
+from dhkit.symbolic.syntax import Syntax
+
+LETTER = re.compile(r"\b[A-Zk]\b")
+LOCAL = frozenset(["T", "q", "b", "k", "status", "wrap", "root", "branches", "found", "nargin", "true", "false"])
+"""Names that the code around the statements uses."""
+
+
+@dataclass(frozen=True)
+class Comment:
+    """A comment, which begins a step."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """A variable and its expression."""
+
+    name: str
+    expression: str
+
+
+@dataclass(frozen=True)
+class Guard:
+    """There is no solution unless an expression is at least another one."""
+
+    expression: str
+    least: str
+
+
+@dataclass(frozen=True)
+class Digit:
+    """The next binary digit of the branch's index: whether an odd number of expressions is negative, or an even one."""
+
+    expressions: tuple[str, ...]
+    is_inverted: bool
+
+
+Statement = Comment | Assignment | Guard | Digit
+
+
+@dataclass(frozen=True)
+class InverseProgram:
+    """Statements that compute one branch, for signs root1, root2 ... of the roots.
+
+    Attributes
+    ----------
+    robot, name
+        The robot's name, safe in comments, and as an identifier.
+    n, roots
+        Numbers of joints and of roots.
+    branches
+        Names of the branches.
+    constants
+        Names and values of the constants, SI.
+    pose
+        Entries of the pose that are used: name, row and column from 0.
+    statements
+        In their order.
+    joints
+        Expressions of the joint values.
+    turning
+        Which of them are angles.
+    words
+        Sentences about the derivation.
+    """
+
+    robot: str
+    name: str
+    n: int
+    roots: int
+    branches: tuple[str, ...]
+    constants: tuple[tuple[str, float], ...]
+    pose: tuple[tuple[str, int, int], ...]
+    statements: tuple[Statement, ...]
+    joints: tuple[str, ...]
+    turning: tuple[bool, ...]
+    words: tuple[str, ...]
+
+
+class CodeWriter:
+    """Writes expressions with ``+ - * /`` and calls, which all languages share."""
+
+    def __init__(self, syntax: Syntax, names: dict[str, str]) -> None:
+        self._syntax, self._names = syntax, names
+
+    def symbol(self, name: str) -> str:  # noqa: D102 - see Writer
+        return self._names[name]
+
+    def variable(self, generator: Generator) -> str:  # noqa: D102
+        return generator.text
+
+    def pi(self) -> str:  # noqa: D102
+        return self._syntax.pi
+
+    def call(self, function: str, arguments: Sequence[str]) -> str:  # noqa: D102
+        return self._syntax.call(function, arguments)
+
+    def power(self, base: str, exponent: int) -> str:  # noqa: D102
+        return "*".join([base] * exponent)
+
+    def brackets(self, inner: str) -> str:  # noqa: D102
+        return f"({inner})"
+
+    def product(self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]) -> str:  # noqa: D102
+        exact = Fraction(float(coefficient)) == coefficient
+        number = repr(float(coefficient)) if exact else f"({coefficient.numerator}.0/{coefficient.denominator}.0)"
+        factors = [*([number] if coefficient != 1 or not numerator else []), *numerator]
+        return "*".join(factors) + "".join(f"/{divisor}" for divisor in denominator)
+
+    def total(self, terms: Sequence[tuple[bool, str]]) -> str:  # noqa: D102
+        signed = "".join(f" {'-' if negative else '+'} {term}" for negative, term in terms)
+        return f"-{signed[3:]}" if signed.startswith(" - ") else signed[3:]
+
+
+def inverse_program(derivation: InverseDerivation, syntax: Syntax) -> InverseProgram:
+    """Return a derivation as a program; expressions are in a language's syntax."""
+    return _Statements(derivation, syntax).program()
+
+
+class _Statements:
+    def __init__(self, derivation: InverseDerivation, syntax: Syntax) -> None:
+        self.derivation, self.chain, self.syntax = derivation, derivation.chain, syntax
+        elements = self._elements()
+        ring = self.chain.ring
+        variables = {g.text for g in ring.generators if g.kind != "constant"}
+        taken = {*RESERVED, *LOCAL, *variables, *(f"theta{i + 1}" for i in range(derivation.n)), "phi"}
+        taken |= {f"root{k + 1}" for k in range(derivation.n)}
+        self.names: dict[str, str] = {}
+        for name in sorted(symbols_of(constants_of(generators_of(elements)))):
+            own = identifier(name)
+            while own in taken or own in self.names.values() or re.fullmatch(r"[A-Zk]\w*_", own):
+                own += "_"
+            self.names[name] = own
+        self.used = {g.text for g in generators_of(elements)}
+        self.printer: Printer[str] = Printer(ring.generators, CodeWriter(syntax, self.names))
+        self.root = 0
+
+    def program(self) -> InverseProgram:
+        derivation, chain = self.derivation, self.chain
+        pose = {chain.names[name]: name for name in POSE}
+        entries = [(self.names[own], *_entry(name)) for own, name in pose.items() if own in self.names]
+        constants = [(self.names[name], value) for name, value in chain.lengths.items() if name in self.names]
+        statements = [statement for step in derivation.steps for statement in self._step(step)]
+        statements += self._conditions()
+        statements += [self._digit(choice) for choice in derivation.choices]
+        turning = tuple(kind == "R" for kind in derivation.description.kinds)
+        words = (derivation.geometry, *(note for note in derivation.notes))
+        return InverseProgram(
+            harmless(derivation.description.name),
+            identifier(derivation.description.name),
+            derivation.n,
+            self.root,
+            derivation.branches,
+            tuple(constants),
+            tuple(entries),
+            tuple(statements),
+            tuple(self._joint(i) for i in range(derivation.n)),
+            turning,
+            words,
+        )
+
+    def _elements(self) -> list[Element]:
+        derivation = self.derivation
+        found = [d.element for step in derivation.steps for d in step.definitions]
+        for step in derivation.steps:
+            if step.form is not None and not isinstance(step.form, Remainder):
+                found += [step.form.letters[letter] for letter in self._letters(step.form)]
+            found += step.choice.factors if step.choice else ()
+        return found + [side for c in derivation.conditions for side in (c.left, c.right)]
+
+    def _text(self, element: Element) -> str:
+        return self.printer.sum(collected(element))
+
+    def _step(self, step: Step) -> Iterator[Statement]:
+        head = step.unknown.name if step.unknown else step.title
+        yield Comment(f"{head}: {step.look}")
+        for definition in step.definitions:
+            yield Assignment(self.names[definition.name], self._text(definition.element))
+        if step.form is None:
+            return
+        yield from self._solution(step.form)
+        unknown = step.form.unknown
+        if unknown.is_angle:
+            functions = ("cos", "sin")
+            for function, symbol in zip(functions, unknown.symbols, strict=True):
+                (generator,) = generators_of([symbol])
+                if generator.text in self.used:
+                    own = self.names.get(generator.text, generator.text)
+                    yield Assignment(own, self.syntax.call(function, [unknown.name]))
+
+    def _solution(self, form: Form) -> Iterator[Statement]:
+        name = form.unknown.name
+        if isinstance(form, Remainder):
+            signed = "".join(f" {'+' if sign > 0 else '-'} {angle}" for angle, sign in form.terms)
+            yield Assignment(name, signed[3:] if signed.startswith(" + ") else f"-{signed[3:]}")
+            return
+        words = self._words(form)
+        guard, least = (self._filled(text, words) for text in form.guard)
+        letters: dict[str, str] = {}
+        for letter in self._letters(form):
+            text = self._text(form.letters[letter])
+            if re.fullmatch(r"[A-Za-z]\w*", text):
+                letters[letter] = text
+            else:
+                letters[letter] = f"{letter}_{name}"
+                yield Assignment(letters[letter], text)
+
+        def in_letters(text: str) -> str:
+            return LETTER.sub(lambda match: letters[match[0]], text)
+
+        if "D" in words:
+            yield Assignment(f"D_{name}", in_letters(words["D"]))
+            guard = words["D"] = f"D_{name}"
+        if guard:
+            yield Guard(in_letters(guard), f"-{ROUNDING!r}*({in_letters(least)})")
+        sign = "1.0"
+        if form.has_two_roots:
+            self.root += 1
+            sign = f"root{self.root}"
+        expression = self._filled(form.code.replace("<s>", "SIGN"), words)
+        # A derived sum is a factor or an argument alone, so that it needs no brackets.
+        expression = in_letters(expression).replace("SIGN", sign)
+        yield Assignment(name, self._calls(expression))
+
+    def _calls(self, expression: str) -> str:
+        return re.sub(r"\batan2\(", f"{self.syntax.functions.get('atan2', 'atan2')}(", expression)
+
+    def _words(self, form: Form) -> dict[str, str]:
+        """Return what stands in the code of a form, in its letters; squares are written as products."""
+        derived = {k: re.sub(r"\b([A-Zk])\^2", r"\1*\1", text) for k, (text, _) in form.derived.items()}
+        return {k: derived.get(k, k) for k in self._placeholders(form)}
+
+    def _letters(self, form: Form) -> list[str]:
+        """Return the letters that the code of a form contains."""
+        words = self._words(form)
+        texts = [*words.values(), *(self._filled(text, words) for text in form.guard)]
+        return sorted({letter for text in texts for letter in LETTER.findall(text)} & set(form.letters))
+
+    @staticmethod
+    def _placeholders(form: Form) -> list[str]:
+        return [k for k in PLACEHOLDER.findall(" ".join([form.code, *form.guard])) if k != "s"]
+
+    @staticmethod
+    def _filled(template: str, words: dict[str, str]) -> str:
+        return PLACEHOLDER.sub(lambda match: words[match[1]], template)
+
+    def _conditions(self) -> Iterator[Statement]:
+        reach = max(self.derivation.description.reach, 1e-9)
+        for condition in self.derivation.conditions:
+            yield Comment(condition.look)
+            yield Assignment("off", f"{self._text(condition.left)} - ({self._text(condition.right)})")
+            yield Guard(repr(IN_PLANE * reach), self.syntax.call("abs", ["off"]))
+
+    def _digit(self, choice: Choice) -> Digit:
+        is_inverted = in_branch_order(choice)[0] != choice.names[0]
+        texts = []
+        for factor in choice.factors:
+            if len(factor) == 1 and not any(next(iter(factor.terms))):
+                is_inverted ^= next(iter(factor.terms.values())) < 0
+            elif len(factor):
+                texts.append(self._text(factor))
+        return Digit(tuple(texts), is_inverted)
+
+    def _joint(self, i: int) -> str:
+        if self.derivation.description.kinds[i] != "R":
+            return f"q{i + 1}"
+        offset = self.chain.number(self.chain.offsets[i])
+        if offset == 0:
+            return f"theta{i + 1}"
+        return f"theta{i + 1} {'-' if offset > 0 else '+'} {abs(offset)!r}"
+
+
+def _entry(name: str) -> tuple[int, int]:
+    """Return row and column, from 0, of an entry of the pose by its name."""
+    return ("xyz".index(name[1]), 3) if name[0] == "p" else (int(name[1]) - 1, int(name[2]) - 1)

@@ -1,0 +1,138 @@
+"""Derivations of inverse kinematics as text and as LaTeX."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+
+from dhkit.symbolic.equations.inverse_writing import Phrases, phi_label, solved_before
+from dhkit.symbolic.equations.latex_document import escaped
+from dhkit.symbolic.equations.text import WIDTH, broken_lines
+from dhkit.symbolic.inverse.derivation import InverseDerivation
+from dhkit.symbolic.inverse.steps import Choice, Step
+
+GIVEN = "Given is the pose T of the tool in the world: its position px, py, pz and its rotation r11 ... r33."
+
+
+def inverse_text(derivation: InverseDerivation) -> str:
+    """Return a derivation as text, step by step."""
+    write = Phrases(derivation, latex=False)
+    lines = [f"{derivation.description.name}: inverse kinematics, step by step", ""]
+    for sentence in introduction(derivation):
+        lines += textwrap.wrap(sentence, WIDTH)
+    for number, step in enumerate(derivation.steps, start=1):
+        lines += ["", f"{number}. {_title(write, step)}", *_step(derivation, write, step)]
+    joints = list(write.joint_values())
+    if joints:
+        lines += ["", "Joint values, turned into (-pi, pi]", *(f"   {name} = {value}" for name, value in joints)]
+    for condition in derivation.conditions:
+        left, right = write.element(condition.left), write.element(condition.right)
+        lines += ["", *textwrap.wrap(condition.look, WIDTH), *broken_lines(f"   {left} = ", right)]
+    lines += ["", *textwrap.wrap(branches_sentence(derivation), WIDTH)]
+    for note in derivation.notes:
+        lines += textwrap.wrap(f"note: {note}", WIDTH)
+    return "\n".join(lines) + "\n"
+
+
+def introduction(derivation: InverseDerivation) -> list[str]:
+    """Return the sentences before the first step."""
+    offsets = [
+        i for i, x in enumerate(derivation.chain.offsets) if not x.is_zero and derivation.description.kinds[i] == "R"
+    ]
+    angle = "theta_i is the table's angle of joint i: "
+    angle += "the joint value q_i plus its offset" if offsets else "the joint value q_i"
+    symbols = "s1 and c1 are sin(theta1) and cos(theta1)"
+    label = phi_label(derivation)
+    if derivation.sum and label != "phi":
+        summed = " + ".join(f"theta{i}" for i, _ in derivation.sum)
+        symbols += f", s{label} and c{label} those of {summed}"
+    elif derivation.sum:
+        symbols += ", sphi and cphi those of phi"
+    return [f"{derivation.geometry[0].upper()}{derivation.geometry[1:]}.", GIVEN, f"{angle}; {symbols}."]
+
+
+def branches_sentence(derivation: InverseDerivation) -> str:
+    """Return a sentence about the branches."""
+    count = len(derivation.branches)
+    aims = " They point the tool at the pose's origin, at whatever distance." if derivation.family.aims else ""
+    return f"{count} branches: {', '.join(derivation.branches)}.{aims}"
+
+
+def _title(write: Phrases, step: Step) -> str:
+    return write.unknown(step.unknown) if step.unknown else step.title
+
+
+def _step(derivation: InverseDerivation, write: Phrases, step: Step) -> Iterator[str]:
+    indent = "   "
+    yield from textwrap.wrap(step.look, WIDTH, initial_indent=indent, subsequent_indent=indent)
+    for definition in step.definitions:
+        yield from broken_lines(f"{indent}{write.name(definition.name)} = ", write.element(definition.element))
+    if step.form is None:
+        return
+    if used := solved_before(derivation, step):
+        yield f"{indent}known from before: {', '.join(used)}"
+    equations = write.equations(step)
+    solution = write.solution(step.form)
+    if equations != [(solution.unknown, solution.alternatives[0])]:
+        for left, right in equations:
+            yield from broken_lines(f"{indent}{left} = ", right)
+    yield f"{indent}{solution.unknown} = {' or '.join(solution.alternatives)}"
+    for letter, value in solution.letters:
+        yield from broken_lines(f"{indent}with {letter} = ", value)
+    if step.choice:
+        yield from textwrap.wrap(
+            f"the two solutions: {write.rule(step.choice)}", WIDTH, initial_indent=indent, subsequent_indent=indent
+        )
+    for head, text in (("no solution where", step.nothing), ("singular where", step.singular)):
+        if text:
+            yield from textwrap.wrap(f"{head} {text}", WIDTH, initial_indent=indent, subsequent_indent=indent)
+
+
+def inverse_latex(derivation: InverseDerivation) -> str:
+    """Return a derivation in LaTeX, for a page that loads amsmath."""
+    write = Phrases(derivation, latex=True)
+    parts = [" ".join(escaped(sentence) for sentence in introduction(derivation))]
+    for step in derivation.steps:
+        title = f"${write.unknown(step.unknown)}$" if step.unknown else escaped(step.title)
+        parts += [rf"\subsection*{{{title}}}", escaped(step.look)]
+        displays = [(write.name(definition.name), write.element(definition.element)) for definition in step.definitions]
+        if step.form is not None:
+            solution = write.solution(step.form)
+            solved = (solution.unknown, r" \quad\text{or}\quad ".join(solution.alternatives))
+            displays += [pair for pair in write.equations(step) if pair != solved]
+            displays += [solved, *solution.letters]
+        rows = [f"{left} &= {right}" for left, right in displays]
+        parts.append("\\begin{align*}\n" + " \\\\\n".join(rows) + "\n\\end{align*}")
+        if step.choice:
+            parts.append(latex_sentence(f"The two solutions: {rule_in_dollars(write, step.choice)}."))
+        parts += [
+            escaped(f"{head} {text}.")
+            for head, text in (("No solution where", step.nothing), ("Singular where", step.singular))
+            if text
+        ]
+    joints = [f"{name} &= {value}" for name, value in write.joint_values()]
+    if joints:
+        parts += [
+            r"\subsection*{Joint values, turned into $(-\pi, \pi]$}",
+            "\\begin{align*}\n" + " \\\\\n".join(joints) + "\n\\end{align*}",
+        ]
+    for condition in derivation.conditions:
+        sides = f"{write.element(condition.left)} &= {write.element(condition.right)}"
+        parts += [escaped(condition.look), f"\\begin{{align*}}\n{sides}\n\\end{{align*}}"]
+    parts += [escaped(branches_sentence(derivation)), *(escaped(f"Note: {note}.") for note in derivation.notes)]
+    return "\n\n".join(parts) + "\n"
+
+
+def rule_in_dollars(write: Phrases, choice: Choice) -> str:
+    """Return the rule that names two roots, with its formulas between dollar signs."""
+    factors = [write.element(factor) for factor in choice.factors]
+    text = write.rule(choice)
+    for factor in sorted(factors, key=len, reverse=True):
+        text = text.replace(factor, f"${factor}$") if len(factor) > 1 else text
+    return text
+
+
+def latex_sentence(text: str) -> str:
+    """Return a sentence whose formulas stand between dollar signs in LaTeX."""
+    parts = text.split("$")
+    return "$".join(part if k % 2 else escaped(part) for k, part in enumerate(parts))
