@@ -73,8 +73,12 @@ class SceneKind:
         return f"{self.robot}{spheres}{' and itself' * self.self_collision}"
 
 
-KINDS = tuple(SceneKind(robot) for robot in ARMS)
-TEN_SPHERES = tuple(SceneKind(robot, (10, 10), has_boxes=False, self_collision=robot == "puma560") for robot in ARMS)
+KINDS = {
+    "mixed": tuple(SceneKind(robot) for robot in ARMS),
+    "spheres": tuple(SceneKind(robot, (10, 10), has_boxes=False) for robot in ("ur5", "panda")),
+    "itself": (SceneKind("puma560", (10, 10), has_boxes=False, self_collision=True),),
+}
+"""Kinds of scenes by name: 3 to 10 boxes and spheres, ten spheres, and ten spheres with self-collision."""
 
 
 @dataclass(frozen=True)
@@ -230,7 +234,7 @@ class SceneReport:
 def compare_scenes(
     count: int = 200,
     *,
-    kinds: Sequence[SceneKind] = KINDS,
+    kinds: Sequence[SceneKind] = KINDS["mixed"],
     compared: int = 40,
     starts: int = 20,
     seed: int = 0,
@@ -358,14 +362,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description="Motions among obstacles in scenes that OMPL solves.")
     parser.add_argument("--scenes", type=int, default=200, help="number of scenes (default: 200)")
     parser.add_argument("--compared", type=int, default=40, help="scenes compared with other starts (default: 40)")
-    parser.add_argument("--ten-spheres", action="store_true", help="ten spheres; the PUMA avoids itself too")
+    parser.add_argument("--kind", choices=[*KINDS], default="mixed", help="kind of scenes (default: mixed)")
     parser.add_argument("--starts", type=int, default=20, help="number of other starts (default: 20)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--output", type=Path, default=RESULT, help="path of the results, without ending")
     chosen = parser.parse_args(arguments)
     report = compare_scenes(
         chosen.scenes,
-        kinds=TEN_SPHERES if chosen.ten_spheres else KINDS,
+        kinds=KINDS[chosen.kind],
         compared=chosen.compared,
         starts=chosen.starts,
         seed=chosen.seed,

@@ -38,6 +38,7 @@ TORQUE_SAMPLES = 801
 LEAST_TIME = "least time"
 PAGES = {
     "equations.html": "the equations of motion",
+    "ik.html": "inverse kinematics worked out",
     "plan.html": "motions in least time",
     "control.html": "simulated controllers",
 }
@@ -90,7 +91,7 @@ def demo(
     stage("figure", lambda: _figure(arm, folder / f"{arm.name}.png"))
     shown: list[InverseKinematics] = []
     motions: dict[str, Motion] = {}
-    stage("ik", lambda: _inverse(arm, shown))
+    stage("ik", lambda: _inverse(arm, folder, shown))
     stage("plan", lambda: _plan(arm, folder, 16 if quick else None, motions))
     stage("control", lambda: _control(arm, folder, motions))
     stage("page", lambda: _page(arm, shown[0], folder / "index.html", motions))
@@ -151,13 +152,20 @@ def _figure(arm: Arm, path: Path) -> str:
     return str(write_figure(plot_arm(arm.description, configurations[shown] if shown else np.zeros(arm.n)), path))
 
 
-def _inverse(arm: Arm, shown: list[InverseKinematics]) -> str:
+def _inverse(arm: Arm, folder: Path, shown: list[InverseKinematics]) -> str:
+    """Solve a pose, follow a line, and write the derivation of closed forms as a page."""
     from dhkit.viewer.scene import first_configuration
 
     line = straight_line(arm)
     solutions = branches(arm, first_configuration(arm.description) if line is None else line.q[0])
     shown.append(InverseKinematics(solutions, line))
-    return f"{_branches_text(solutions)}; {_line_text(line)}"
+    worked_out = ""
+    if solutions.closed_form:
+        derivation = arm.symbolic.ik
+        write_atomically(folder / "ik.html", derivation.html())
+        verdict = "proved" if derivation.prove() else "NOT PROVED"
+        worked_out = f"; worked out and {verdict}: {folder / 'ik.html'}"
+    return f"{_branches_text(solutions)}; {_line_text(line)}{worked_out}"
 
 
 def _branches_text(branches: Branches) -> str:

@@ -10,7 +10,8 @@ from dhkit.description import Description, Robot, library_robot, read_robot, rob
 from dhkit.description.robot import description_of, takes_robot
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.objects import entries_of
-from dhkit.grading.answers.sheet import AnswerSheet, Names, quantity_names, read_sheet, sheet_of
+from dhkit.grading.answers.sheet import quantity_names, read_sheet, sheet_of
+from dhkit.grading.answers.sheet_values import AnswerSheet, Names
 from dhkit.grading.answers.sources import SHEET_SUFFIXES, read_source
 from dhkit.grading.judging.truth import truth_of
 from dhkit.grading.mistakes.diagnosis import variants_of

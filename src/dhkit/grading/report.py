@@ -212,6 +212,8 @@ class NoteKind(Enum):
     """The number of solutions is unknown: dhkit has no closed form for the arm."""
     SOLUTIONS_MISSING = "solutions_missing"
     """The branches give ``values[0]`` of the ``values[1]`` solutions that the arm has in general."""
+    ROOTS_MISSING = "roots_missing"
+    """A step gives ``values[0]`` of the ``values[1]`` values that its joint has in general."""
     PROGRAM = "program"
     """How a program or paper was read: ``values`` has the reader's text, with its line."""
 

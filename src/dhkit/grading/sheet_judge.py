@@ -23,7 +23,8 @@ from dhkit.grading.answers.given import (
     with_entries_gathered,
 )
 from dhkit.grading.answers.quantity_names import QuantityNames
-from dhkit.grading.answers.sheet import ALIASES, AnswerSheet, quantity_names, shape_of
+from dhkit.grading.answers.sheet import ALIASES, quantity_names, shape_of
+from dhkit.grading.answers.sheet_values import AnswerSheet
 from dhkit.grading.answers.typeset import typeset
 from dhkit.grading.answers.vocabulary import Vocabulary
 from dhkit.grading.judging.consistency import Consistency
@@ -171,7 +172,7 @@ class _SheetJudge:
         """Judge the table and the inverse kinematics; return them, and the errors of those that were refused."""
         judged: list[KinematicJudgement] = []
         refused: dict[str, DhkitError] = {}
-        for name, is_given in (("dh", self.sheet.table), ("ik", self.sheet.branches)):
+        for name, is_given in (("dh", self.sheet.table), ("ik", self.sheet.branches or self.sheet.steps)):
             if is_given:
                 try:
                     judged.append(self._table() if name == "dh" else self._inverse(explain))
@@ -196,6 +197,12 @@ class _SheetJudge:
 
         description = self.truth.description
         vocabulary = vocabulary_of(description, self.sheet, inverse=True)
+        if self.sheet.steps:
+            from dhkit.grading.answers.inverse_steps import given_steps
+            from dhkit.grading.judging.inverse_steps import judge_steps
+
+            steps = given_steps(self.sheet.steps, vocabulary)
+            return judge_steps(description, steps, seed=self.seed, explain=explain)
         return _judge_rows(
             "ik",
             given_branches(self.sheet.branches, description.n, vocabulary),

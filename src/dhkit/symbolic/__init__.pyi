@@ -43,6 +43,7 @@ from .exact.exact_arm import ExactArm as ExactArm, exact_arm as exact_arm
 from .exact.lagrangian import Lagrangian as Lagrangian, Proof as Proof, lagrangian as lagrangian
 from .exact.naming import Symbols as Symbols
 from .exact.regressor import Regressor as Regressor
+from .inverse.chain import table_lengths as table_lengths
 from .inverse.derivation import (
     InverseDerivation as InverseDerivation,
     InverseProof as InverseProof,

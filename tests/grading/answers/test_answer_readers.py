@@ -23,7 +23,7 @@ from dhkit.grading.answers.programs.python_effects import bound_names, part_name
 from dhkit.grading.answers.programs.python_formulas import PythonFormulas
 from dhkit.grading.answers.programs.python_text import PythonText, ascii_name
 from dhkit.grading.answers.quantity_names import QuantityNames
-from dhkit.grading.answers.sheet import AnswerSheet
+from dhkit.grading.answers.sheet_values import AnswerSheet
 from dhkit.grading.answers.tokens import replace_runs, split_tokens
 
 

@@ -9,7 +9,7 @@ from acceptance import only_accepting
 from dhkit.description import Convention, from_dh, library_robot, robots
 from dhkit.errors import AnswerError
 from dhkit.expressions import read
-from dhkit.grading.answers.sheet import Requirements
+from dhkit.grading.answers.sheet_values import Requirements
 from dhkit.grading.judging.tables import judge_table
 from dhkit.grading.mistakes.library import LIBRARY
 from dhkit.grading.report import Note, NoteKind, Verdict

@@ -21,9 +21,10 @@ from dhkit.grading.answers.objects import entry_tree, is_entry
 from dhkit.grading.answers.pretty import is_pretty
 from dhkit.grading.answers.quantity_names import QuantityNames, Target
 from dhkit.grading.answers.reading import meaning_of
-from dhkit.grading.answers.sheet import AnswerSheet, Chain, Entries, Refusal
+from dhkit.grading.answers.sheet_values import AnswerSheet, Chain, Entries, Refusal
 from dhkit.grading.answers.tokens import quote
 from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
+from dhkit.symbolic import table_lengths
 
 LEFT_EMPTY = "left empty"
 """Error of an entry that was not handed in."""
@@ -103,10 +104,11 @@ def vocabulary_of(
     AnswerError
         A name that stands for two things, or one made of names that the robot does not have.
     """
-    further = POSE_NAMES if inverse else ()
+    further = (*POSE_NAMES, *table_lengths(description)) if inverse else ()
     names = sheet.names
     vocabulary = Vocabulary(description, q=names.q, qd=names.qd, qdd=names.qdd, sums=sums, further=further)
-    texts = _texts([sheet.answers, sheet.table, sheet.branches, names.parameters])
+    steps = [text for step in sheet.steps for text in (*step.equations, *step.solutions)]
+    texts = _texts([sheet.answers, sheet.table, sheet.branches, steps, names.parameters])
     vocabulary.first_index = first_index(texts, vocabulary)
     if vocabulary.first_index is None and sheet.file.endswith((".py", ".ipynb")):
         vocabulary.first_index = 0

@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
 from typing import TypeVar
@@ -13,6 +12,15 @@ from typing import TypeVar
 from dhkit.description.files import read_bounded
 from dhkit.description.toml_text import toml_document
 from dhkit.errors import AnswerError, DescriptionError
+from dhkit.grading.answers.sheet_values import (
+    AnswerSheet,
+    Chain,
+    Entries,
+    InverseStep,
+    Names,
+    Refusal,
+    Requirements,
+)
 
 T = TypeVar("T")
 
@@ -28,6 +36,9 @@ MAX_NAMES = 100
 MAX_BRANCHES = 64
 """Largest number of branches of inverse kinematics."""
 
+MAX_STEPS = 64
+"""Largest number of steps of inverse kinematics, and of equations and of solutions in one."""
+
 MAX_LEFT_OUT = 20
 """Largest number of statements of a program or a document that are listed as left out."""
 
@@ -37,7 +48,8 @@ KEYS = {
     "names": ("q", "qd", "qdd", "angles", "parameters"),
     "task": ("friction", "total_derivative", "asked", "proof", "frames", "zero"),
     "dh": ("convention", "rows"),
-    "ik": ("branches",),
+    "ik": ("branches", "steps"),
+    "step": ("joint", "equation", "solution"),
 }
 """Keys that a document, and each table in it, may have. No key stands in two tables with two meanings."""
 
@@ -58,138 +70,6 @@ QUANTITY = re.compile(r"M|C|h|g|tau|K|V|L|T|J|dh|ik|A[1-9][0-9]?")
 
 ALIASES = dict(D="M", G="g", KE="K", PE="V", U="V", P="V", Tau="tau", N="g", Jac="J", Lagrangian="L")
 """Other names of quantities."""
-
-
-@dataclass(frozen=True)
-class Refusal:
-    """Stands in place of a text that a program or a document assigns and that is not to be judged.
-
-    Attributes
-    ----------
-    reason
-        Why it is not judged, with the line.
-    """
-
-    reason: str
-
-
-@dataclass(frozen=True)
-class Chain:
-    """The formulas of one statement ``V = a = b``: the last is the answer, and those before it must equal it.
-
-    Attributes
-    ----------
-    formulas
-        As they were typed, two or more.
-    """
-
-    formulas: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Entries:
-    """A quantity that was given entry by entry, perhaps not all of them.
-
-    Attributes
-    ----------
-    texts
-        Text, :class:`Chain` or :class:`Refusal` by index, from 0.
-    """
-
-    texts: Mapping[tuple[int, ...], str | Chain | Refusal]
-
-
-@dataclass(frozen=True)
-class Names:
-    """What a student's names mean.
-
-    Attributes
-    ----------
-    q, qd, qdd
-        Names of the joint variables, their rates and accelerations; the usual ones where empty.
-    absolute
-        Whether angles count from a fixed direction rather than from the link before.
-    parameters
-        The student's further names, each as text in the robot's parameters and in the names before it.
-    lenient
-        Whether a further name may be unreadable, and replaces any other meaning: names that a program defines.
-    """
-
-    q: tuple[str, ...] = ()
-    qd: tuple[str, ...] = ()
-    qdd: tuple[str, ...] = ()
-    absolute: bool = False
-    parameters: Mapping[str, str | Refusal] = field(default_factory=dict)
-    lenient: bool = False
-
-
-@dataclass(frozen=True)
-class Requirements:
-    """What the instructor asks for, where there is a choice: the table ``[task]``.
-
-    Attributes
-    ----------
-    friction
-        Whether tau includes viscous friction.
-    total_derivative
-        Whether L is right up to the total derivative of a function of q and t.
-    asked
-        Quantities that were assigned; a sheet without one of them is incomplete. Empty: the quantities on the sheet.
-    proof_required
-        Whether answers that are not proved do not pass (``proof = "required"``).
-    frames_given
-        Whether a table must have the file's own frames (``frames = "given"``).
-    zero_given
-        Whether a table's joint variables must be zero in the file's own zero pose (``zero = "given"``).
-    """
-
-    friction: bool = False
-    total_derivative: bool = False
-    asked: tuple[str, ...] = ()
-    proof_required: bool = False
-    frames_given: bool = False
-    zero_given: bool = False
-
-
-@dataclass(frozen=True)
-class AnswerSheet:
-    """What was handed in, as text.
-
-    Attributes
-    ----------
-    robot
-        A library name, or a path inside the sheet's folder; empty where the caller knows the robot.
-    names, task
-        What names mean, and what was asked for.
-    answers
-        Text, or lists of text, by quantity.
-    table
-        Convention and rows (theta, d, a, alpha) of a table; None without one.
-    branches
-        Formulas of inverse kinematics, n for each branch.
-    rubric
-        How points are given; the instructor's own file comes first.
-    student
-        Student's name; empty if unknown.
-    file
-        What messages begin with.
-    notes
-        What a reader should know of how a program or a document was read, each with its line.
-    left_out
-        Statements that were not read as answers, each with its line.
-    """
-
-    robot: str = ""
-    names: Names = field(default=Names())
-    task: Requirements = field(default=Requirements())
-    answers: Mapping[str, object] = field(default_factory=dict)
-    table: tuple[str, tuple[tuple[str, ...], ...]] | None = None
-    branches: tuple[tuple[str, ...], ...] = ()
-    rubric: Mapping[str, object] = field(default_factory=dict)
-    student: str = ""
-    file: str = "answers"
-    notes: tuple[str, ...] = ()
-    left_out: tuple[str, ...] = ()
 
 
 def source_sheet(
@@ -326,7 +206,8 @@ def _sheet(data: Mapping[str, object], checker: _Checker, known: Sequence[str]) 
         _requirements(checker, task),
         {name: value for name, value in answers.items() if name not in ("dh", "ik")},
         _table(checker, table) if "dh" in answers else None,
-        _branches(checker, inverse) if "ik" in answers else (),
+        _branches(checker, inverse) if "ik" in answers and "steps" not in inverse else (),
+        _steps(checker, inverse) if "steps" in inverse else (),
         checker.table(data, "rubric", ""),
         checker.text(data, "student", ""),
         checker.file,
@@ -428,6 +309,36 @@ def _table(checker: _Checker, data: Mapping[str, object]) -> tuple[str, tuple[tu
         if len(row) != len(COLUMNS):
             raise checker.error(f"answer.dh.rows[{k}]", list(row), "four entries: theta, d, a, alpha")
     return checker.choice(data, "convention", "answer.dh."), texts
+
+
+def _steps(checker: _Checker, data: Mapping[str, object]) -> tuple[InverseStep, ...]:
+    checker.keys(data, KEYS["ik"], "answer.ik.")
+    if "branches" in data:
+        raise checker.error("answer.ik", "both branches and steps", "one of them")
+    steps = data.get("steps")
+    expected = f'1 to {MAX_STEPS} steps such as {{ joint = 1, equation = "...", solution = "..." }}'
+    if not isinstance(steps, list) or not 0 < len(steps) <= MAX_STEPS:
+        raise checker.error("answer.ik.steps", steps, expected)
+    return tuple(_step(checker, step, f"answer.ik.steps[{k}]", expected) for k, step in enumerate(steps))
+
+
+def _step(checker: _Checker, data: object, place: str, expected: str) -> InverseStep:
+    if not isinstance(data, Mapping):
+        raise checker.error(place, data, expected)
+    checker.keys(data, KEYS["step"], f"{place}.")
+    joint = data.get("joint")
+    if not isinstance(joint, int) or isinstance(joint, bool):
+        raise checker.error(f"{place}.joint", joint, "the joint's number, from 1")
+    texts = []
+    for key in ("equation", "solution"):
+        value = data.get(key, [])
+        several = checker.texts(value if isinstance(value, list) else [value], f"{place}.{key}", "a formula, or a list")
+        if len(several) > MAX_STEPS:
+            raise checker.error(f"{place}.{key}", f"{len(several)} formulas", f"at most {MAX_STEPS}")
+        texts.append(tuple(text for text in several if text.strip()))
+    if not any(texts):
+        raise checker.error(place, data, "an equation, a solution, or both")
+    return InverseStep(joint, *texts)
 
 
 def _branches(checker: _Checker, data: Mapping[str, object]) -> tuple[tuple[str, ...], ...]:

@@ -9,7 +9,8 @@ from typing import TypeAlias
 
 from dhkit.description import Description
 from dhkit.errors import AnswerError
-from dhkit.grading.answers.sheet import AnswerSheet, read_text
+from dhkit.grading.answers.sheet import read_text
+from dhkit.grading.answers.sheet_values import AnswerSheet
 
 MAX_CHARACTERS = 1_000_000
 """Largest length of code or LaTeX, in characters; a notebook may be longer, since its figures do not count."""

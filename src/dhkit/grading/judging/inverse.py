@@ -24,6 +24,7 @@ from dhkit.grading.judging.inverse_poses import CLOSES, Poses
 from dhkit.grading.judging.numeric import names_of, parts_of
 from dhkit.grading.mistakes.library import hint_of, sentence_of
 from dhkit.grading.report import Diagnosis, Entry, KinematicJudgement, Note, NoteKind, Verdict, Witness, entry_name
+from dhkit.symbolic import table_lengths
 
 MAX_NODES = 5_000
 """Largest number of nodes of a formula; a PUMA's longest has 200."""
@@ -163,7 +164,7 @@ def _check(description: Description, branches: Sequence[Sequence[Tree]]) -> None
     if not branches:
         raise AnswerError("ik: no branch")
     n = description.n
-    pose = {*POSE_NAMES, *description.parameters, *CONSTANTS}
+    pose = {*POSE_NAMES, *description.parameters, *table_lengths(description), *CONSTANTS}
     for b, branch in enumerate(branches, start=1):
         if len(branch) != n:
             raise AnswerError(f"ik, branch {b}: {len(branch)} formula{'s' * (len(branch) != 1)}; expected {n}")
@@ -175,7 +176,16 @@ def _check(description: Description, branches: Sequence[Sequence[Tree]]) -> None
                 where = f"ik, branch {b}, q{k + 1}"
                 if name == f"q{k + 1}":
                     raise AnswerError(f"{where}: uses {name}, which it is to give")
-                known = ", ".join([*POSE_NAMES[:3], "r11 ... r33", *description.parameters, "pi", "other joints"])
+                known = ", ".join(
+                    [
+                        *POSE_NAMES[:3],
+                        "r11 ... r33",
+                        *description.parameters,
+                        *table_lengths(description),
+                        "pi",
+                        "other joints",
+                    ]
+                )
                 raise AnswerError(f"{where}: unknown name {name!r}; expected {known}")
         joint_order(branch, f"ik, branch {b}")
 

@@ -40,6 +40,8 @@ ORDER = (
     "lengths_exchanged",
     "offset_forgotten",
     "tool_length_forgotten",
+    "shoulder_offset_forgotten",
+    "length_forgotten",
     "term_function",
     "term_parameter",
     "term_sign",
@@ -119,8 +121,13 @@ def edits(
         Lengths of the robot.
     """
     whole = chain(_of_the_whole(tree, is_revolute, others, offsets), _with_triangle(tree, is_revolute, others, lengths))
+    changes = [*(Edit(mistake, new, tree, new) for mistake, new in whole), *edits_of_parts(tree, lengths)]
+    return sorted(changes, key=lambda edit: ORDER.index(edit.mistake))[:MAX_EDITS]
+
+
+def edits_of_parts(tree: Tree, lengths: Lengths) -> list[Edit]:
+    """Return the changes of parts of a formula, and of names throughout, in the order in which they are tried."""
     changes = [
-        *(Edit(mistake, new, tree, new) for mistake, new in whole),
         *islice(_of_parts(tree, lengths, lambda part: part, _is_law(tree)), 2 * MAX_EDITS),
         *(
             Edit(mistake, new, tree, new)

@@ -83,11 +83,13 @@ class Search:
     ----------
     description
         The robot.
+    lengths
+        Lengths that formulas may contain; those of :func:`lengths_of` unless given.
     """
 
-    def __init__(self, description: Description) -> None:
+    def __init__(self, description: Description, lengths: Lengths | None = None) -> None:
         self.revolute = [kind == "R" for kind in description.kinds]
-        self.lengths = lengths_of(description)
+        self.lengths = lengths or lengths_of(description)
         self.left = MAX_WORK
 
     def explanations(self, branch: Branch) -> Iterator[Explanation]:

@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 from dhkit.description import Array, Description, world_to_tool
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.kinematics import classify, inverse_kinematics, jacobian
+from dhkit.symbolic import table_lengths
 
 CLOSES = 1e-9
 """Largest distance of the tool from a pose that is reached, in entries of the rotation and relative to the reach."""
 MATCHES = 1e-6
 """Largest distance of joint values from a solution they are taken for, rad and relative to the reach: it exceeds CLOSES
 because gaps widen at poses near singular ones."""
+KNOWN = "known"
+"""Beginning of the names of joint values that are known from elsewhere; no answer can contain them."""
 TOOL_AXES = {f"pitch of the tool's {axis} axis": k for k, axis in enumerate("xyz")}
 """By part of a pose that an arm reaches: the column of the tool's rotation that it determines."""
 FEW_JOINTS = 3
@@ -57,6 +60,8 @@ class Poses:
         Axis of the tool, from 0, that is asked for besides the position; None if none is.
     lower, upper
         Range of joint values, shape (n,), rad and m.
+    known
+        Joint values that formulas may use as known1, known2 ..., shape (S, n), rad and m; None for none.
     """
 
     description: Description
@@ -68,6 +73,7 @@ class Poses:
     axis: int | None
     lower: Array
     upper: Array
+    known: Array | None = None
 
     @classmethod
     def random(cls, description: Description, samples: int, seed: int) -> Poses:
@@ -90,7 +96,8 @@ class Poses:
     def at(self, chosen: Sequence[int] | NDArray[np.intp]) -> Poses:
         """Return the poses of some indices, shape (k,)."""
         index = np.asarray(chosen, dtype=int)
-        return replace(self, q=self.q[index], T=self.T[index], solutions=self.solutions[index])
+        known = None if self.known is None else self.known[index]
+        return replace(self, q=self.q[index], T=self.T[index], solutions=self.solutions[index], known=known)
 
     @property
     def has_closed_form(self) -> bool:
@@ -107,7 +114,9 @@ class Poses:
     def values(self) -> dict[str, Array | float]:
         """Values by name: px ... r33 of the poses, shape (S,), and parameters; SI units and rad."""
         entries = [*np.moveaxis(self.T[:, :3, 3], -1, 0), *self.T[:, :3, :3].reshape(-1, 9).T]
-        return {**self.description.numbers.values, **dict(zip(POSE_NAMES, entries, strict=True))}
+        known = {f"{KNOWN}{i + 1}": column for i, column in enumerate(self.known.T)} if self.known is not None else {}
+        lengths = {name: float(value) for name, value in table_lengths(self.description).items()}
+        return {**lengths, **self.description.numbers.values, **dict(zip(POSE_NAMES, entries, strict=True)), **known}
 
     @cached_property
     def truths(self) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Name, Product, Sum, Tree
 from dhkit.grading.answers.given import LEFT_EMPTY, Given
-from dhkit.grading.answers.sheet import Requirements
+from dhkit.grading.answers.sheet_values import Requirements
 from dhkit.grading.judging.coordinates import Coordinates
 from dhkit.grading.judging.findings import Comparison, Finding, compare, exact_difference, names_in
 from dhkit.grading.judging.numeric import doubles, general_state, names_of, state_arrays

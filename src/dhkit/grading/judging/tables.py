@@ -17,7 +17,7 @@ import numpy as np
 from dhkit.description import Convention, Description
 from dhkit.expressions import PI, ZERO, Expression, substitute
 from dhkit.expressions.syntax import Tree
-from dhkit.grading.answers.sheet import Requirements
+from dhkit.grading.answers.sheet_values import Requirements
 from dhkit.grading.judging.frame_changes import FrameChange
 from dhkit.grading.judging.same_arm import Overlay, overlaid
 from dhkit.grading.judging.table_arms import TableArm

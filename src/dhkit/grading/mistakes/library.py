@@ -114,6 +114,13 @@ INVERSE = _catalogue(
             "triangle_angle_forgotten": "the angle in the triangle of two links is not taken off: the direction to the"
             " end of the second is given in place of the first link's",
             "tool_length_forgotten": "the tool's length is not taken off the position: the triangle ends at the wrist",
+            "shoulder_offset_forgotten": "the shoulder's offset is missing: the point does not lie in the plane through"
+            " axis 1, but beside it",
+            "length_forgotten": "a constant length is missing in the equation",
+        },
+        (Subject.INVERSE, "Put the pose of one configuration into both sides, and compare."): {
+            "equation_wrong": "the equation is no identity of the arm; no single mistake explains it",
+            "solution_wrong": "the solution is wrong given the joints before; no single mistake explains it",
         },
         (Subject.INVERSE, "Look again at the triangle of the links: what does the law of cosines say?"): {
             "cosine_law_factor": "the law of cosines lacks its factor 2: c^2 = a^2 + b^2 - 2 a b cos(C)",

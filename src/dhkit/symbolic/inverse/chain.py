@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from fractions import Fraction
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -65,6 +66,8 @@ class Chain:
         Values of the symbols, SI, by name.
     notes
         One sentence for each number that is a symbol because it has no exact form.
+    in_joint_values
+        Whether sines and cosines are those of the joint values; else of the table's angles theta_i.
     """
 
     description: Description
@@ -79,9 +82,10 @@ class Chain:
     values: dict[str, float]
     lengths: dict[str, float]
     notes: tuple[str, ...]
+    in_joint_values: bool = False
 
     @classmethod
-    def of(cls, description: Description, *, named: bool) -> Chain:
+    def of(cls, description: Description, *, named: bool, in_joint_values: bool = False) -> Chain:
         """Return an arm's chain; lengths that are numbers get names (a2, d3) if ``named``, else all are numbers."""
         naming = Naming(description, "inertial" if named else "none")
         joints, is_standard = description.joints, description.convention is Convention.STANDARD
@@ -121,6 +125,7 @@ class Chain:
             {text: value_of(constant, naming.values) for text, constant in constants.found.items()},
             {name: float(naming.values[name]) for name in sorted(taken)},
             tuple(constants.notes),
+            in_joint_values,
         )
 
     @property
@@ -138,9 +143,13 @@ class Chain:
 
     def cosine_and_sine(self, i: int) -> Direction:
         """Return cosine and sine of theta_i, i from 1; of a sliding joint those of its constant angle."""
-        if self.description.kinds[i - 1] == "R":
-            return self.ring.cosine(i - 1), self.ring.sine(i - 1)
-        return self.ring.direction(self.offsets[i - 1])
+        offset = self.ring.direction(self.offsets[i - 1])
+        if self.description.kinds[i - 1] != "R":
+            return offset
+        c, s = self.ring.cosine(i - 1), self.ring.sine(i - 1)
+        if not self.in_joint_values:
+            return c, s
+        return c * offset[0] - s * offset[1], s * offset[0] + c * offset[1]
 
     def joint(self, i: int) -> Elements:
         """Return J_i, i from 1, shape (4, 4)."""
@@ -183,6 +192,19 @@ class Chain:
     def named(self, names: Iterable[str]) -> Elements:
         """Return defined quantities by their usual names, shape (k,)."""
         return np.array([self.symbol(name) for name in names], dtype=object)
+
+
+@lru_cache(maxsize=64)
+def table_lengths(description: Description) -> dict[str, Fraction]:
+    """Return the lengths of a table that are numbers, by the names that derivations give them: a2, d3, m."""
+    naming, found = Naming(description, "inertial"), {}
+    for i, joint in enumerate(description.joints, start=1):
+        for name, length in ((f"a{i}", joint.a), (f"d{i}", joint.d)):
+            symbol = naming.length(name, length)
+            value = naming.values.get(symbol.text)
+            if symbol.text not in description.parameters and value is not None and value.rational is not None:
+                found[symbol.text] = value.rational
+    return found
 
 
 def is_identity(T: Elements) -> bool:

@@ -13,7 +13,7 @@ from dhkit.errors import AnswerError
 from dhkit.grading import grade
 from dhkit.grading.answers.documents.entry_statements import statements_of
 from dhkit.grading.answers.documents.statements import left_hand_name
-from dhkit.grading.answers.sheet import Chain, Entries, Refusal
+from dhkit.grading.answers.sheet_values import Chain, Entries, Refusal
 from dhkit.grading.answers.sources import read_source
 from dhkit.grading.report import NoteKind
 

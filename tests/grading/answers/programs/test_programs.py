@@ -20,7 +20,7 @@ from dhkit.description import library_robot
 from dhkit.errors import AnswerError
 from dhkit.grading import grade
 from dhkit.grading.answers.documents.entry_statements import statements_of
-from dhkit.grading.answers.sheet import Entries, Refusal
+from dhkit.grading.answers.sheet_values import Entries, Refusal
 from dhkit.grading.answers.sources import read_source
 from dhkit.symbolic.equations import equations_matlab, equations_python, equations_text, matlab_files, quantities
 from dhkit.symbolic.exact.lagrangian import lagrangian

@@ -13,7 +13,8 @@ from dhkit.grading.answers.documents.statements import Statement, left_hand_name
 from dhkit.grading.answers.latex import latex_tokens
 from dhkit.grading.answers.programs.name_resolution import NameResolver, is_same_number
 from dhkit.grading.answers.quantity_names import Target
-from dhkit.grading.answers.sheet import AnswerSheet, Chain, Entries, Refusal, source_sheet
+from dhkit.grading.answers.sheet import source_sheet
+from dhkit.grading.answers.sheet_values import AnswerSheet, Chain, Entries, Refusal
 from dhkit.grading.answers.tokens import to_ascii
 from dhkit.grading.answers.vocabulary import plain_name
 

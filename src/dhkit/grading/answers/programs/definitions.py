@@ -29,7 +29,7 @@ from dhkit.grading.answers.programs.name_resolution import (
     vector_place,
 )
 from dhkit.grading.answers.rewriting import DERIVATIVES, MODULES
-from dhkit.grading.answers.sheet import Refusal
+from dhkit.grading.answers.sheet_values import Refusal
 from dhkit.grading.answers.tokens import MAX_LENGTH, word_set
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, plain_name
 

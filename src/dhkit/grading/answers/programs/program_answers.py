@@ -21,7 +21,8 @@ from dhkit.grading.answers.programs.bindings import (
 from dhkit.grading.answers.programs.definitions import Definition, Definitions, definition_of
 from dhkit.grading.answers.programs.name_resolution import NameResolver, Resolution
 from dhkit.grading.answers.quantity_names import Target
-from dhkit.grading.answers.sheet import AnswerSheet, Chain, Entries, Refusal, source_sheet
+from dhkit.grading.answers.sheet import source_sheet
+from dhkit.grading.answers.sheet_values import AnswerSheet, Chain, Entries, Refusal
 
 WRITTEN_BY_DHKIT = {
     "mass_matrix": "M",
