@@ -1,4 +1,4 @@
-"""Worked solution: a robot's equations of motion, derived step by step."""
+"""Worked solution: a robot's equations of motion and its inverse kinematics, derived step by step."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from dhkit.description import Description
+from dhkit.errors import DescriptionError
 from dhkit.grading.reports.html import STYLE
 from dhkit.grading.reports.mathml import mathml
-from dhkit.symbolic import Lagrangian, lagrangian
+from dhkit.symbolic import InverseDerivation, Lagrangian, inverse_derivation, lagrangian
 from dhkit.symbolic.equations import latex_text, plain_text
 from dhkit.symbolic.exact.compact import shortened
 from dhkit.symbolic.ring import Element, Elements, element_array
@@ -50,29 +51,56 @@ def worked_solution(description: Description) -> list[Step]:
 
 
 def explanation_text(description: Description) -> str:
-    """Return the worked solution as text."""
+    """Return the worked solution as text, with inverse kinematics where there is a closed form.
+
+    Raises
+    ------
+    DescriptionError
+        A link has no body, and there is no closed form.
+    """
+    inverse = _inverse(description)
+    if inverse is not None and not _has_bodies(description):
+        return inverse.text()
     lines = [f"{description.name}: the equations of motion, step by step", ""]
     for number, step in enumerate(worked_solution(description), start=1):
         lines += [f"{number}. {step.title}", f"   {step.method}", ""]
         lines += [f"   {name} = {plain_text(element)}" for name, _, element in step.results] or ["   all zero"]
         lines.append("")
-    return "\n".join(lines)
+    return "\n".join(lines) + (f"\n{inverse.text()}" if inverse is not None else "")
 
 
 def explanation_html(description: Description) -> str:
-    """Return the worked solution as an HTML page without other files."""
+    """Return the worked solution as an HTML page without other files, as :func:`explanation_text`."""
+    inverse = _inverse(description)
+    if inverse is not None and not _has_bodies(description):
+        return inverse.html()
     body = [f"<h1>{html.escape(description.name)}: the equations of motion, step by step</h1>"]
     for number, step in enumerate(worked_solution(description), start=1):
         body += [f"<h2>{number}. {html.escape(step.title)}</h2>", f"<p>{html.escape(step.method)}</p>"]
         for name, head, element in step.results:
             text = f"{name} = {plain_text(element)}"
             body.append(f"<p>{mathml(f'{head} = {latex_text(element)}') or html.escape(text)}</p>")
+    if inverse is not None:
+        body.append(f"<h1>{html.escape(description.name)}: inverse kinematics, step by step</h1>")
+        body.append(inverse._repr_html_())
     title = f"{html.escape(description.name)}: worked solution"
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
         f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{STYLE}</style></head>\n'
         f"<body>{''.join(body)}</body></html>\n"
     )
+
+
+def _inverse(description: Description) -> InverseDerivation | None:
+    """Return the derivation of inverse kinematics; None without a closed form."""
+    try:
+        return inverse_derivation(description)
+    except DescriptionError:
+        return None
+
+
+def _has_bodies(description: Description) -> bool:
+    return all(joint.bodies for joint in description.joints)
 
 
 class _Solution:

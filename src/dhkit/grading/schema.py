@@ -18,6 +18,7 @@ from dhkit.grading.answers.sheet import (
     KEYS,
     MAX_BRANCHES,
     MAX_NAMES,
+    MAX_STEPS,
     QUANTITY,
     quantity_names,
     shape_of,
@@ -129,12 +130,26 @@ def _properties() -> Schema:
             "items": {"type": "array", "items": ENTRY},
         },
     }
+    keys |= {
+        "joint": {"type": "integer", "minimum": 1, "description": "The joint that a step finds, from 1."},
+        "equation": _formulas("Equation that determines the joint from those before, with one equals sign."),
+        "solution": _formulas("The joint's value (rad, m), in joints of earlier steps; ± or a list for both roots."),
+    }
+    keys["steps"] = {
+        "type": "array",
+        "description": "Steps in the order in which joints are found; in place of branches.",
+        "minItems": 1,
+        "maxItems": MAX_STEPS,
+        "items": _table(KEYS["step"], keys, "An equation, its solution, or both.")
+        | {"required": ["joint"], "anyOf": [{"required": ["equation"]}, {"required": ["solution"]}]},
+    }
     tables = {
         "names": _table(KEYS["names"], keys, "The student's own names."),
         "task": _table(KEYS["task"], keys, "What was asked for, where there is a choice."),
         "answer": _answer(
             dh=_table(KEYS["dh"], keys, "A table: theta, d, a, alpha by row.") | {"required": ["rows"]},
-            ik=_table(KEYS["ik"], keys, "Inverse kinematics as formulas.") | {"required": ["branches"]},
+            ik=_table(KEYS["ik"], keys, "Inverse kinematics: formulas of branches, or steps.")
+            | {"oneOf": [{"required": ["branches"]}, {"required": ["steps"]}]},
         ),
     }
     return keys | tables
@@ -162,6 +177,11 @@ def _answer(**tables: Schema) -> Schema:
         "additionalProperties": False,
         "minProperties": 1,
     }
+
+
+def _formulas(description: str) -> Schema:
+    """Return the schema of a formula, or of a list of them."""
+    return {"anyOf": [ENTRY, {"type": "array", "items": ENTRY, "maxItems": MAX_STEPS}], "description": description}
 
 
 def _text(description: str) -> Schema:

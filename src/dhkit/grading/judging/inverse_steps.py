@@ -25,7 +25,7 @@ from dhkit.grading.answers.inverse_steps import GivenStep
 from dhkit.grading.judging.inverse_branch import Branch
 from dhkit.grading.judging.inverse_edits import Edit, Lengths, edits_of_parts
 from dhkit.grading.judging.inverse_mistakes import Search, lengths_of
-from dhkit.grading.judging.inverse_poses import CLOSES, KNOWN, MATCHES, Poses
+from dhkit.grading.judging.inverse_poses import CLOSES, KNOWN, MATCHES, Mask, Poses
 from dhkit.grading.judging.numeric import EditedDoubles, doubles, names_of
 from dhkit.grading.judging.quotients import OutsideTheRingError, RingReader
 from dhkit.grading.mistakes.library import hint_of, sentence_of
@@ -410,7 +410,7 @@ class _Solutions:
         """Return the number of values that this joint has in general, given the joints of earlier steps."""
         poses, own = self.judge.poses, self.step.joint
         truths = poses.truths
-        alive = np.isfinite(truths).all(axis=-1)
+        alive: Mask = np.all(np.isfinite(truths), axis=-1)
         for j in self.before:
             alive &= poses.gaps(truths[..., j], poses.q[:, None, j], j) < MATCHES
         counts = []

@@ -265,7 +265,7 @@ class _Statements:
         return PLACEHOLDER.sub(lambda match: words[match[1]], template)
 
     def _conditions(self) -> Iterator[Statement]:
-        reach = max(self.derivation.description.reach, 1e-9)
+        reach = self.derivation.description.reach or 1.0
         for condition in self.derivation.conditions:
             yield Comment(condition.look)
             yield Assignment("off", f"{self._text(condition.left)} - ({self._text(condition.right)})")

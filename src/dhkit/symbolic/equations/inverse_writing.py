@@ -68,8 +68,12 @@ class Phrases:
             self._printer = Printer(ring.generators, TextWriter(_written_names(derivation)))
 
     def element(self, element: Element) -> str:
-        """Return an element in one line."""
-        return self._printer.sum(collected(element)).replace("\n", "")
+        """Return an element in one line, with a positive term first if it has one."""
+        products = list(collected(element))
+        first = next((k for k, product in enumerate(products) if product.coefficient > 0), 0)
+        if products:
+            products.insert(0, products.pop(first))
+        return self._printer.sum(products).replace("\n", "")
 
     def name(self, name: str) -> str:
         """Return a defined quantity's name."""

@@ -251,7 +251,7 @@ class InverseDerivation:
     def _closes(self, found: Array, T: Array) -> bool:
         valid = np.asarray(np.isfinite(found).all(axis=-1))
         reached = world_to_tool(self.description, np.where(valid[..., None], found, 0.0))
-        scale = max(self.description.reach, 1e-9)
+        scale = self.description.reach or 1.0
         gap = np.abs(reached - T[:, None])[..., :3, :]
         gap[..., 3] /= scale
         if self.family.aims:
@@ -262,7 +262,7 @@ class InverseDerivation:
     def _contains(self, found: Array, q: Array) -> bool:
         slides = self.description.numbers.prismatic
         away = np.abs(found - q[:, None])
-        away = np.where(slides, away / max(self.description.reach, 1e-9), np.abs((away + np.pi) % (2 * np.pi) - np.pi))
+        away = np.where(slides, away / (self.description.reach or 1.0), np.abs((away + np.pi) % (2 * np.pi) - np.pi))
         return bool(np.all(np.nanmin(np.where(np.isnan(away), np.inf, away).max(axis=-1), axis=1) < FOUND))
 
     # Numbers
@@ -312,7 +312,7 @@ class InverseDerivation:
             values.set_unknown(step.form.unknown, np.broadcast_to(found, count))
         for condition in self.conditions:
             off = np.abs(values.of(condition.left) - values.of(condition.right))
-            is_solved &= np.broadcast_to(off <= IN_PLANE * max(self.description.reach, 1e-9), count)
+            is_solved &= np.broadcast_to(off <= IN_PLANE * (self.description.reach or 1.0), count)
         return values, is_solved
 
     def _joints(self, values: Values) -> Array:
