@@ -1,10 +1,14 @@
-"""`make assets`: the library's URDFs in urdf/ and the PUMA's meshes in meshes/, generated and checked in."""
+"""`make assets`: what is generated and checked in.
+
+The library's URDFs in urdf/, the PUMA's meshes in meshes/, and derivations of inverse kinematics in docs/.
+"""
 
 import logging
 from pathlib import Path
 
 from dhkit.description import library_robot, robots, write_atomically
 from dhkit.model.urdf import urdf_text
+from dhkit.symbolic import inverse_derivation
 from tools.puma560_meshes import write_puma560_meshes
 
 log = logging.getLogger(__name__)
@@ -15,11 +19,28 @@ def library_urdf(name: str) -> str:
     return urdf_text(library_robot(name), mesh_path=lambda path: f"../meshes/{path}")
 
 
+WORKED_OUT = ("puma560", "ur5")
+"""Robots whose inverse kinematics is worked out in docs/."""
+
+
+def inverse_page(name: str) -> str:
+    """Return the text of docs/ik-NAME.md."""
+    derivation = inverse_derivation(library_robot(name))
+    return (
+        f"# {name}: inverse kinematics worked out\n"
+        f"Printed by `dhkit equations {name} --what ik`; `make assets` writes this file. "
+        "[inverse-kinematics.md](inverse-kinematics.md) says what is proved of it.\n"
+        f"```text\n{derivation.text()}\n{derivation.prove()}\n```\n"
+    )
+
+
 def write_assets(root: Path) -> None:
-    """Write urdf/ and meshes/ below a folder."""
+    """Write urdf/, meshes/ and docs/ik-NAME.md below a folder."""
     meshes = write_puma560_meshes(root / "meshes" / "puma560")
     for name in robots():
         write_atomically(root / "urdf" / f"{name}.urdf", library_urdf(name))
+    for name in WORKED_OUT:
+        write_atomically(root / "docs" / f"ik-{name}.md", inverse_page(name))
     log.info("wrote %d files below %s", len(meshes) + len(robots()), root)
 
 

@@ -48,6 +48,7 @@ def test_the_demo_writes_a_urdf_a_figure_and_a_page(tmp_path, capsys):
         "control.png",
         "equations.html",
         "equations.tex",
+        "ik.html",
         "index.html",
         "meshes",
         "plan.html",
@@ -58,6 +59,7 @@ def test_the_demo_writes_a_urdf_a_figure_and_a_page(tmp_path, capsys):
         "verification.md",
     ]
     assert "<math" in (folder / "equations.html").read_text("utf-8")
+    assert "worked out and proved: " in out and "<svg" in (folder / "ik.html").read_text("utf-8")
     assert ElementTree.parse(folder / "puma560.urdf").getroot().get("name") == "puma560"
     with Image.open(folder / "puma560.png") as picture:
         assert len(np.unique(np.asarray(picture.convert("L")))) > 50
@@ -98,7 +100,8 @@ def test_the_demo_tells_machines_what_it_did(tmp_path, capsys):
     stages = ["build", "verify", "equations", "figure", "ik", "plan", "control", "page"]
     assert [stage["stage"] for stage in report["stages"]] == stages
     assert re.fullmatch(
-        r"8 branches of one pose close FK to \de-16; a line of 0\.\d+ m in 200 poses: 0 switches",
+        r"8 branches of one pose close FK to \de-16; a line of 0\.\d+ m in 200 poses: 0 switches; "
+        r"worked out and proved: .*ik\.html",
         report["stages"][4]["result"],
     )
 

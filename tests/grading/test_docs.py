@@ -15,12 +15,18 @@ from dhkit.grading.answers.sheet import sheet_of
 from dhkit.grading.sheet_judge import judge_sheet
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "grading.md").read_text("utf-8")
-TASK, SHEET, RUBRIC = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+TASK, SHEET, STEPS, RUBRIC = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 COMMANDS = re.findall(r"^\$ dhkit ([^#\n]*)", PAGE, re.MULTILINE)
 
 
 def test_the_sheet_is_right():
     report = judge_sheet(library_robot("planar2r"), sheet_of(tomllib.loads(SHEET, parse_float=Decimal)))
+    assert report.verdict.value == "correct", str(report)
+
+
+def test_the_steps_are_right():
+    data = {"robot": "planar2r", **tomllib.loads(STEPS, parse_float=Decimal)}
+    report = judge_sheet(library_robot("planar2r"), sheet_of(data))
     assert report.verdict.value == "correct", str(report)
 
 

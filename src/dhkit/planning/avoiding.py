@@ -366,6 +366,36 @@ class AvoidingSearch:
         return motion.q(times[:-1, None] + np.diff(times)[:, None] * np.linspace(0.0, 1.0, points))
 
 
+def motion_around(
+    task: Task,
+    free: PlannedMotion,
+    search: Search[Knots],
+    program: MotionProgram,
+    finer: Callable[[], MotionProgram],
+    warm: Trajectory | None,
+) -> tuple[Task, PlannedMotion]:
+    """Return the best motion among obstacles, with the task whose clearance it keeps.
+
+    A clearance that is reduced at an end is reduced during the whole motion first: the motion then found is the
+    start of the search for one that keeps the clearance farther away, and the result if there is none.
+    """
+    if not task.avoidance:
+        return task, free
+    if (certificate := task.checker.check(free.trajectory)).ok:
+        return task, replace(free, certificate=certificate)
+    if not task.avoidance.reduced or task.avoidance.is_reduced_throughout:
+        return task, AvoidingSearch(task, search, program, finer)(warm)
+    easier = task.avoiding(task.avoidance.reduced_throughout)
+    _, near = motion_around(easier, free, search, program, finer, warm)
+    search.program = program
+    if (certificate := task.checker.check(near.trajectory)).ok:
+        return task, replace(near, certificate=certificate)
+    try:
+        return task, AvoidingSearch(task, search, program, finer)(near.trajectory)
+    except PlanningError:
+        return easier, near
+
+
 def _evenly(points: Array, share: Array) -> Array:
     """Return the points of a polygon (k, n) at shares (N,) of its length, shape (N, n)."""
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])

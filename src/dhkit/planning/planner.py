@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +15,7 @@ from dhkit.description import Array, Payload, Robot, description_of
 from dhkit.description.frames import world_to_tool
 from dhkit.display import repr_line
 from dhkit.errors import PlanningError
-from dhkit.planning.avoiding import FINER, AvoidingSearch
+from dhkit.planning.avoiding import FINER, motion_around
 from dhkit.planning.certificate import Checker
 from dhkit.planning.collision_avoidance import CollisionAvoidance
 from dhkit.planning.constraints import Constraint
@@ -46,7 +46,6 @@ from dhkit.planning.search import RESOLUTION, PlannedMotion, Search, Work, coars
 from dhkit.planning.solver import ProgressCall, delayed_interrupts
 from dhkit.planning.states import prepare
 from dhkit.planning.task import Task
-from dhkit.planning.variables import Knots
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 from dhkit.trajectories.timing import check_duration
@@ -396,7 +395,7 @@ class Planner:
                     work.build_seconds += seconds
                     return program
 
-                return self._around(task, found, search, program, finer, warm)
+                return motion_around(task, found, search, program, finer, warm)
             except PlanningError as error:
                 if is_last or time.perf_counter() > deadline:
                     slow = None
@@ -406,36 +405,6 @@ class Planner:
                         return task, slow
                     raise
         raise AssertionError("no curve")
-
-    def _around(
-        self,
-        task: Task,
-        free: PlannedMotion,
-        search: Search[Knots],
-        program: MotionProgram,
-        finer: Callable[[], MotionProgram],
-        warm: Trajectory | None,
-    ) -> tuple[Task, PlannedMotion]:
-        """Return the best motion among obstacles, with the task whose clearance it keeps.
-
-        A clearance that is reduced at an end is reduced during the whole motion first: the motion then found is the
-        start of the search for one that keeps the clearance farther away, and the result if there is none.
-        """
-        if not task.avoidance:
-            return task, free
-        if (certificate := task.checker.check(free.trajectory)).ok:
-            return task, replace(free, certificate=certificate)
-        if not task.avoidance.reduced or task.avoidance.is_reduced_throughout:
-            return task, AvoidingSearch(task, search, program, finer)(warm)
-        easier = task.avoiding(task.avoidance.reduced_throughout)
-        _, near = self._around(easier, free, search, program, finer, warm)
-        search.program = program
-        if (certificate := task.checker.check(near.trajectory)).ok:
-            return task, replace(near, certificate=certificate)
-        try:
-            return task, AvoidingSearch(task, search, program, finer)(near.trajectory)
-        except PlanningError:
-            return easier, near
 
     def _with_reason(
         self, error: PlanningError, request: PlanRequest, routes: Sequence[Route], deadline: float

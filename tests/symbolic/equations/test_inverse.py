@@ -10,11 +10,13 @@ import re
 import shutil
 import subprocess
 from html.parser import HTMLParser
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 import sympy
+from tools.assets import WORKED_OUT, inverse_page
 
 from conftest import require
 from dhkit.description import library_robot, world_to_tool
@@ -133,7 +135,7 @@ def test_the_pumas_derivation_is_that_of_the_books():
         "   px*s1 - py*c1 = d3",
         "   theta1 = atan2(px, -py) ± atan2(sqrt(px^2 + py^2 - d3^2), d3)",
         "   2*a2*(a3*c3 - d4*s3) = x^2 + y^2 - a2^2 - a3^2 - d4^2",
-        "   theta2 = atan2(u*y - v*x, u*x + v*y)",
+        "   theta2 = atan2(y*u - x*v, x*u + y*v)",
         "   theta4 = atan2(ay, ax) or atan2(-ay, -ax)",
         "   theta5 = atan2(-ax*c4 - ay*s4, az)",
         "   the two solutions: right where px*c1 + py*s1 > 0, else left",
@@ -219,3 +221,9 @@ def test_sympys_solutions_satisfy_sympys_equations(name):
                 assert abs(float(difference)) < 1e-9
                 checked += 1
     assert checked >= 2
+
+
+@pytest.mark.parametrize("name", WORKED_OUT)
+def test_the_pages_in_docs_are_fresh(name):
+    path = Path(__file__).resolve().parents[3] / "docs" / f"ik-{name}.md"
+    assert path.read_text("utf-8") == inverse_page(name), "run make assets"

@@ -1,6 +1,7 @@
 """Inverse kinematics derived in the exact ring: proved, and held against the kernels and forward kinematics.
 
-Modules: chain, derivation, families, forms, missing, regions, steps, wrists.
+Modules: chain, derivation, families, forms, missing, planar, regions, relations, steps,
+turning_planes, wrists.
 """
 
 import math
@@ -187,7 +188,7 @@ def test_nothing_is_used_before_it_is_found(name):
     derivation = inverse_derivation(library_robot(name))
     chain = derivation.chain
     known = {*chain.lengths, *(chain.names[k] for k in chain.names if k.startswith(("p", "r")))}
-    known |= {text for text in chain.values}
+    known |= set(chain.values)
     joints: set[int] = set()
     for step in derivation.steps:
         for definition in step.definitions:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from itertools import chain, combinations, islice, permutations
 
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
@@ -127,7 +128,11 @@ def edits(
 
 def edits_of_parts(tree: Tree, lengths: Lengths) -> list[Edit]:
     """Return the changes of parts of a formula, and of names throughout, in the order in which they are tried."""
+    exchanged = (
+        formulas.with_calls_changed(tree, ("sin", "cos"), partial(_exchanged, angle)) for angle in _angles(tree)
+    )
     changes = [
+        *(Edit("term_function", new, tree, new) for new in exchanged),
         *islice(_of_parts(tree, lengths, lambda part: part, _is_law(tree)), 2 * MAX_EDITS),
         *(
             Edit(mistake, new, tree, new)
@@ -136,6 +141,19 @@ def edits_of_parts(tree: Tree, lengths: Lengths) -> list[Edit]:
         ),
     ]
     return sorted(changes, key=lambda edit: ORDER.index(edit.mistake))[:MAX_EDITS]
+
+
+def _angles(tree: Tree) -> list[frozenset[str]]:
+    """Return the variables of the angles of which a formula contains the sine or the cosine, each once."""
+    calls = [part for part in parts_of(tree) if isinstance(part, Call) and part.function in ("sin", "cos")]
+    return list(dict.fromkeys(frozenset(names_of(call)) for call in calls))
+
+
+def _exchanged(angle: frozenset[str], call: Call) -> Tree:
+    """Return the cosine for the sine of an angle of these variables, and the sine for its cosine."""
+    if names_of(call) != angle:
+        return call
+    return replace(call, function="cos" if call.function == "sin" else "sin")
 
 
 def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, dict[str, Tree]]]:
@@ -277,7 +295,7 @@ def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, 
 
 
 def _of_number(number: Number, in_law: bool) -> Iterator[tuple[str, Tree]]:
-    if number.value == 1:
+    if abs(number.value) == 1:
         return
     if number.value >= MIN_MEASURE:
         yield "degrees_for_radians", times(number, Name("deg", 0))

@@ -118,7 +118,7 @@ INVERSE = _catalogue(
             " axis 1, but beside it",
             "length_forgotten": "a constant length is missing in the equation",
         },
-        (Subject.INVERSE, "Put the pose of one configuration into both sides, and compare."): {
+        (Subject.INVERSE, "Look again at this step: put the pose of one configuration into both sides, and compare."): {
             "equation_wrong": "the equation is no identity of the arm; no single mistake explains it",
             "solution_wrong": "the solution is wrong given the joints before; no single mistake explains it",
         },

@@ -1,0 +1,75 @@
+"""What the judges of equations and of solutions of a step share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from dhkit.description import Description
+from dhkit.errors import DescriptionError
+from dhkit.expressions.syntax import Name, Tree
+from dhkit.grading.judging.inverse_edits import Lengths
+from dhkit.grading.judging.inverse_mistakes import lengths_of
+from dhkit.grading.judging.inverse_poses import Poses
+from dhkit.grading.judging.numeric import names_of
+from dhkit.grading.report import Verdict, Witness
+from dhkit.symbolic import InverseDerivation, inverse_derivation, table_lengths
+from dhkit.symbolic.inverse.chain import Chain
+from dhkit.symbolic.inverse.steps import Step as DerivedStep
+
+
+@dataclass
+class Part:
+    """The verdict on a part of a step: its equations, or its solutions."""
+
+    verdict: Verdict
+    statement: str
+    mistakes: list[tuple[str, str]] = field(default_factory=list)
+    """Mistakes with details."""
+    difference: str | None = None
+    witness: Witness | None = None
+
+
+class StepContext:
+    """An arm and the poses at which steps are tried.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    poses
+        Random poses with their solutions.
+    explain
+        Whether to look for mistakes.
+    """
+
+    def __init__(self, description: Description, poses: Poses, explain: bool) -> None:
+        self.description, self.poses, self.explain = description, poses, explain
+
+    @cached_property
+    def derivation(self) -> InverseDerivation | None:
+        """The worked solution; None without a closed form."""
+        try:
+            return inverse_derivation(self.description)
+        except DescriptionError:
+            return None
+
+    def derived(self, joint: int) -> DerivedStep | None:
+        """Return the derivation's step for a joint, from 0; None without a derivation."""
+        steps = self.derivation.steps if self.derivation is not None else ()
+        return next((step for step in steps if step.unknown is not None and step.unknown.joint == joint), None)
+
+    def lengths(self, trees: Sequence[Tree]) -> Lengths:
+        """Return the lengths that formulas may contain: by name where formulas use the names of the table's."""
+        names, table = set().union(*map(names_of, trees)), table_lengths(self.description)
+        if not names & {*table}:
+            return lengths_of(self.description)
+        known = (*self.description.parameters, *table)
+        return Lengths(known, tuple(Name(name, 0) for name in known))
+
+    @cached_property
+    def chains(self) -> tuple[Chain, Chain]:
+        """The arm with named lengths, and with numbers."""
+        named, numbers = (Chain.of(self.description, named=named, in_joint_values=True) for named in (True, False))
+        return named, numbers
