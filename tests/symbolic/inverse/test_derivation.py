@@ -122,6 +122,7 @@ def check_family(law, arm):
     assert derivation.family.name == found.name
     for proof in derivation.identities():
         assert proof, proof.statement
+    arm = derivation.chain.description  # lengths of at most 1e-12 of the reach are read as 0
     hold(law, arm, derivation, random_states(arm, 50), found.words)
 
 
@@ -143,6 +144,26 @@ def test_any_arm_of_the_stanfords_family(law, arm):
 @given(arm=few_joint_arms())
 def test_any_arm_of_few_joints(law, arm):
     check_family(law, arm)
+
+
+def test_numbers_near_zero_and_right_angles_are_read_as_the_kernels_read_them(law):
+    right, tiny = 1.5707963267949, 1e-15  # 13 digits, and what an import leaves of 0
+    rows = [(0, 0.6, tiny, -right), (0, 0.15, 0.43, 0), (0, 0, 0.02, right), (0, 0.43, tiny, -right)]
+    arm = from_dh([*rows, (0, tiny, 0, right), (0, 0.06, 0, tiny)], name="rounded")
+    derivation = inverse_derivation(arm)
+    assert derivation.family.name == classify(arm).name
+    assert "note: alpha1, -1.5707963267949, is read as -pi/2" in derivation.text()
+    assert derivation.prove(100)
+    T = world_to_tool(arm, random_states(arm, 1000))
+    kernels, ours = inverse_kinematics(arm, T), derivation.solve(T)
+    both = kernels.valid & (smallest_measures(derivation, T) > NEAR)
+    assert both.mean() > 0.9
+    assert np.nanmax(gaps(arm, ours, kernels.q)[both]) < 1e-9
+    read = derivation.chain.description
+    hold(law, read, derivation, random_states(read, 1000), "rounded")
+    slide = [(0, tiny, 0, -right), (0, tiny, 0, -right), (1e-250, 0, 0.5, 0), (0, 0, 0, right), (0, 0, 0, right)]
+    arm = from_dh([*slide, (0, 0.1, 0, 0)], kinds="RRPRRR")
+    hold(law, arm, inverse_derivation(arm), random_states(arm, 1000), "rounded slide")
 
 
 def test_the_proof_can_fail():

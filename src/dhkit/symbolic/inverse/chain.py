@@ -7,16 +7,18 @@ F = tool. Angles of joints are the table's theta_i: joint value plus offset.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
 from dhkit.description import Convention, Description
 from dhkit.description.parameters import resolved
-from dhkit.expressions import Expression, exact_angle, substitute
+from dhkit.expressions import PI, ZERO, Expression, exact_angle, substitute
 from dhkit.symbolic.exact.naming import Naming
 from dhkit.symbolic.exact.transforms import identity, inverse, rotation, translation
 from dhkit.symbolic.ring import Direction, Element, Elements, Ring
@@ -36,6 +38,8 @@ DEFINED = (
     *("x", "y", "u", "v", "cphi", "sphi"),
 )
 """Names that steps may define."""
+ROUNDING = Fraction(1, 10**12)
+"""rad, and lengths over the reach."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,6 +196,36 @@ class Chain:
     def named(self, names: Iterable[str]) -> Elements:
         """Return defined quantities by their usual names, shape (k,)."""
         return np.array([self.symbol(name) for name in names], dtype=object)
+
+
+def without_rounding(description: Description) -> tuple[Description, list[str]]:
+    """Return an arm with lengths within ROUNDING of 0 as 0, angles so near k pi/2 as k pi/2, and notes on these.
+
+    ``arm.family`` reads tables with the same tolerance; only numbers change, not parameters.
+    """
+    joints, notes = [], []
+    for i, joint in enumerate(description.joints, start=1):
+        read = {
+            **{name: _rounded_length(getattr(joint, name), description.reach or 1.0) for name in ("a", "d")},
+            **{name: _rounded_angle(getattr(joint, name)) for name in ("alpha", "theta")},
+        }
+        changed: dict[str, Any] = {name: value for name, value in read.items() if value is not None}
+        notes += [f"{name}{i}, {float(getattr(joint, name))!r}, is read as {new}" for name, new in changed.items()]
+        joints.append(replace(joint, **changed) if changed else joint)
+    return (replace(description, joints=tuple(joints)) if notes else description), notes
+
+
+def _rounded_length(length: Expression, reach: float) -> Expression | None:
+    number = length.rational
+    return ZERO if number and abs(number) <= ROUNDING * reach else None
+
+
+def _rounded_angle(angle: Expression) -> Expression | None:
+    number = exact_angle(angle).rational
+    if not number:
+        return None
+    nearest = PI * Fraction(round(2 * float(number) / math.pi), 2)
+    return nearest if abs(nearest.value() - number) <= ROUNDING else None
 
 
 @lru_cache(maxsize=64)

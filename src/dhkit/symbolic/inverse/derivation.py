@@ -17,7 +17,7 @@ from dhkit.display import repr_line
 from dhkit.errors import DescriptionError
 from dhkit.formats import format_function
 from dhkit.symbolic.exact.lagrangian import Proof
-from dhkit.symbolic.inverse.chain import POSE, Chain
+from dhkit.symbolic.inverse.chain import POSE, Chain, without_rounding
 from dhkit.symbolic.inverse.families import Derivable, family_of
 from dhkit.symbolic.inverse.forms import ROUNDING, Unknown, lemmas
 from dhkit.symbolic.inverse.missing import why_not
@@ -396,7 +396,7 @@ def inverse_derivation(description: Description) -> InverseDerivation:
     DescriptionError
         No closed form is known: says which axes do not meet or are not parallel, and what to use instead.
     """
-    notes: list[str] = []
+    description, notes = without_rounding(description)
     chain = Chain.of(description, named=True)
     family = family_of(chain)
     if family is None:
