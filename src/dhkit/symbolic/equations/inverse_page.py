@@ -34,10 +34,10 @@ def inverse_page(derivation: InverseDerivation) -> str:
         "<h2>Denavit-Hartenberg table</h2>",
         DHTable.of(derivation.description)._repr_html_(),
     ]
-    return html_page(f"{name}: inverse kinematics", "\n".join([*filter(None, head), inverse_body(derivation)]))
+    return html_page(f"{name}: inverse kinematics", "\n".join([*filter(None, head), _body(derivation)]))
 
 
-def inverse_body(derivation: InverseDerivation) -> str:
+def _body(derivation: InverseDerivation) -> str:
     """Return a derivation as HTML to stand inside a page or a notebook."""
     write, T = Phrases(derivation, latex=True), sample_pose(derivation)
     first, given, angles = introduction(derivation)

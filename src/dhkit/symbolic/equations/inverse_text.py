@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterator
 
+from dhkit.display import html_table
 from dhkit.symbolic.equations.inverse_writing import Phrases, phi_label, solved_before
 from dhkit.symbolic.equations.latex_document import escaped
 from dhkit.symbolic.equations.text import WIDTH, broken_lines
@@ -32,6 +33,21 @@ def inverse_text(derivation: InverseDerivation) -> str:
     for note in derivation.notes:
         lines += textwrap.wrap(f"note: {note}", WIDTH)
     return "\n".join(lines) + "\n"
+
+
+def inverse_table(derivation: InverseDerivation) -> str:
+    """Return a derivation's equations and solutions as a table of HTML, a row for each step."""
+    write = Phrases(derivation, latex=False)
+    rows = []
+    for step in derivation.steps:
+        if step.form is None:
+            continue
+        equations = "; ".join(f"{left} = {right}" for left, right in write.equations(step))
+        solution = write.solution(step.form)
+        rows.append([equations, f"{solution.unknown} = {' or '.join(solution.alternatives)}"])
+    return html_table(
+        ("what is looked at", "equation", "solution"), rows, f"{derivation.description.name}: joint by joint"
+    )
 
 
 def introduction(derivation: InverseDerivation) -> list[str]:

@@ -11,12 +11,12 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from dhkit.description import Convention, Description
+from dhkit.description import Convention, Description, takes_robot
 from dhkit.description.parameters import resolved
 from dhkit.expressions import PI, ZERO, Expression, exact_angle, substitute
 from dhkit.symbolic.exact.naming import Naming
@@ -228,7 +228,7 @@ def _rounded_angle(angle: Expression) -> Expression | None:
     return nearest if abs(nearest.value() - number) <= ROUNDING else None
 
 
-@lru_cache(maxsize=64)
+@takes_robot
 def table_lengths(description: Description) -> dict[str, Fraction]:
     """Return the lengths of a table that are numbers, by the names that derivations give them: a2, d3, m."""
     naming, found = Naming(description, "inertial"), {}

@@ -210,7 +210,7 @@ class InverseDerivation:
         return repr_line("InverseDerivation", self.description.name, f"{self.geometry}, {len(self.steps)} steps")
 
     def _repr_html_(self) -> str:
-        return str(format_function("inverse_body")(self))
+        return str(format_function("inverse_table")(self))
 
     # Proof
 
