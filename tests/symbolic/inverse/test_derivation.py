@@ -27,24 +27,37 @@ CLOSES_NEAR = 1e-7
 NEAR = 1e-3
 """Singularity measure below which textbook formulas lose digits."""
 JOINTS = 1e-12
-"""rad and shares of the reach: difference from the kernels, times the smallest measure of a branch."""
+"""rad and shares of ``scale``: difference from the kernels, times the smallest measure of a branch."""
 LIBRARY = [*SIX_JOINTS, *FEW_JOINTS]
 
 
-def gaps(arm, a, b):
-    """Largest differences of joint values, shape (..., B): angles the short way, slides over the reach."""
+def scale(arm, T):
+    """Return the length that lengths of a solution are compared with, at poses (N, 4, 4): (N,), m.
+
+    The reach counts no travel of slides without limits; the distance of the pose from the base does.
+    """
+    base = np.array([float(x) for x in arm.base.placement.xyz])
+    return (arm.reach or 1.0) + np.linalg.norm(T[:, :3, 3] - base, axis=-1)
+
+
+def gaps(arm, T, a, b):
+    """Return the largest differences of joint values (N, B, n): (N, B), angles the short way, slides over ``scale``."""
     turned = np.abs((a - b + np.pi) % (2 * np.pi) - np.pi)
-    away = np.where(arm.numbers.prismatic, np.abs(a - b) / (arm.reach or 1.0), turned)
+    away = np.where(arm.numbers.prismatic, np.abs(a - b) / scale(arm, T)[:, None, None], turned)
     return away.max(axis=-1)
 
 
 def smallest_measures(derivation, T):
-    """The smallest sine, or root relative to its terms, of each branch at poses (N, 4, 4): (N, B), NaN for none."""
-    reach = derivation.description.reach or 1.0
+    """The smallest sine, or root relative to its terms, of each branch at poses (N, 4, 4): (N, B), NaN for none.
+
+    A step that loses digits hands its error on, and a second one divides it again: of several measures below NEAR it is
+    the product of their shares of NEAR, times NEAR.
+    """
+    reach = scale(derivation.description, T)
     result = np.full((len(T), len(derivation.branches)), np.nan)
     with np.errstate(all="ignore"):
         for values, solved in derivation.candidates(T):
-            least = np.ones(len(T))
+            least, shares = np.ones(len(T)), np.ones(len(T))
             for step in derivation.steps:
                 if step.form is None:
                     continue
@@ -61,7 +74,8 @@ def smallest_measures(derivation, T):
                     measure = np.hypot(letters["U"], letters["V"]) / reach
                 else:
                     continue
-                least = np.minimum(least, measure)
+                least, shares = np.minimum(least, measure), shares * np.minimum(measure / NEAR, 1.0)
+            least = np.where(least < NEAR, NEAR * shares, least)
             rows = np.flatnonzero(solved)
             result[rows, derivation._named(values)[rows]] = least[rows]
     return result
@@ -80,7 +94,7 @@ def hold(law, arm, derivation, q, where):
     both = solved & kernels.valid & (least > 1e-9)
     law.holds(
         "joints beside the kernels, times the measure",
-        np.max((gaps(arm, ours, kernels.q) * least)[both], initial=0),
+        np.max((gaps(arm, T, ours, kernels.q) * least)[both], initial=0),
         JOINTS,
         where,
     )
@@ -158,7 +172,7 @@ def test_numbers_near_zero_and_right_angles_are_read_as_the_kernels_read_them(la
     kernels, ours = inverse_kinematics(arm, T), derivation.solve(T)
     both = kernels.valid & (smallest_measures(derivation, T) > NEAR)
     assert both.mean() > 0.9
-    assert np.nanmax(gaps(arm, ours, kernels.q)[both]) < 1e-9
+    assert np.nanmax(gaps(arm, T, ours, kernels.q)[both]) < 1e-9
     read = derivation.chain.description
     hold(law, read, derivation, random_states(read, 1000), "rounded")
     slide = [(0, tiny, 0, -right), (0, tiny, 0, -right), (1e-250, 0, 0.5, 0), (0, 0, 0, right), (0, 0, 0, right)]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from dhkit.symbolic.exact.transforms import rotation
 from dhkit.symbolic.inverse.chain import Chain
 from dhkit.symbolic.inverse.forms import Direction as Directed, Turned
@@ -227,7 +229,7 @@ def yaw_three(bench: Workbench) -> None:
     plane = turn_the_plane(bench, origin(bench.T), origin(chain.part(2, 4) @ chain.last), TOOL)
     sense, senses = relative_sense(chain, 2) * relative_sense(chain, 3), _parallel_senses(chain)
     # The tool's axis that is seen in the plane: z, or x if z is along the axes.
-    column = 2 if any(abs(number(chain, x)) > 0.5 for x in chain.last[:2, 2]) else 0
+    column = 2 if math.hypot(*(number(chain, x) for x in chain.last[:2, 2])) > 0.5 else 0
     _known_rotation(bench, into_axis_2(bench, bench.T[:3, column]), chain.last[:3, column], sense, senses, column)
     _reach_axis_4(bench, plane, origin(chain.last), sense, senses)
 
