@@ -1,7 +1,7 @@
 """Arithmetic and trigonometric text, read without ever evaluating it, and the exact numbers it stands for."""
 
 from dhkit.expressions.budget import Budget
-from dhkit.expressions.exact import PI, ZERO, Atom, Expression
+from dhkit.expressions.exact import PI, PI_DIGITS, ZERO, Atom, Expression
 from dhkit.expressions.functions import FUNCTIONS, arc_tangent, call, cos, decimals, settled, sin, sqrt, substitute
 from dhkit.expressions.numbers import exact, exact_angle
 from dhkit.expressions.parser import CONSTANTS, parse
@@ -11,6 +11,7 @@ __all__ = [
     "CONSTANTS",
     "FUNCTIONS",
     "PI",
+    "PI_DIGITS",
     "ZERO",
     "Atom",
     "Budget",

@@ -50,8 +50,8 @@ def gaps(arm, T, a, b):
 def smallest_measures(derivation, T):
     """The smallest sine, or root relative to its terms, of each branch at poses (N, 4, 4): (N, B), NaN for none.
 
-    A step that loses digits hands its error on, and a second one divides it again: of several measures below NEAR it is
-    the product of their shares of NEAR, times NEAR.
+    A step that loses digits hands its error on, and a later one divides it by its own measure again: where the smallest
+    is below NEAR, all measures below 0.1 count, as the product of their shares of 0.1.
     """
     reach = scale(derivation.description, T)
     result = np.full((len(T), len(derivation.branches)), np.nan)
@@ -74,8 +74,8 @@ def smallest_measures(derivation, T):
                     measure = np.hypot(letters["U"], letters["V"]) / reach
                 else:
                     continue
-                least, shares = np.minimum(least, measure), shares * np.minimum(measure / NEAR, 1.0)
-            least = np.where(least < NEAR, NEAR * shares, least)
+                least, shares = np.minimum(least, measure), shares * np.minimum(measure / 0.1, 1.0)
+            least = np.where(least < NEAR, 0.1 * shares, least)
             rows = np.flatnonzero(solved)
             result[rows, derivation._named(values)[rows]] = least[rows]
     return result

@@ -26,7 +26,7 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.closed_form.arm_plane import as_pair
+from dhkit.kinematics.closed_form.arm_plane import UPRIGHT, as_pair
 from dhkit.kinematics.closed_form.family import Fit, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
     ROUNDING,
@@ -86,7 +86,7 @@ def chain_fit(axes: Axes) -> Fit | None:
             "axis": np.eye(3)[column],
             "pointing": as_pair(seen[0, column], seen[1, column]),
             "senses": tuple(axes.sense(first, i) for i in range(1, axes.n + 1)),
-            "up": 1.0 if R[2, 2] >= 0 else -1.0,
+            "up": 1.0 if R[2, 2] >= -UPRIGHT else -1.0,
             "reach": axes.scale,
         },
         branches=("left", "right"),

@@ -7,18 +7,16 @@ F = tool. Angles of joints are the table's theta_i: joint value plus offset.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from dhkit.description import Convention, Description, takes_robot
+from dhkit.description import Convention, Description, Placement, takes_robot
 from dhkit.description.parameters import resolved
-from dhkit.expressions import PI, ZERO, Expression, exact_angle, substitute
+from dhkit.expressions import PI, PI_DIGITS, ZERO, Expression, exact_angle, substitute
 from dhkit.symbolic.exact.naming import Naming
 from dhkit.symbolic.exact.transforms import identity, inverse, rotation, translation
 from dhkit.symbolic.ring import Direction, Element, Elements, Ring
@@ -203,29 +201,42 @@ def without_rounding(description: Description) -> tuple[Description, list[str]]:
 
     ``arm.family`` reads tables with the same tolerance; only numbers change, not parameters.
     """
-    joints, notes = [], []
-    for i, joint in enumerate(description.joints, start=1):
-        read = {
-            **{name: _rounded_length(getattr(joint, name), description.reach or 1.0) for name in ("a", "d")},
-            **{name: _rounded_angle(getattr(joint, name)) for name in ("alpha", "theta")},
-        }
-        changed: dict[str, Any] = {name: value for name, value in read.items() if value is not None}
-        notes += [f"{name}{i}, {float(getattr(joint, name))!r}, is read as {new}" for name, new in changed.items()]
-        joints.append(replace(joint, **changed) if changed else joint)
-    return (replace(description, joints=tuple(joints)) if notes else description), notes
+    notes: list[str] = []
 
+    def length(name: str, value: Expression) -> Expression:
+        return nearest(name, value, value.rational, ZERO, (description.reach or 1.0) * ROUNDING)
 
-def _rounded_length(length: Expression, reach: float) -> Expression | None:
-    number = length.rational
-    return ZERO if number and abs(number) <= ROUNDING * reach else None
+    def angle(name: str, value: Expression) -> Expression:
+        number = exact_angle(value).rational
+        return nearest(name, value, number, PI * Fraction(round(2 * (number or 0) / PI_DIGITS), 2), ROUNDING)
 
+    def nearest(
+        name: str, value: Expression, number: Fraction | None, known: Expression, tolerance: float | Fraction
+    ) -> Expression:
+        if not number or abs(known.value() - number) > tolerance:
+            return value
+        notes.append(f"{name}, {float(number)!r}, is read as {known}")
+        return known
 
-def _rounded_angle(angle: Expression) -> Expression | None:
-    number = exact_angle(angle).rational
-    if not number:
-        return None
-    nearest = PI * Fraction(round(2 * float(number) / math.pi), 2)
-    return nearest if abs(nearest.value() - number) <= ROUNDING else None
+    def end(name: str, placement: Placement) -> Placement:
+        x, y, z = (length(f"{axis} of the {name}", v) for axis, v in zip("xyz", placement.xyz, strict=True))
+        angles = zip(("roll", "pitch", "yaw"), placement.rpy, strict=True)
+        roll, pitch, yaw = (angle(f"{turn} of the {name}", v) for turn, v in angles)
+        return Placement((x, y, z), (roll, pitch, yaw))
+
+    joints = tuple(
+        replace(
+            joint,
+            a=length(f"a{i}", joint.a),
+            alpha=angle(f"alpha{i}", joint.alpha),
+            d=length(f"d{i}", joint.d),
+            theta=angle(f"theta{i}", joint.theta),
+        )
+        for i, joint in enumerate(description.joints, start=1)
+    )
+    base = replace(description.base, placement=end("base", description.base.placement))
+    tool = replace(description.tool, placement=end("tool", description.tool.placement))
+    return (replace(description, joints=joints, base=base, tool=tool) if notes else description), notes
 
 
 @takes_robot

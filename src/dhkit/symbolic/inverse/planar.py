@@ -11,6 +11,7 @@ from dhkit.symbolic.exact.transforms import rotation
 from dhkit.symbolic.inverse.chain import Chain
 from dhkit.symbolic.inverse.forms import Circle, Turned
 from dhkit.symbolic.inverse.regions import (
+    UPRIGHT,
     height_of_slide,
     linear_parts,
     number,
@@ -75,7 +76,7 @@ def parallel_chain(bench: Workbench) -> None:
     first = _between(chain, a, b)
     end = _end(chain, turning[-1])
     up: Any = chain.first[2, :3] @ before[:3, 2]
-    side = chain.ring.number(1 if number(chain, up) >= 0 else -1)
+    side = chain.ring.number(1 if number(chain, up) >= -UPRIGHT else -1)
     x, y = point
     last = end
     if len(turning) == 3:

@@ -14,6 +14,9 @@ from dhkit.symbolic.inverse.steps import Choice, Definition, Figure, Step, View,
 from dhkit.symbolic.ring import Element, Elements
 from dhkit.symbolic.ring.elements import element_array
 
+UPRIGHT = 1e-9
+"""Of entries of the vertical's direction, as in ``dhkit.kinematics.closed_form``."""
+
 
 @dataclass(frozen=True, eq=False)
 class Plane:
@@ -39,6 +42,15 @@ def number(chain: Chain, element: Element) -> float:
     """Return the value of an element of constants, with the file's values."""
     ring = chain.ring
     return float(element.value([chain.values.get(g.text, np.nan) for g in ring.generators]))
+
+
+def vertical(chain: Chain) -> Elements:
+    """Return the direction that is up in the frame before joint 1, shape (3,).
+
+    It only gives branches their names; a base that is upright or level but for UPRIGHT counts as upright or level.
+    """
+    zero = chain.ring.zero
+    return element_array([zero if abs(number(chain, x)) <= UPRIGHT else x for x in chain.first[2, :3]])
 
 
 def into_axis_2(bench: Workbench, vector: Elements) -> Elements:
@@ -88,7 +100,7 @@ def turn_the_plane(bench: Workbench, point: Elements, inside: Elements, who: str
         )
     names = ("front", "back")
     if offset:
-        swapped = (-1.0 if number(chain, chain.first[2, 2]) < 0 else 1.0) * offset > 0
+        swapped = (-1.0 if number(chain, vertical(chain)[2]) < 0 else 1.0) * offset > 0
         names = ("right", "left") if swapped else ("left", "right")
     bench.add(
         Step(
@@ -103,7 +115,7 @@ def turn_the_plane(bench: Workbench, point: Elements, inside: Elements, who: str
         )
     )
     x, y = c * px + s * py - chain.a[0], tilt * (pz - chain.d[0])
-    up = into_axis_2(bench, chain.first[2, :3])
+    up = into_axis_2(bench, vertical(chain))
     return Plane(tilt, x, y, (up[0], up[1]))
 
 
