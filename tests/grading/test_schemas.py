@@ -14,6 +14,7 @@ from dhkit.description import library_robot, robots
 from dhkit.errors import AnswerError, DhkitError
 from dhkit.grading import LIBRARY, Rubric, Verdict, grade, robot_of
 from dhkit.grading.answers.sheet import read_sheet, read_task
+from dhkit.grading.marks import marks
 from dhkit.grading.schema import rubric_schema, sheet_schema, task_schema, template
 from grading import test_docs, test_rubric
 
@@ -142,6 +143,25 @@ def test_every_sheet_of_the_corpus_fits():
 @pytest.mark.parametrize("name", robots())
 def test_an_empty_sheet_fits(name):
     assert fits("sheet", template(library_robot(name)))
+
+
+def test_steps_of_an_empty_sheet_are_those_to_fill_in(tmp_path):
+    text = template(library_robot("puma560"))
+    path = tmp_path / "sheet.toml"
+    head, steps = text.split("# [answer.ik]")
+    path.write_text(
+        head + "\n".join(line.removeprefix("# ") for line in ("# [answer.ik]" + steps).splitlines()), "utf-8"
+    )
+    assert fits("sheet", path.read_text("utf-8"))
+    assert "joint = 6" in path.read_text("utf-8")
+    with pytest.raises(AnswerError, match="every entry is empty"):
+        grade(path)
+    path.write_text(path.read_text("utf-8").replace('1, equation = ""', '1, equation = "px*s1 - py*c1 = d3"'), "utf-8")
+    report = grade(path)
+    assert report.verdict is Verdict.INCOMPLETE
+    earned = marks(report, Rubric())
+    assert earned.points == pytest.approx(earned.most / 6, abs=0.51)  # rounded
+    assert "[answer.ik]" not in template(library_robot("panda"))
 
 
 @pytest.mark.parametrize(

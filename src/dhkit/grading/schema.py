@@ -25,6 +25,7 @@ from dhkit.grading.answers.sheet import (
 )
 from dhkit.grading.mistakes.library import LIBRARY
 from dhkit.grading.rubric import WEIGHED, Rubric
+from dhkit.kinematics import classify
 
 Schema: TypeAlias = dict[str, Any]
 """A JSON Schema, or a part of one."""
@@ -242,6 +243,14 @@ def template(description: Description, robot: str | None = None) -> str:
         f'# convention = "{description.convention.value}"',
         "# rows = [" + ", ".join('["", "", "", ""]' for _ in range(n)) + "]",
     ]
+    if classify(description).family is not None:
+        lines += [
+            "",
+            "# [answer.ik]                # joint by joint from T: px, py, pz, r11 ... r33, and joints found before",
+            "# steps = [                  # for two solutions: ±, or a list",
+            *(f'#   {{ joint = {i + 1}, equation = "", solution = "" }},' for i in range(n)),
+            "# ]",
+        ]
     return "\n".join(lines) + "\n"
 
 

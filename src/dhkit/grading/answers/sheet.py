@@ -319,7 +319,8 @@ def _steps(checker: _Checker, data: Mapping[str, object]) -> tuple[InverseStep, 
     expected = f'1 to {MAX_STEPS} steps such as {{ joint = 1, equation = "...", solution = "..." }}'
     if not isinstance(steps, list) or not 0 < len(steps) <= MAX_STEPS:
         raise checker.error("answer.ik.steps", steps, expected)
-    return tuple(_step(checker, step, f"answer.ik.steps[{k}]", expected) for k, step in enumerate(steps))
+    read = [_step(checker, step, f"answer.ik.steps[{k}]", expected) for k, step in enumerate(steps)]
+    return tuple(step for step in read if step.equations or step.solutions)
 
 
 def _step(checker: _Checker, data: object, place: str, expected: str) -> InverseStep:
@@ -336,7 +337,7 @@ def _step(checker: _Checker, data: object, place: str, expected: str) -> Inverse
         if len(several) > MAX_STEPS:
             raise checker.error(f"{place}.{key}", f"{len(several)} formulas", f"at most {MAX_STEPS}")
         texts.append(tuple(text for text in several if text.strip()))
-    if not any(texts):
+    if not {"equation", "solution"} & data.keys():
         raise checker.error(place, data, "an equation, a solution, or both")
     return InverseStep(joint, *texts)
 

@@ -71,9 +71,10 @@ class _Judge(StepContext):
             if entry.verdict.severity >= Verdict.WRONG.severity:
                 wrong.append(step.joint)
         missing = sorted({*range(self.description.n)} - {step.joint for step in steps})
-        if missing:
-            named = ", ".join(f"q{j + 1}" for j in missing)
-            entries.append(Entry("ik", (len(steps),), Verdict.INCOMPLETE, statement=f"no step finds {named}"))
+        entries += [
+            Entry("ik", (len(steps) + k,), Verdict.INCOMPLETE, statement=f"no step finds q{j + 1}")
+            for k, j in enumerate(missing)
+        ]
         if not self.poses.asks_rotation and self.poses.pose_parts:
             notes.append(Note(NoteKind.ASKED_FOR, "ik", self.poses.pose_parts))
         return KinematicJudgement(tuple(entries), tuple(diagnosis), tuple(notes))
