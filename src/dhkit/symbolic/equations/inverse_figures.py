@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from html import escape
+from typing import TypeAlias
 
 import numpy as np
 
@@ -17,8 +18,13 @@ WIDTH, HEIGHT, MARGIN = 340, 250, 46
 """Of a figure, in pixels."""
 FIRST, SECOND, PLAIN, FAINT = "#0b5cad", "#c2570c", "#1b1f24", "#8c959f"
 """Colours of the two solutions, of points, and of helping lines."""
+LETTER = 6.8
+"""Mean width of a letter, in pixels."""
 SHORT = 1e-9
 """Share of the figure's size below which a length is not drawn."""
+
+
+Pixel: TypeAlias = tuple[float, float]
 
 
 @dataclass
@@ -37,6 +43,10 @@ class Drawing:
         """Add a point with its name."""
         self.points.append(at)
         self.items.append(("dot", (at,), colour, label))
+
+    def name(self, at: Array, text: str, colour: str) -> None:
+        """Add a text at a point."""
+        self.items.append(("name", (at,), colour, text))
 
     def label(self, a: Array, b: Array, text: str, colour: str) -> None:
         """Add a text beside the middle of a line."""
@@ -58,6 +68,8 @@ class Drawing:
             x, y = (point - middle) * scale
             return round(WIDTH / 2 + x, 1), round(HEIGHT / 2 - y, 1)
 
+        lines = [[at(point) for point in points] for kind, points, *_ in self.items if kind == "line"]
+        texts = []
         parts = [
             f'<svg class="figure" role="img" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" '
             f'xmlns="http://www.w3.org/2000/svg"><title>{escape(title)}</title>'
@@ -77,11 +89,12 @@ class Drawing:
             elif kind == "dot":
                 ((x, y),) = places
                 parts.append(f'<circle cx="{x}" cy="{y}" r="4.5" fill="{colour}"/>')
-                parts.append(_text(x, y, text, colour, y > HEIGHT / 2))
+                texts.append(_text((x, y), text, colour, lines))
+            elif kind == "name":
+                texts.append(_text(places[0], text, colour, lines))
             else:
-                (x1, y1), (x2, y2) = places
-                parts.append(_beside((x1, y1), (x2, y2), text, colour))
-        return "".join([*parts, "</svg>"])
+                texts.append(_beside(places[0], places[1], text, colour))
+        return "".join([*parts, *texts, "</svg>"])
 
 
 def figure_of(derivation: InverseDerivation, step: Step, T: Array) -> str:
@@ -135,7 +148,7 @@ def _top(derivation: InverseDerivation, form: Form, figure: Figure, values: Valu
             drawing.line(origin, point, colour)
         tip = foot + 0.35 * float(np.linalg.norm(point)) * ahead
         drawing.line(foot, tip, colour, "dashed")
-        drawing.label(foot, tip, "theta1" + (" + pi" if sign < 0 and not is_beside else ""), colour)
+        drawing.name(tip, "theta1" + (" + pi" if sign < 0 and not is_beside else ""), colour)
     if beside:
         drawing.circle(origin, beside)
     drawing.dot(origin, axis)
@@ -191,13 +204,18 @@ def _turned(vector: Array, angle: float) -> Array:
     return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]])
 
 
-def _text(x: float, y: float, text: str, colour: str, below: bool) -> str:
-    anchor = "start" if x < WIDTH / 3 else "end" if x > 2 * WIDTH / 3 else "middle"
-    y += 18 if below else -10
-    return f'<text x="{x}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}">{escape(text)}</text>'
+def _text(at: Pixel, text: str, colour: str, lines: Sequence[Sequence[Pixel]]) -> str:
+    """Return a text above or below a point, where fewer of its lines lead, inside the figure."""
+    x, y = at
+    others = [other for a, b in lines for here, other in ((a, b), (b, a)) if here == at]
+    downwards = sum((v - y) / max(float(np.hypot(u - x, v - y)), 1.0) for u, v in others)
+    half = LETTER * len(text) / 2
+    x = min(max(x, half), WIDTH - half)
+    y += -10 if downwards > 0 else 18
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="middle" fill="{colour}">{escape(text)}</text>'
 
 
-def _beside(a: Sequence[float], b: Sequence[float], text: str, colour: str) -> str:
+def _beside(a: Pixel, b: Pixel, text: str, colour: str) -> str:
     """Return a text beside the middle of a line, on its right where it rises and on its left where it falls."""
     (x1, y1), (x2, y2) = a, b
     x, y = (x1 + x2) / 2, (y1 + y2) / 2

@@ -17,8 +17,9 @@ from dhkit.symbolic.inverse.steps import Step
 STYLE = """<style>
 .ik-step { display: flow-root; }
 .ik-step svg.figure { float: right; max-width: 100%; height: auto; margin: 0 0 .5rem 1.5rem; }
-svg.figure text { font: 13px sans-serif; } .ik-step .solution { background: #f3f6fa; border-left: 3px solid #0b5cad; }
-.ik-step .display + .display { padding-top: 0; } .ik-step p { margin: .35rem 0; }
+svg.figure text { font: 13px sans-serif; paint-order: stroke; stroke: #fff; stroke-width: 4px; }
+.ik-step .solution { background: #f3f6fa; border-left: 3px solid #0b5cad; }
+.ik-step .display { padding-top: .25rem; padding-bottom: .25rem; } .ik-step p { margin: .35rem 0; }
 .ik-known { color: #57606a; }
 </style>"""
 ANGLE = re.compile(r"\b(theta)(\d+)\b|\bphi\b")
