@@ -214,6 +214,10 @@ class NoteKind(Enum):
     """The branches give ``values[0]`` of the ``values[1]`` solutions that the arm has in general."""
     ROOTS_MISSING = "roots_missing"
     """A step gives ``values[0]`` of the ``values[1]`` values that its joint has in general."""
+    STEP_REMARK = "step_remark"
+    """A step passes; ``values`` has a sentence on a part of it that earns nothing, or on where it holds."""
+    TABLE_ANGLES = "table_angles"
+    """Angles of steps are read as those of the table, joint values plus offsets: more steps pass so."""
     PROGRAM = "program"
     """How a program or paper was read: ``values`` has the reader's text, with its line."""
 
@@ -353,7 +357,16 @@ class GradeReport:
     @property
     def missing(self) -> tuple[str, ...]:
         """Names of the entries and quantities that were begun or asked for, and are not on the sheet."""
-        return tuple(entry.name for entry in self.entries if entry.verdict is Verdict.INCOMPLETE)
+        return tuple(entry.name for entry in self._incomplete if not entry.answer)
+
+    @property
+    def unfinished(self) -> tuple[Entry, ...]:
+        """Entries on the sheet that are not wrong, but do not give what was asked for; their statements say why."""
+        return tuple(entry for entry in self._incomplete if entry.answer)
+
+    @property
+    def _incomplete(self) -> list[Entry]:
+        return [entry for entry in self.entries if entry.verdict is Verdict.INCOMPLETE]
 
     @property
     def fault(self) -> str:
@@ -374,6 +387,7 @@ class GradeReport:
     @property
     def _diagnosis_lines(self) -> list[str]:
         lines = [f"{diagnosis.place}: {diagnosis.sentence}" for diagnosis in self.diagnosis]
+        lines += [f"{entry.name}: {entry.statement}" for entry in self.unfinished]
         return lines + ([f"missing: {', '.join(self.missing)}"] if self.missing else [])
 
     @property

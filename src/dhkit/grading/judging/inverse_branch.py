@@ -36,11 +36,14 @@ class Branch:
         Formulas, one for each joint.
     repairs
         Joints, from 0, with changes of their values before later joints use them.
+    given_order
+        Joints, from 0, in the order in which their formulas are evaluated; by default as the formulas need it.
     """
 
     poses: Poses
     trees: tuple[Tree, ...]
     repairs: tuple[tuple[int, Repair], ...] = ()
+    given_order: tuple[int, ...] = ()
 
     @property
     def n(self) -> int:
@@ -50,7 +53,7 @@ class Branch:
     @cached_property
     def order(self) -> tuple[int, ...]:
         """Joints, from 0, in the order in which their formulas are evaluated."""
-        return joint_order(self.trees)
+        return self.given_order or joint_order(self.trees)
 
     def rank(self, joint: int) -> int:
         """Return the position of a joint in the order."""
@@ -158,7 +161,7 @@ class Branch:
     def sample(self, most: int) -> Branch:
         """Return the branch at up to so many poses that it fails to reach, and at up to as many that it reaches."""
         chosen = [*np.flatnonzero(self.failing)[:most], *np.flatnonzero(self.closed)[:most]]
-        return Branch(self.poses.at(chosen), self.trees)
+        return Branch(self.poses.at(chosen), self.trees, given_order=self.given_order)
 
     def with_repair(self, joint: int, repair: Repair) -> Branch:
         """Return the branch with a change of a joint's values."""
@@ -170,7 +173,7 @@ class Branch:
 
     def with_trees(self, trees: Sequence[Tree]) -> Branch:
         """Return the branch with other formulas."""
-        return Branch(self.poses, tuple(trees), self.repairs)
+        return replace(self, trees=tuple(trees))
 
 
 def joint_order(branch: Sequence[Tree], where: str = "ik") -> tuple[int, ...]:

@@ -76,9 +76,12 @@ class Poses:
     known: Array | None = None
 
     @classmethod
-    def random(cls, description: Description, samples: int, seed: int) -> Poses:
-        """Return the poses of random joint values in :func:`joint_ranges`."""
+    def random(cls, description: Description, samples: int, seed: int, *, whole_turns: bool = False) -> Poses:
+        """Return the poses of random joint values in :func:`joint_ranges`; of angles of a whole turn if wanted."""
         lower, upper = joint_ranges(description)
+        if whole_turns:
+            turning = ~description.numbers.prismatic
+            lower, upper = np.where(turning, -np.pi, lower), np.where(turning, np.pi, upper)
         q = np.random.default_rng(seed).uniform(lower, upper, (samples, description.n))
         T = world_to_tool(description, q)
         if classify(description).family is None:
@@ -98,6 +101,16 @@ class Poses:
         index = np.asarray(chosen, dtype=int)
         known = None if self.known is None else self.known[index]
         return replace(self, q=self.q[index], T=self.T[index], solutions=self.solutions[index], known=known)
+
+    def with_known(self, known: Array) -> Poses:
+        """Return the poses with joint values (S, n), rad and m, that formulas may use as known1, known2 ..."""
+        return replace(self, known=known)
+
+    def followed_by(self, other: Poses) -> Poses:
+        """Return these poses and then those of another set of the same arm."""
+        pairs = ((getattr(self, name), getattr(other, name)) for name in ("q", "T", "solutions"))
+        q, T, solutions = (np.concatenate(pair) for pair in pairs)
+        return replace(self, q=q, T=T, solutions=solutions, known=None)
 
     @property
     def has_closed_form(self) -> bool:
@@ -170,7 +183,7 @@ class Poses:
         near: Mask = np.max(np.abs(self.residuals(q, self.T)), axis=1) <= CLOSES
         return near
 
-    def gaps(self, a: Array, b: Array, joint: int | slice = slice(None)) -> Array:
+    def gaps(self, a: Array, b: Array, joint: int | slice | list[int] = slice(None)) -> Array:
         """Return the distances of joint values (..., n): angles the short way in rad, slides relative to the reach."""
         prismatic = self.description.numbers.prismatic[joint]
         with np.errstate(invalid="ignore"):

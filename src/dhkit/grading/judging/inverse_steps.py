@@ -9,12 +9,16 @@ true values: a joint that is right in terms of wrong earlier ones is right.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from dhkit.description import Description
 from dhkit.errors import AnswerError
+from dhkit.expressions import ZERO, read
+from dhkit.expressions.syntax import Name, Sum, Tree
 from dhkit.grading.answers.inverse_steps import GivenStep
+from dhkit.grading.judging.changed_formulas import renamed
 from dhkit.grading.judging.inverse_poses import Poses
 from dhkit.grading.judging.numeric import names_of
 from dhkit.grading.judging.step_context import Part, StepContext
@@ -22,6 +26,28 @@ from dhkit.grading.judging.step_equations import Equations
 from dhkit.grading.judging.step_solutions import Solutions
 from dhkit.grading.mistakes.library import hint_of, sentence_of
 from dhkit.grading.report import Diagnosis, Entry, KinematicJudgement, Note, NoteKind, Verdict, entry_name
+
+
+def steps_in_table_angles(description: Description, steps: Sequence[GivenStep]) -> list[GivenStep] | None:
+    """Return steps whose angles are the table's theta, joint value plus offset, in joint values; None if they agree."""
+    offsets = {
+        j: read(str(joint.theta))
+        for j, joint in enumerate(description.joints)
+        if description.kinds[j] == "R" and joint.theta != ZERO
+    }
+    if not offsets:
+        return None
+    change: dict[str, Tree] = {
+        f"q{j + 1}": Sum(((True, Name(f"q{j + 1}", 0)), (True, offset))) for j, offset in offsets.items()
+    }
+    changed = []
+    for step in steps:
+        solutions = [renamed(tree, change) for tree in step.solutions]
+        if step.joint in offsets:
+            solutions = [Sum(((True, tree), (False, offsets[step.joint]))) for tree in solutions]
+        equations = tuple((renamed(left, change), renamed(right, change)) for left, right in step.equations)
+        changed.append(replace(step, equations=equations, solutions=tuple(solutions)))
+    return changed
 
 
 def judge_steps(
@@ -51,8 +77,21 @@ def judge_steps(
             raise AnswerError(f"ik, step {k}: joint {step.joint + 1}; expected 1 to {n}")
         if step.joint in [other.joint for other in steps[: k - 1]]:
             raise AnswerError(f"ik, step {k}: joint {step.joint + 1} has a step already")
+    poses = Poses.random(description, samples, seed)
     with np.errstate(all="ignore"):
-        return _Judge(description, Poses.random(description, samples, seed), explain).judgement(steps)
+        judged = _Judge(description, poses, seed, explain).judgement(steps)
+        in_table_angles = steps_in_table_angles(description, steps)
+        if in_table_angles is None or not _count(judged, Verdict.WRONG):
+            return judged
+        other = _Judge(description, poses, seed, explain).judgement(in_table_angles)
+    # One reading for the whole sheet: the joint values, unless more steps pass in the table's angles.
+    if sum(e.verdict.passes for e in other.entries) <= sum(e.verdict.passes for e in judged.entries):
+        return judged
+    return replace(other, notes=(*other.notes, Note(NoteKind.TABLE_ANGLES, "ik")))
+
+
+def _count(judgement: KinematicJudgement, verdict: Verdict) -> int:
+    return sum(entry.verdict is verdict for entry in judgement.entries)
 
 
 class _Judge(StepContext):
@@ -61,14 +100,14 @@ class _Judge(StepContext):
         diagnosis: list[Diagnosis] = []
         notes: list[Note] = []
         wrong: list[int] = []
+        self.solutions = Solutions(self)
         for k, step in enumerate(steps):
             before = [other.joint for other in steps[:k]]
-            several = any(len(other.solutions) > 1 for other in steps[:k])
-            entry, found, note = self._step(k, step, before, [j for j in before if j in wrong], several)
+            entry, found, note = self._step(k, step, before, [j for j in before if j in wrong])
             entries.append(entry)
             diagnosis += found
             notes += note
-            if entry.verdict.severity >= Verdict.WRONG.severity:
+            if entry.verdict.severity >= Verdict.WRONG.severity and step.joint not in self.solutions.solved:
                 wrong.append(step.joint)
         missing = sorted({*range(self.description.n)} - {step.joint for step in steps})
         entries += [
@@ -80,25 +119,32 @@ class _Judge(StepContext):
         return KinematicJudgement(tuple(entries), tuple(diagnosis), tuple(notes))
 
     def _step(
-        self, k: int, step: GivenStep, before: Sequence[int], wrong: Sequence[int], several: bool
+        self, k: int, step: GivenStep, before: Sequence[int], wrong: Sequence[int]
     ) -> tuple[Entry, list[Diagnosis], list[Note]]:
-        """Return the entry of step k, from 0, its diagnosis, and notes.
-
-        ``several`` says whether an earlier step gives several roots, for all of which this one has to be right.
-        """
+        """Return the entry of step k, from 0, its diagnosis, and notes."""
+        name = entry_name("ik", (k,))
         if step.error:
+            self.solutions.skip(step.joint)
             return Entry("ik", (k,), Verdict.UNREADABLE, step.text, statement=step.error), [], []
         parts, notes = [], []
         try:
             if step.equations:
                 parts.append(Equations(self, step, before).part())
-            if step.solutions:
-                part, roots = Solutions(self, step, before, several).part()
+            if not step.solutions:
+                self.solutions.skip(step.joint)
+            else:
+                part, roots = self.solutions.part(step, before)
+                if part.verdict.passes:  # the solution is what was asked for
+                    open_parts = [one for one in parts if one.verdict is Verdict.INCOMPLETE]
+                    notes += [Note(NoteKind.STEP_REMARK, name, (one.statement,)) for one in open_parts]
+                    parts = [one for one in parts if one not in open_parts]
                 parts.append(part)
                 if roots is not None and roots[0] < roots[1]:
-                    notes.append(Note(NoteKind.ROOTS_MISSING, entry_name("ik", (k,)), (str(roots[0]), str(roots[1]))))
+                    notes.append(Note(NoteKind.ROOTS_MISSING, name, (str(roots[0]), str(roots[1]))))
         except AnswerError as error:
+            self.solutions.skip(step.joint)
             return Entry("ik", (k,), Verdict.UNREADABLE, step.text, statement=str(error)), [], []
+        notes += [Note(NoteKind.STEP_REMARK, name, (one.remark,)) for one in parts if one.remark]
         worst = max(parts, key=lambda part: part.verdict.severity)
         statement = "; ".join(part.statement for part in parts)
         used = {name for tree in step.solutions for name in names_of(tree)}

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
+import numpy as np
+
 from dhkit.description import Description
 from dhkit.errors import DescriptionError
 from dhkit.expressions.syntax import Name, Tree
 from dhkit.grading.judging.inverse_edits import Lengths
 from dhkit.grading.judging.inverse_mistakes import lengths_of
-from dhkit.grading.judging.inverse_poses import Poses
+from dhkit.grading.judging.inverse_poses import Mask, Poses
 from dhkit.grading.judging.numeric import names_of
 from dhkit.grading.report import Verdict, Witness
 from dhkit.symbolic import InverseDerivation, inverse_derivation, table_lengths
@@ -29,6 +31,8 @@ class Part:
     """Mistakes with details."""
     difference: str | None = None
     witness: Witness | None = None
+    remark: str = ""
+    """What a reader should know of a part that passes."""
 
 
 class StepContext:
@@ -40,12 +44,14 @@ class StepContext:
         The robot.
     poses
         Random poses with their solutions.
+    seed
+        Seed of further poses.
     explain
         Whether to look for mistakes.
     """
 
-    def __init__(self, description: Description, poses: Poses, explain: bool) -> None:
-        self.description, self.poses, self.explain = description, poses, explain
+    def __init__(self, description: Description, poses: Poses, seed: int, explain: bool) -> None:
+        self.description, self.poses, self.seed, self.explain = description, poses, seed, explain
 
     @cached_property
     def derivation(self) -> InverseDerivation | None:
@@ -67,6 +73,31 @@ class StepContext:
             return lengths_of(self.description)
         known = (*self.description.parameters, *table)
         return Lengths(known, tuple(Name(name, 0) for name in known))
+
+    @cached_property
+    def solved_poses(self) -> Poses:
+        """The poses at which solutions are tried: those of joint values within the limits, then those of any angles.
+
+        Of these the poses at which the arm has most solutions: elsewhere a root may be right, and later joints out of
+        reach. Without a closed form the poses alone.
+        """
+        return self._solved[0]
+
+    @property
+    def within_limits(self) -> Mask:
+        """Which of :attr:`solved_poses` are those of joint values within the limits, shape (S,)."""
+        return self._solved[1]
+
+    @cached_property
+    def _solved(self) -> tuple[Poses, Mask]:
+        inside = self.poses
+        count = len(inside.q)
+        if not inside.has_closed_form:
+            return inside, np.ones(count, dtype=bool)
+        every = inside.followed_by(Poses.random(self.description, count, self.seed, whole_turns=True))
+        found = np.sum(np.all(np.isfinite(every.solutions), axis=-1), axis=1)
+        rows = np.flatnonzero(found == found.max())
+        return every.at(rows), rows < count
 
     @cached_property
     def chains(self) -> tuple[Chain, Chain]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from dhkit.description import Array
 from dhkit.errors import AnswerError
-from dhkit.expressions.syntax import Sum, Tree
+from dhkit.expressions.syntax import Number, Sum, Tree
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.answers.inverse_steps import GivenStep
 from dhkit.grading.judging.changed_formulas import square_of
 from dhkit.grading.judging.inverse_edits import Edit, Lengths, edits_of_parts
-from dhkit.grading.judging.numeric import EditedDoubles, doubles, names_of
+from dhkit.grading.judging.numeric import EditedDoubles, doubles, names_of, parts_of
 from dhkit.grading.judging.quotients import OutsideTheRingError, RingReader
 from dhkit.grading.judging.step_context import Part, StepContext
 from dhkit.grading.report import Verdict, Witness
@@ -29,14 +29,17 @@ from dhkit.symbolic.ring.ring import translated
 
 MAX_SHOWN = 200
 """Longest difference of an equation's sides that is printed, in characters."""
-FREE_POSES = 8
-"""Number of random poses, unrelated to the joints, at which an equation that says nothing of the arm holds."""
+FREE_POSES = 32
+"""Number of random poses, unrelated to the joints; an equation that holds at one of them says nothing of the arm."""
 ZERO = 1e-9
 """Largest difference of an equation's sides, relative to their size, that is rounding."""
 OF_BOTH_SIDES = ("square_forgotten", "square_too_much", "root_forgotten")
 """Changes of both sides of an equation at once, which are no correction."""
 STEP = 1e-6
-"""Step of finite differences, rad and m."""
+"""Step of finite differences, rad, and relative to the reach."""
+WITH_NUMBERS = "proved: an identity of the arm with its own lengths"
+NO_CHANGE = 1e-7
+"""Change of an equation, relative to the size of its terms, by a step of one, that is rounding."""
 SAME_RANK = 1e-5
 """Singular value, as a share of the largest, below which an equation adds nothing to the others."""
 
@@ -56,11 +59,18 @@ class Equations:
             if strange := sorted(names_of(tree) - known):
                 raise AnswerError(f"equation: unknown name {strange[0]!r}")
         statements = []
+        remarks: list[str] = []
         verdict = Verdict.CORRECT
         for k, tree in enumerate(self.differences):
             found, statement, difference = self._identity(tree)
             if found is Verdict.WRONG:
-                return self._wrong(k, tree, difference)
+                share = self._share_of_a_root(tree)
+                if share is None:
+                    return self._wrong(k, tree, difference)
+                found, statement = Verdict.UNDECIDED, "true of one of the joint's roots; tried, not proved"
+                remarks.append(f"the equation is true of one root alone, at {share:.3g} % of the poses tried")
+            elif statement == WITH_NUMBERS and self._is_in_names(tree):
+                remarks.append("the equation is true of this arm alone: it needs lengths that are equal, or zero, here")
             statements.append(statement)
             verdict = max(verdict, found, key=lambda one: one.severity)
         own = f"q{self.step.joint + 1}"
@@ -73,7 +83,7 @@ class Equations:
             later = sorted(used & joints - {own} - {f"q{j + 1}" for j in self.before})
             what = f", as {', '.join(later)} {'is' if len(later) == 1 else 'are'} not known yet" if later else ""
             return Part(Verdict.INCOMPLETE, f"the equation is right, but does not determine {own}{what}")
-        return Part(verdict, f"equation: {statements[0]}")
+        return Part(verdict, f"equation: {statements[0]}", remark="; ".join(dict.fromkeys(remarks)))
 
     def _identity(self, tree: Tree) -> tuple[Verdict, str, str | None]:
         """Return whether a difference is zero for the pose of the arm, why, and what it is if not."""
@@ -87,7 +97,7 @@ class Equations:
         difference: str | None = None
         for chain, known, statement in (
             (named, {}, "proved: an identity of the arm, whatever its lengths are"),
-            (numbers, {**table, **values}, "proved: an identity of the arm with its own lengths"),
+            (numbers, {**table, **values}, WITH_NUMBERS),
         ):
             try:
                 element = self._element(tree, chain, known)
@@ -109,19 +119,19 @@ class Equations:
         used = {k for monomial in quotient.numerator.terms for k, e in enumerate(monomial) if e and k in places}
         return translated(quotient.numerator, chain.ring, {k: places[k] for k in used})
 
-    def _values(self, q: Array) -> dict[str, Array | float]:
-        return {**self.context.poses.values, **{f"q{i + 1}": column for i, column in enumerate(q.T)}}
+    @property
+    def _values(self) -> dict[str, Array | float]:
+        return {**self.context.poses.values, **_joints(self.context.poses.q)}
 
     def residual(self, tree: Tree, values: dict[str, Array | float] | None = None) -> Array:
         """Return the difference of an equation's sides relative to the size of its terms, shape (S,)."""
-        given = self._values(self.context.poses.q) if values is None else values
-        size = sum(np.abs(np.asarray(doubles(part, given))) for part in _terms(tree))
-        relative = np.asarray(doubles(tree, given)) / np.maximum(size, 1e-12)
+        given = self._values if values is None else values
+        relative = np.asarray(doubles(tree, given)) / np.maximum(_sizes(tree, given), 1e-12)
         residual: Array = np.broadcast_to(np.nan_to_num(relative, nan=np.inf), np.shape(given["px"]))
         return residual
 
     def _holds_always(self, tree: Tree) -> bool:
-        """Whether an equation holds for poses that have nothing to do with the joints."""
+        """Whether an equation holds for poses that have nothing to do with the joints: at one of them, if it has roots."""
         rng = np.random.default_rng(5)
         n, scale = self.context.description.n, self.context.poses.scale
         T = np.tile(np.eye(4), (FREE_POSES, 1, 1))
@@ -129,35 +139,54 @@ class Equations:
         T[:, :3, 3] = rng.uniform(-scale, scale, (FREE_POSES, 3))
         free = Equations(self.context, self.step, self.before)
         poses = replace(self.context.poses, q=rng.uniform(-2, 2, (FREE_POSES, n)), T=T, known=None)
-        values = {**poses.values, **{f"q{i + 1}": column for i, column in enumerate(poses.q.T)}}
-        return bool(np.max(np.abs(free.residual(tree, values))) < ZERO)
+        values = {**poses.values, **_joints(poses.q)}
+        return bool(np.min(np.abs(free.residual(tree, values))) < ZERO)
+
+    def _share_of_a_root(self, tree: Tree) -> float | None:
+        """Return at how many poses, in %, an equation holds that is true of one root at all poses; None for another.
+
+        An equation with an explicit root, such as c1 = px/sqrt(px^2 + py^2), holds for some of the solutions of a pose.
+        """
+        poses = self.context.solved_poses
+        truths = poses.truths
+        holds = np.zeros(truths.shape[:2], dtype=bool)
+        for b in range(truths.shape[1]):
+            at = {**poses.values, **{f"q{i + 1}": column for i, column in enumerate(truths[:, b].T)}}
+            holds[:, b] = np.abs(self.residual(tree, at)) < ZERO
+        share = 100 * float(np.mean(np.abs(self.residual(tree)) < ZERO))
+        return share if share > 0 and poses.has_closed_form and np.all(holds.any(axis=1)) else None
+
+    def _is_in_names(self, tree: Tree) -> bool:
+        """Whether an equation has lengths by name, and no number that may stand for one."""
+        lengths = {*table_lengths(self.context.description), *self.context.description.parameters}
+        numbers = [part for part in parts_of(tree) if isinstance(part, Number) and part.value.denominator != 1]
+        return bool(names_of(tree) & lengths) and not numbers
 
     def _determines(self) -> bool:
         """Whether the equations determine the joint where those of earlier steps are known."""
         n, own = self.context.description.n, self.step.joint
         free = [j for j in range(n) if j not in self.before]
-        poses = self.context.poses.at(range(min(8, len(self.context.poses.q))))
-        columns = []
-        for j in free:
-            pushed = poses.q + STEP * np.eye(n)[j]
-            sides = []
-            for tree in self.differences:
-                at, after = (
-                    np.asarray(doubles(tree, {**poses.values, **{f"q{i + 1}": c for i, c in enumerate(q.T)}}))
-                    for q in (poses.q, pushed)
-                )
-                sides.append(np.broadcast_to((after - at) / STEP, len(poses.q)))
-            columns.append(sides)
-        J = np.array(columns).transpose(2, 1, 0)  # (S, equations, free joints)
-        own_column = free.index(own)
-        without = np.delete(J, own_column, axis=2)
+        holds = np.all([np.abs(self.residual(tree)) < ZERO for tree in self.differences], axis=0)
+        poses = self.context.poses.at(np.flatnonzero(holds)[:8])
+        J = np.zeros((len(poses.q), len(self.differences), len(free)))
+        for m, tree in enumerate(self.differences):
+            at = _sizes(tree, {**poses.values, **_joints(poses.q)})
+            for k, j in enumerate(free):
+                unit = poses.scale if poses.description.kinds[j] == "P" else 1.0
+                sides = [
+                    np.asarray(doubles(tree, {**poses.values, **_joints(poses.q + sign * STEP * unit * np.eye(n)[j])}))
+                    for sign in (0, 1)
+                ]
+                J[:, m, k] = (sides[1] - sides[0]) / STEP / np.maximum(at, 1e-12)
+        J[np.abs(J) < NO_CHANGE] = 0
+        without = np.delete(J, free.index(own), axis=2)
         return bool(np.mean(_ranks(J) > _ranks(without)) > 0.5)
 
     def _wrong(self, k: int, tree: Tree, difference: str | None) -> Part:
         """Return the part of a wrong equation k, with its mistake."""
         residual = np.abs(self.residual(tree))
         s = int(np.argmax(residual))
-        values = self._values(self.context.poses.q)
+        values = self._values
         left, right = (
             float(np.broadcast_to(doubles(side, values), len(residual))[s]) for side in self.step.equations[k]
         )
@@ -174,7 +203,7 @@ class Equations:
     def _mistake(self, tree: Tree) -> str | None:
         """Return the mistake whose correction makes a wrong equation an identity."""
         poses = self.context.poses.at(range(min(40, len(self.context.poses.q))))
-        values = {**poses.values, **{f"q{i + 1}": column for i, column in enumerate(poses.q.T)}}
+        values = {**poses.values, **_joints(poses.q)}
         formula, lengths = EditedDoubles(tree, values), self.context.lengths([tree])
         size = np.max(np.abs(np.asarray(formula.numbers))) + self.context.poses.scale
         for edit in (*_with_a_length(tree, lengths, self.step.joint), *edits_of_parts(tree, lengths)):
@@ -194,6 +223,17 @@ def _with_a_length(tree: Tree, lengths: Lengths, joint: int) -> Iterator[Edit]:
             for added in (True, False):
                 new = Sum(((True, tree), (added, term)))
                 yield Edit(name, new, tree, new)
+
+
+def _joints(q: Array) -> dict[str, Array | float]:
+    """Return joint values (S, n), rad and m, by name."""
+    return {f"q{i + 1}": column for i, column in enumerate(q.T)}
+
+
+def _sizes(tree: Tree, values: Mapping[str, Array | float]) -> Array:
+    """Return the sum of the sizes of a formula's terms, shape (S,) or ()."""
+    sizes: Array = sum((np.abs(np.asarray(doubles(part, values))) for part in _terms(tree)), np.zeros(()))
+    return sizes
 
 
 def _terms(tree: Tree) -> list[Tree]:

@@ -1,159 +1,331 @@
-"""Judging of the solutions of a step of inverse kinematics: a joint's value, given the joints of earlier steps."""
+"""Judging of the solutions of steps of inverse kinematics: a joint's values, given the joints of earlier steps.
+
+The student's roots are followed: each choice among the roots of earlier steps has a set of the arm's solutions that
+agree with it, and a formula is right if its value belongs to one of them, at all poses and after every choice. An earlier
+joint without a right solution has its true values: any of them if one formula is right for all, else those of one branch,
+or with one sign of the sine or cosine, the same in all following steps.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from itertools import chain
+from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Name, Number, Product, Sum, Tree
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.answers.inverse_steps import GivenStep
-from dhkit.grading.judging.inverse_branch import Branch
+from dhkit.grading.judging.inverse_branch import MISSED_SHARE, Branch
 from dhkit.grading.judging.inverse_mistakes import Search
 from dhkit.grading.judging.inverse_poses import CLOSES, KNOWN, MATCHES, Mask
-from dhkit.grading.judging.numeric import names_of
+from dhkit.grading.judging.numeric import doubles, names_of
 from dhkit.grading.judging.step_context import Part, StepContext
 from dhkit.grading.report import Verdict, Witness
 from dhkit.symbolic.inverse.forms import Circle
 
+MAX_HYPOTHESES = 100
+"""Largest number of ways to take earlier joints without a right solution that are followed at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """One choice among the roots of the steps so far.
+
+    Attributes
+    ----------
+    alive
+        Which solutions of the arm have the values chosen, shape (S, B).
+    q
+        Values of the joints found, shape (S, n), rad and m; NaN of others, and where no solution has the values.
+    """
+
+    alive: Mask
+    q: Array
+
+    @property
+    def rows(self) -> Mask:
+        """The poses at which a solution has the values, shape (S,)."""
+        rows: Mask = self.alive.any(axis=1)
+        return rows
+
+
+Hypothesis: TypeAlias = tuple[Choice, ...]
+"""All choices among the student's roots, for one way to take the earlier joints without a right solution."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """The formulas of a step, tried after each choice of a hypothesis.
+
+    Attributes
+    ----------
+    choices
+        The choices before the step.
+    values
+        Values of each formula after each choice, each of shape (S,), rad or m.
+    following
+        Choices after the step: one for each formula and earlier choice.
+    right
+        Share of the poses at which each formula is right after each choice, shape (formulas, choices); 1 without poses.
+    right_within_limits
+        The same at poses that joint values within the limits give.
+    """
+
+    choices: Hypothesis
+    values: list[list[Array]]
+    following: list[list[Choice]]
+    right: Array
+    right_within_limits: Array
+
+    @property
+    def worst(self) -> tuple[int, int]:
+        """The formula and the choice with the smallest share of poses at which it is right."""
+        k, c = np.unravel_index(int(np.argmin(self.right_within_limits)), self.right.shape)
+        return int(k), int(c)
+
 
 class Solutions:
-    """Judges the solutions of one step."""
+    """Judges the solutions of steps, in their order; it keeps the choices among the roots so far.
 
-    def __init__(self, context: StepContext, step: GivenStep, before: Sequence[int], several: bool) -> None:
-        self.context, self.step, self.before, self.several = context, step, before, several
+    Parameters
+    ----------
+    context
+        The arm and poses.
+    """
 
-    def part(self) -> tuple[Part, tuple[int, int] | None]:
-        """Return the verdict, and the numbers of roots that are given and that there are."""
-        own, n = self.step.joint, self.context.description.n
-        values = self.context.poses.values
-        for tree in self.step.solutions:
-            names = names_of(tree)
-            if f"q{own + 1}" in names:
-                raise AnswerError(f"solution: uses q{own + 1}, which it is to give")
-            later = [f"q{j + 1}" for j in range(n) if j not in self.before and f"q{j + 1}" in names]
-            if later:
-                return Part(Verdict.INCOMPLETE, f"solution: uses {later[0]}, which no earlier step finds"), None
-            if strange := sorted(names - {*values, "pi"} - {f"q{j + 1}" for j in self.before}):
-                raise AnswerError(f"solution: unknown name {strange[0]!r}")
-        statements, found = [], np.zeros((0, 0), dtype=bool)
-        for k, tree in enumerate(self.step.solutions):
-            branch, right = self._best(tree)
-            which = f"solution {k + 1}" if len(self.step.solutions) > 1 else "solution"
-            if not right:
-                return self._wrong(which, branch), None
-            hits = self._roots(branch)
-            if any(np.array_equal(hits, other) for other in found):
-                part = Part(Verdict.WRONG, f"{which}: gives the same as another", [("duplicate_branch", "")])
-                return part, None
-            found = np.vstack([found, hits[None]]) if found.size else hits[None]
-            statements.append(which)
-        count = len(self.context.poses.q)
-        statement = f"solution: right at {count} poses given the joints before; tried, not proved"
-        return Part(Verdict.CORRECT, statement), (len(self.step.solutions), int(self.counts.max(initial=0)))
+    def __init__(self, context: StepContext) -> None:
+        self.context = context
+        self.unsolved: list[int] = []
+        """Joints of earlier steps whose values are none of the student's and not yet part of the hypotheses."""
+        self.solved: set[int] = set()
+        """Joints of which the student's values are right."""
+        self._hypotheses: list[Hypothesis] = []
 
-    def _branch(self, tree: Tree, known: Array) -> Branch:
-        """Return a branch with a formula for this joint, earlier joints known, and later ones as they follow.
+    @property
+    def truths(self) -> Array:
+        """Solutions at the poses, shape (S, B, n), rad and m."""
+        return self.context.solved_poses.truths
 
-        At poses where each value of this joint leads to a solution: a root may be right and later joints out of reach.
+    @property
+    def hypotheses(self) -> list[Hypothesis]:
+        """The ways to take earlier joints without a right solution that explain the steps so far."""
+        if not self._hypotheses:
+            alive = np.all(np.isfinite(self.truths), axis=-1)
+            self._hypotheses = [(Choice(alive, np.full((len(alive), self.truths.shape[-1]), np.nan)),)]
+        if self.unsolved:
+            following = [
+                found
+                for hypothesis in self._hypotheses
+                for found in self._divided(hypothesis, self.unsolved)
+                if any(np.any(choice.alive) for choice in found)
+            ]
+            self._hypotheses, self.unsolved = following[:MAX_HYPOTHESES], []
+        return self._hypotheses
+
+    def skip(self, joint: int) -> None:
+        """Take a joint whose step has no solution that could be judged as unsolved."""
+        self.unsolved.append(joint)
+
+    def part(self, step: GivenStep, before: Sequence[int]) -> tuple[Part, tuple[int, int] | None]:
+        """Return the verdict on a step's solutions, and the numbers of roots that are given and that there are.
+
+        Parameters
+        ----------
+        step
+            The step.
+        before
+            Joints of earlier steps, from 0, in the order of these.
+
+        Raises
+        ------
+        AnswerError
+            A name that is unknown there, or an arm whose joints do not follow from the pose.
         """
-        rows = np.flatnonzero(np.isfinite(known).all(axis=1) & (self.counts == self.counts.max(initial=0)))
-        poses = replace(self.context.poses.at(rows), known=known[rows])
-        given = {j: Name(f"{KNOWN}{j + 1}", 0) for j in range(self.context.description.n)}
-        nothing = Product(((True, Number(Fraction(0), "0", 0)), (True, Name(f"q{self.step.joint + 1}", 0))))
-        trees: list[Tree] = []
-        for j, name in given.items():
-            if j == self.step.joint:
-                trees.append(tree)
-            elif j in self.before:
-                trees.append(name)
-            else:  # behind this joint, in the order of evaluation
-                trees.append(Sum(((True, name), (True, nothing))))
-        return Branch(poses, tuple(trees))
-
-    def _best(self, tree: Tree) -> tuple[Branch, bool]:
-        """Return the branch at whose earlier joints a formula is right most often, and whether it always is.
-
-        A formula may be that of one branch, unless earlier steps give several roots.
-        """
-        own = self.step.joint
-        solutions = self.context.poses.solutions
-        of_branches = () if self.several else (solutions[:, b] for b in range(solutions.shape[1]))
-        candidates = [self.context.poses.q, *of_branches]
-        best: tuple[float, Branch] | None = None
-        for known in candidates:
-            branch = self._branch(tree, known)
-            if not len(branch.poses.q):
-                continue
-            share = float(np.mean(branch.agrees(own, branch.q[:, own])))
-            if best is None or share > best[0]:
-                best = share, branch
-            if share == 1.0:
+        if (part := self._unusable(step, before)) is not None:
+            self.skip(step.joint)
+            return part, None
+        trials = [self._trial(hypothesis, step) for hypothesis in self.hypotheses]
+        least = 1.0 if self.context.poses.has_closed_form else 1.0 - MISSED_SHARE
+        for beyond in (True, False):
+            right = [
+                trial
+                for trial in trials
+                if np.min(trial.right if beyond else trial.right_within_limits) >= least and self._reached(trial)
+            ]
+            if right:
                 break
-        if best is None:
-            raise AnswerError("solution: the arm has no poses to try it at")
-        return best[1], best[0] == 1.0
+        else:
+            trial = max(trials, key=lambda one: float(np.min(one.right_within_limits)))
+            self.skip(step.joint)
+            return self._wrong(trial, step, before), None
+        first = right[0]
+        count = self._count(first.choices, step.joint)
+        if (same := _same(first.values)) is not None:
+            self.skip(step.joint)
+            return Part(Verdict.WRONG, f"solution {same}: gives the same as another", [("duplicate_branch", "")]), None
+        self._hypotheses = [tuple(chain(*trial.following)) for trial in right]
+        self.solved.add(step.joint)
+        tried, where, remark = self.context.within_limits, "", ""
+        if beyond:
+            tried = np.ones_like(tried)
+        else:
+            where = " within the joint limits"
+            remark = f"right{where}; beyond them at {100 * float(np.min(first.right)):.3g} % of the poses tried"
+        statement = f"solution: right at {np.sum(tried)} poses{where} given the joints before; tried, not proved"
+        verdict = Verdict.CORRECT if self.context.poses.has_closed_form else Verdict.UNDECIDED
+        return Part(verdict, statement, remark=remark), (len(step.solutions), count)
 
-    def _roots(self, branch: Branch) -> NDArray[np.bool_]:
-        """Return which joint values, rounded, a formula gives at the poses: equal for equal formulas."""
-        x = np.remainder(branch.q[:, self.step.joint], 2 * np.pi)
-        whole = np.zeros(len(self.context.poses.q))
-        whole[: len(x)] = x
-        hits: NDArray[np.bool_] = np.round(whole / (10 * MATCHES)).astype(np.int64)
-        return hits
-
-    @cached_property
-    def counts(self) -> NDArray[np.int_]:
-        """The number of values that this joint may have at each pose, given the joints of earlier steps, shape (S,)."""
-        poses, own = self.context.poses, self.step.joint
-        truths = poses.truths
-        alive: Mask = np.all(np.isfinite(truths), axis=-1)
-        for j in self.before:
-            alive &= poses.gaps(truths[..., j], poses.q[:, None, j], j) < MATCHES
-        values = truths[..., own]
-        # A value counts if none before it is the same.
-        same = poses.gaps(values[:, :, None], values[:, None, :], own) < MATCHES
-        earlier = np.tril(np.ones(same.shape[1:], dtype=bool), -1)
-        counts: NDArray[np.int_] = np.sum(alive & ~np.any(same & earlier & alive[:, None, :], axis=2), axis=1)
-        return counts
-
-    def _wrong(self, which: str, branch: Branch) -> Part:
-        own = self.step.joint
-        agrees = branch.agrees(own, branch.q[:, own])
-        s = int(np.argmax(~agrees))
-        pose = {name: float(np.asarray(branch.poses.values[name])[s]) for name in POSE_NAMES}
-        pose |= {f"q{j + 1}": float(branch.q[s, j]) for j in self.before}
-        answer = float(branch.q[s, own])
-        truth = float(np.asarray(branch.poses.values[f"{KNOWN}{own + 1}"])[s])
-        witness = Witness(pose, answer if np.isfinite(answer) else None, truth)
-        share = 100 * float(np.mean(agrees))
-        part = Part(Verdict.WRONG, f"{which}: right at {share:.3g} % of {len(agrees)} poses given the joints before")
-        part.witness = witness
-        if self.context.explain:
-            part.mistakes = [(self._mistake(branch) or "solution_wrong", "")]
-        return part
-
-    def _mistake(self, branch: Branch) -> str | None:
-        if self._forgets_offset(branch):
-            return "shoulder_offset_forgotten"
-        search = Search(self.context.description, self.context.lengths([branch.trees[self.step.joint]]))
-        for explanation in search.explanations(branch):
-            if explanation.joint == self.step.joint:
-                return explanation.mistake
-            return None
+    def _unusable(self, step: GivenStep, before: Sequence[int]) -> Part | None:
+        """Return why formulas cannot be evaluated in this order; None if they can."""
+        own, poses = step.joint, self.context.poses
+        if not poses.isolated:
+            raise AnswerError("solution: the arm reaches a pose with a curve of joint values; equations alone are judged")
+        joints = [f"q{j + 1}" for j in range(self.context.description.n)]
+        for tree in step.solutions:
+            names = names_of(tree)
+            if joints[own] in names:
+                raise AnswerError(f"solution: uses q{own + 1}, which it is to give")
+            if strange := sorted(names - {*poses.values, "pi", *joints}):
+                raise AnswerError(f"solution: unknown name {strange[0]!r}")
+            if later := [joints[j] for j in range(len(joints)) if j not in before and joints[j] in names]:
+                return Part(Verdict.INCOMPLETE, f"solution: uses {later[0]}, which no earlier step finds")
         return None
 
-    def _forgets_offset(self, branch: Branch) -> bool:
+    # Hypotheses
+
+    def _divided(self, hypothesis: Hypothesis, joints: Sequence[int]) -> Iterator[Hypothesis]:
+        """Yield ways to take unsolved joints: all of their values, those of one branch, or of one sign."""
+        truths = self.truths
+        divided = [self._by_values(choice, joints) for choice in hypothesis]
+        yield tuple(choice for parts in divided for choice in parts.values())
+        for j in joints:
+            for function in (np.sin, np.cos) if self.context.description.kinds[j] == "R" else (np.sign,):
+                for sign in (1.0, -1.0):
+                    chosen = function(truths[..., j]) * sign > 0
+                    parts = [self._by_values(Choice(one.alive & chosen, one.q), joints) for one in hypothesis]
+                    yield tuple(choice for part in parts for choice in part.values())
+        for b in range(truths.shape[1]):
+            yield tuple(parts[b] for parts in divided if b in parts)
+
+    def _by_values(self, choice: Choice, joints: Sequence[int]) -> dict[int, Choice]:
+        """Return a choice for each set of values of some joints, by the index of a solution that has them."""
+        joints, parts = list(joints), dict[int, Choice]()
+        values = self.truths[..., joints]
+        for b in range(values.shape[1]):
+            gaps = self.context.solved_poses.gaps(values, values[:, b : b + 1], joints)
+            alive = choice.alive & choice.alive[:, b, None] & np.all(gaps < MATCHES, axis=-1)
+            if not alive.any() or any(np.array_equal(alive, other.alive) for other in parts.values()):
+                continue
+            q = choice.q.copy()
+            q[:, joints] = np.where(alive.any(axis=1)[:, None], values[:, b], np.nan)
+            parts[b] = Choice(alive, q)
+        return parts
+
+    # Formulas
+
+    def _trial(self, hypothesis: Hypothesis, step: GivenStep) -> Trial:
+        values: list[list[Array]] = []
+        following: list[list[Choice]] = []
+        shares = np.ones((2, len(step.solutions), len(hypothesis)))
+        for k, tree in enumerate(step.solutions):
+            values.append([])
+            following.append([])
+            for c, choice in enumerate(hypothesis):
+                x = self._evaluated(tree, choice)
+                after = self._after(choice, step.joint, x)
+                for share, rows in zip(shares, (choice.rows, choice.rows & self.context.within_limits), strict=True):
+                    if np.any(rows):
+                        share[k, c] = np.mean(after.rows[rows])
+                values[-1].append(x)
+                following[-1].append(after)
+        return Trial(hypothesis, values, following, *shares)
+
+    def _evaluated(self, tree: Tree, choice: Choice) -> Array:
+        given = {f"q{j + 1}": column for j, column in enumerate(choice.q.T)}
+        numbers = np.asarray(doubles(tree, {**self.context.solved_poses.values, **given}), dtype=float)
+        x: Array = np.array(np.broadcast_to(numbers, len(choice.q)))
+        x[~np.isfinite(x)] = np.nan
+        return x
+
+    def _after(self, choice: Choice, joint: int, x: Array) -> Choice:
+        """Return a choice with a value of one more joint, x (S,), rad or m."""
+        gaps = self.context.solved_poses.gaps(x[:, None], self.truths[..., joint], joint)
+        alive = choice.alive & (gaps < MATCHES)
+        q = choice.q.copy()
+        q[:, joint] = np.where(alive.any(axis=1), x, np.nan)
+        return Choice(alive, q)
+
+    def _reached(self, trial: Trial) -> bool:
+        """Whether there are poses at which the formulas were tried."""
+        return any(np.any(choice.rows & self.context.within_limits) for choice in trial.choices)
+
+    def _count(self, hypothesis: Hypothesis, joint: int) -> int:
+        """Return the largest number of values that a joint may have after a choice."""
+        most = 0
+        for choice in hypothesis:
+            values = self.truths[..., joint]
+            # A value counts if none before it is the same.
+            same = self.context.solved_poses.gaps(values[:, :, None], values[:, None, :], joint) < MATCHES
+            earlier = np.tril(np.ones(same.shape[1:], dtype=bool), -1)
+            repeated = np.any(same & earlier & choice.alive[:, None, :], axis=2)
+            most = max(most, int(np.sum(choice.alive & ~repeated, axis=1).max(initial=0)))
+        return most
+
+    # Mistakes
+
+    def _wrong(self, trial: Trial, step: GivenStep, before: Sequence[int]) -> Part:
+        k, c = trial.worst
+        own, poses, choice = step.joint, self.context.solved_poses, trial.choices[c]
+        which = f"solution {k + 1}" if len(step.solutions) > 1 else "solution"
+        rows = np.flatnonzero(choice.rows & self.context.within_limits)
+        if not len(rows):
+            return Part(Verdict.WRONG, f"{which}: no pose has the values of the joints before")
+        right = trial.following[k][c].rows
+        s = int(rows[np.argmin(right[rows])])
+        pose = {name: float(np.asarray(poses.values[name])[s]) for name in POSE_NAMES}
+        pose |= {f"q{j + 1}": float(choice.q[s, j]) for j in before}
+        answer, alive = float(trial.values[k][c][s]), np.flatnonzero(choice.alive[s])
+        gaps = poses.gaps(np.full(len(alive), answer), self.truths[s, alive, own], own)
+        nearest = alive[int(np.argmin(np.nan_to_num(gaps, nan=np.inf)))]
+        share = 100 * float(np.mean(right[rows]))
+        part = Part(Verdict.WRONG, f"{which}: right at {share:.3g} % of {len(rows)} poses given the joints before")
+        truth = float(self.truths[s, nearest, own])
+        part.witness = Witness(pose, answer if np.isfinite(answer) else None, truth)
+        if self.context.explain:
+            branch = self._branch(step.solutions[k], choice, rows, own, before)
+            part.mistakes = [(self._mistake(branch, own) or "solution_wrong", "")]
+        return part
+
+    def _branch(self, tree: Tree, choice: Choice, rows: Array, own: int, before: Sequence[int]) -> Branch:
+        """Return a branch with a formula for one joint; earlier joints have their values, and later ones follow."""
+        poses, n = self.context.solved_poses, self.context.description.n
+        first = np.argmax(choice.alive[rows], axis=1)
+        known = self.truths[rows, first]
+        known[:, before] = choice.q[rows][:, before]
+        given = [Name(f"{KNOWN}{j + 1}", 0) for j in range(n)]
+        nothing = Product(((True, Number(Fraction(0), "0", 0)), (True, Name(f"q{own + 1}", 0))))
+        later = [j for j in range(n) if j != own and j not in before]
+        trees: list[Tree] = [Sum(((True, name), (True, nothing))) if j in later else name for j, name in enumerate(given)]
+        trees[own] = tree
+        return Branch(poses.at(rows).with_known(known), tuple(trees), given_order=(*before, own, *later))
+
+    def _mistake(self, branch: Branch, own: int) -> str | None:
+        if self._forgets_offset(branch, own):
+            return "shoulder_offset_forgotten"
+        search = Search(self.context.description, self.context.lengths([branch.trees[own]]))
+        explanation = next(search.explanations(branch), None)
+        return explanation.mistake if explanation is not None and explanation.joint == own else None
+
+    def _forgets_offset(self, branch: Branch, own: int) -> bool:
         """Whether the formula is that of joint 1 without its offset: the direction of the point, or the opposite."""
-        step, derivation = self.context.derived(self.step.joint), self.context.derivation
-        if derivation is None or step is None or self.step.joint != 0 or not isinstance(step.form, Circle):
+        step, derivation = self.context.derived(own), self.context.derivation
+        if derivation is None or step is None or own != 0 or not isinstance(step.form, Circle):
             return False
         values, _ = next(derivation.candidates(branch.poses.T))
         A, B, C = (np.broadcast_to(values.of(step.form.letters[k]), len(branch.q)) for k in "ABC")
@@ -162,3 +334,15 @@ class Solutions:
         x = branch.q[:, 0]
         near = [np.abs((x - straight - turn + np.pi) % (2 * np.pi) - np.pi) < MATCHES for turn in (0.0, np.pi)]
         return bool(np.any(np.abs(C) > CLOSES) and np.mean(near[0] | near[1]) > 0.99)
+
+
+def _same(values: Sequence[Sequence[Array]]) -> int | None:
+    """Return the number, from 1, of a formula whose values are those of one before it after every choice."""
+    def equal(a: Array, b: Array) -> bool:
+        gap = np.abs(np.remainder(a - b + np.pi, 2 * np.pi) - np.pi)
+        return bool(np.all((gap < MATCHES) | np.isnan(gap)))
+
+    for k, own in enumerate(values):
+        if any(all(map(equal, own, other)) for other in values[:k]):
+            return k + 1
+    return None

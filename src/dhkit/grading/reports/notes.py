@@ -40,6 +40,9 @@ SENTENCES: Mapping[NoteKind, str] = {
     NoteKind.ASKED_FOR: "{quantity}: asked for what the arm can meet: {values}",
     NoteKind.POSITIONS_ONLY: "{quantity}: asked for positions alone, which determine the joints of this arm",
     NoteKind.NO_CLOSED_FORM: "{quantity}: no closed form of ours for this arm: how many solutions there are is open",
+    NoteKind.TABLE_ANGLES: "{quantity}: angles are read as the table's theta, joint value plus offset, as the worked "
+    "solution writes them",
+    NoteKind.STEP_REMARK: "{quantity}: {first}",
     NoteKind.ROOTS_MISSING: "{quantity}: gives {first} of the {second} values that the joint has in general",
     NoteKind.SOLUTIONS_MISSING: "{quantity}: the branches give {first} of the {second} solutions that the arm has in "
     "general",

@@ -97,7 +97,8 @@ def reading_lines(report: GradeReport) -> Iterator[str]:
 
 
 def remark_lines(report: GradeReport) -> Iterator[str]:
-    """Yield what a reader needs besides verdicts: missing entries, statements left out, notes."""
+    """Yield what a reader needs besides verdicts: unfinished and missing entries, statements left out, notes."""
+    yield from (f"{plain(entry.name)}: {plain(entry.statement)}" for entry in report.unfinished)
     if report.missing:
         yield f"missing: {', '.join(map(plain, report.missing))}"
     yield from (f"left out: {plain(line)}" for line in report.left_out)
