@@ -83,12 +83,6 @@ class Trial:
     right: Array
     right_within_limits: Array
 
-    @property
-    def worst(self) -> tuple[int, int]:
-        """The formula and the choice with the smallest share of poses at which it is right."""
-        k, c = np.unravel_index(int(np.argmin(self.right_within_limits)), self.right.shape)
-        return int(k), int(c)
-
 
 class Solutions:
     """Judges the solutions of steps, in their order; it keeps the choices among the roots so far.
@@ -156,7 +150,7 @@ class Solutions:
             right = [
                 trial
                 for trial in trials
-                if np.min(trial.right if beyond else trial.right_within_limits) >= least and self._reached(trial)
+                if self._reached(trial) and np.min(trial.right if beyond else trial.right_within_limits) >= least
             ]
             if right:
                 break
@@ -280,40 +274,45 @@ class Solutions:
     # Mistakes
 
     def _wrong(self, trial: Trial, step: GivenStep, before: Sequence[int]) -> Part:
-        k, c = trial.worst
-        own, poses, choice = step.joint, self.context.solved_poses, trial.choices[c]
+        own, inside = step.joint, self.context.within_limits
+        k = int(np.argmin(np.mean(trial.right_within_limits, axis=1)))
         which = f"solution {k + 1}" if len(step.solutions) > 1 else "solution"
-        rows = np.flatnonzero(choice.rows & self.context.within_limits)
-        if not len(rows):
+        places = [(c, s) for c, choice in enumerate(trial.choices) for s in np.flatnonzero(choice.rows & inside)]
+        if not places:
             return Part(Verdict.WRONG, f"{which}: no pose has the values of the joints before")
-        right = trial.following[k][c].rows
-        s = int(rows[np.argmin(right[rows])])
-        pose = {name: float(np.asarray(poses.values[name])[s]) for name in POSE_NAMES}
-        pose |= {f"q{j + 1}": float(choice.q[s, j]) for j in before}
-        answer, alive = float(trial.values[k][c][s]), np.flatnonzero(choice.alive[s])
-        gaps = poses.gaps(np.full(len(alive), answer), self.truths[s, alive, own], own)
-        nearest = alive[int(np.argmin(np.nan_to_num(gaps, nan=np.inf)))]
-        share = 100 * float(np.mean(right[rows]))
-        part = Part(Verdict.WRONG, f"{which}: right at {share:.3g} % of {len(rows)} poses given the joints before")
-        truth = float(self.truths[s, nearest, own])
+        right = np.array([trial.following[k][c].rows[s] for c, s in places])
+        share = 100 * float(np.mean(right))
+        part = Part(Verdict.WRONG, f"{which}: right at {share:.3g} % of {len(right)} poses given the joints before")
+        branch = self._branch(step.solutions[k], trial.choices, places, own, before)
+        c, s = places[int(np.argmin(right))]
+        pose = {name: float(np.asarray(self.context.solved_poses.values[name])[s]) for name in POSE_NAMES}
+        pose |= {f"q{j + 1}": float(trial.choices[c].q[s, j]) for j in before}
+        answer, alive = float(trial.values[k][c][s]), np.flatnonzero(trial.choices[c].alive[s])
+        truths = self.truths[s, alive, own]
+        gaps = self.context.solved_poses.gaps(np.full(len(alive), answer), truths, own)
+        truth = float(truths[int(np.argmin(np.nan_to_num(gaps, nan=np.inf)))])
         part.witness = Witness(pose, answer if np.isfinite(answer) else None, truth)
         if self.context.explain:
-            branch = self._branch(step.solutions[k], choice, rows, own, before)
             part.mistakes = [(self._mistake(branch, own) or "solution_wrong", "")]
         return part
 
-    def _branch(self, tree: Tree, choice: Choice, rows: Array, own: int, before: Sequence[int]) -> Branch:
-        """Return a branch with a formula for one joint; earlier joints have their values, and later ones follow."""
-        poses, n = self.context.solved_poses, self.context.description.n
-        first = np.argmax(choice.alive[rows], axis=1)
-        known = self.truths[rows, first]
-        known[:, before] = choice.q[rows][:, before]
+    def _branch(
+        self, tree: Tree, choices: Hypothesis, places: Sequence[tuple[int, int]], own: int, before: Sequence[int]
+    ) -> Branch:
+        """Return a branch with a formula for one joint; earlier joints have their values, and later ones follow.
+
+        Its poses are those of ``places``, each a choice and the index of a pose.
+        """
+        n, rows = self.context.description.n, [s for _, s in places]
+        known = np.array([self.truths[s, np.argmax(choices[c].alive[s])] for c, s in places])
+        known[:, list(before)] = np.array([choices[c].q[s] for c, s in places])[:, list(before)]
         given = [Name(f"{KNOWN}{j + 1}", 0) for j in range(n)]
         nothing = Product(((True, Number(Fraction(0), "0", 0)), (True, Name(f"q{own + 1}", 0))))
         later = [j for j in range(n) if j != own and j not in before]
         trees: list[Tree] = [Sum(((True, name), (True, nothing))) if j in later else name for j, name in enumerate(given)]
         trees[own] = tree
-        return Branch(poses.at(rows).with_known(known), tuple(trees), given_order=(*before, own, *later))
+        poses = self.context.solved_poses.at(rows).with_known(known)
+        return Branch(poses, tuple(trees), given_order=(*before, own, *later))
 
     def _mistake(self, branch: Branch, own: int) -> str | None:
         if self._forgets_offset(branch, own):
