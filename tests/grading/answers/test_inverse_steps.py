@@ -44,9 +44,14 @@ def test_sheets_that_cannot_be_read(steps, message):
 @pytest.mark.parametrize(
     ("formulas", "message"),
     [
-        ({"equation": "px*s1"}, "0 equals signs; expected an equation with one"),
-        ({"equation": "px = s1 = 2"}, "2 equals signs"),
-        ({"equation": "banana = s1"}, "banana"),
+        ({"equation": "px*s1"}, "no equals sign between two sides; expected an equation"),
+        ({"equation": "px = "}, "no equals sign between two sides; expected an equation"),
+        ({"equation": "banana = s1"}, "'banana = s1': defines quantities, and has no equation or solution of q1"),
+        ({"equation": "D = ±px"}, "'D = ±px': defines 'D' with two signs; write ± where it is used"),
+        ({"equation": "2*D = px"}, "unknown name 'D' .* a quantity of your own is defined by an equation, D = "),
+        ({"solution": "q2 = px"}, "'q2' stands in front of a solution of q1"),
+        ({"solution": "phi = px"}, "'phi' stands in front of a solution of q1"),
+        ({"solution": "py +-sqrt(px)"}, r"'\+-' may be ± or a minus; write ±"),
         ({"solution": "q1 + 1"}, "uses q1, which it is to give"),
         ({"solution": "__import__('os')"}, "position"),
         ({"solution": "("}, "position|bracket|end"),

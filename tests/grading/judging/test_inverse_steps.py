@@ -110,12 +110,17 @@ def test_offsets_base_and_tool_belong_to_the_arm():
     ("steps", "message"),
     [
         ([{"joint": 9, "equation": "c1 = 1"}], "ik, step 1: joint 9; expected 1 to 6"),
-        ([{"joint": 1, "equation": "c1 = 1"}] * 2, "ik, step 2: joint 1 has a step already"),
     ],
 )
 def test_steps_that_cannot_be(steps, message):
     with pytest.raises(AnswerError, match=message):
         judged(steps)
+
+
+def test_a_second_step_of_a_joint_is_not_read_and_the_others_are():
+    entries = judged([*PUMA[:2], PUMA[0], *PUMA[2:]]).entries
+    assert [entry.verdict for entry in entries] == [*[Verdict.CORRECT] * 2, Verdict.UNREADABLE, *[Verdict.CORRECT] * 4]
+    assert "joint 1 has a step already; expected all of its formulas in one" in entries[2].statement
 
 
 def test_a_solution_of_a_later_joint_is_incomplete():

@@ -18,6 +18,7 @@ from dhkit.grading.answers.documents.statements import Statement
 from dhkit.grading.answers.indices import first_index
 from dhkit.grading.answers.matrices import read_matrix
 from dhkit.grading.answers.objects import entry_tree, is_entry
+from dhkit.grading.answers.pose_entries import other_names, with_pose_entries
 from dhkit.grading.answers.pretty import is_pretty
 from dhkit.grading.answers.quantity_names import QuantityNames, Target
 from dhkit.grading.answers.reading import meaning_of
@@ -112,6 +113,8 @@ def vocabulary_of(
     vocabulary.first_index = first_index(texts, vocabulary)
     if vocabulary.first_index is None and sheet.file.endswith((".py", ".ipynb")):
         vocabulary.first_index = 0
+    if inverse:
+        vocabulary.define_aliases(other_names())
     for name, text in names.parameters.items():
         try:
             if isinstance(text, Refusal):
@@ -119,7 +122,8 @@ def vocabulary_of(
             define = vocabulary.redefine if names.lenient else vocabulary.define
             define(name, meaning_of(text, vocabulary))
         except AnswerError as error:
-            if not names.lenient:
+            is_of_the_pose = not inverse and (sheet.steps or sheet.branches)
+            if not names.lenient and not is_of_the_pose:
                 raise AnswerError(f"names.parameters: {quote(name)}: {error}") from None
             vocabulary.refuse(name, f"its own assignment is not read: {error}")
     return vocabulary
@@ -352,7 +356,7 @@ def given_branches(branches: Sequence[Sequence[str]], n: int, vocabulary: Vocabu
     for k, branch in enumerate(branches, start=1):
         if len(branch) != n:
             raise AnswerError(f"ik: branch {k}: found {len(branch)} formulas; expected {n}, one a joint")
-    return _given_lists(branches, vocabulary)
+    return _given_lists([[with_pose_entries(text, vocabulary) for text in branch] for branch in branches], vocabulary)
 
 
 def _given_lists(lists: Sequence[Sequence[str]], vocabulary: Vocabulary) -> list[tuple[Given, ...]]:

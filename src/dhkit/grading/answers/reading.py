@@ -30,7 +30,7 @@ BAR = re.compile(r"-{2,}")
 JOINED = re.compile(r"(?:[-+*/^(,;=\[{&]|\.\.\.|\\)\s*\n|\n\s*(?:[-+*/^),;=\]}&.]|\Z)")
 """A line's end that an operator, or a bracket, joins to the next line."""
 
-TWO_ARGUMENTS = ("atan2", "pow", "Rational", "min", "max")
+TWO_ARGUMENTS = ("atan2", "atan2d", "hypot", "pow", "Rational", "min", "max")
 RECIPROCALS = {"sec": "cos", "csc": "sin", "cot": "tan"}
 
 
@@ -168,8 +168,15 @@ def _plain_call(function: str, arguments: tuple[Tree, ...], at: int) -> Tree:
             return time_derivative(first)
         case "sind" | "cosd" | "tand":
             return Call(function[:3], (_radians(first, at),), at)
+        case "asind" | "acosd" | "atand" | "atan2d":
+            return _degrees(Call(function[:-1], arguments, at), at)
         case "radians":
             return _radians(first, at)
+        case "degrees":
+            return _degrees(first, at)
+        case "hypot":
+            squares = tuple((True, Power(side, number(2, at), at)) for side in arguments)
+            return Call("sqrt", (Sum(squares),), at)
         case "Rational":
             return quotient(first, arguments[1])
         case "number":
@@ -179,6 +186,10 @@ def _plain_call(function: str, arguments: tuple[Tree, ...], at: int) -> Tree:
         case "square":
             return Power(first, number(2, at), at)
     return Call(function, arguments, at)
+
+
+def _degrees(angle: Tree, at: int) -> Tree:
+    return Product(((True, angle), (True, number(180, at)), (False, Name("pi", at))))
 
 
 def _radians(angle: Tree, at: int) -> Tree:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from itertools import pairwise
 from typing import TypeAlias
@@ -18,11 +18,13 @@ Meaning: TypeAlias = tuple[str, ...]
 """Tokens that a name stands for, in the robot's own names."""
 
 SPELLINGS = (
-    dict(sin="sin Sin SIN s", cos="cos Cos COS c", tan="tan Tan TAN", asin="asin arcsin ArcSin")
-    | dict(acos="acos arccos ArcCos", atan="atan arctan ArcTan", atan2="atan2 arctan2", sqrt="sqrt Sqrt SQRT")
+    dict(sin="sin Sin SIN s", cos="cos Cos COS c", tan="tan Tan TAN", asin="asin arcsin ArcSin Asin ASIN")
+    | dict(acos="acos arccos ArcCos Acos ACOS", atan="atan arctan ArcTan Atan ATAN")
+    | dict(atan2="atan2 arctan2 Atan2 ATAN2", sqrt="sqrt Sqrt SQRT", hypot="hypot")
     | dict(abs="abs Abs ABS fabs", sign="sign Sign sgn", exp="exp Exp", pow="pow Pow power", square="square")
     | dict(min="min Min fmin", max="max Max fmax", sec="sec Sec", csc="csc Csc", cot="cot Cot")
-    | dict(sind="sind", cosd="cosd", tand="tand", radians="radians deg2rad")
+    | dict(sind="sind", cosd="cosd", tand="tand", radians="radians deg2rad", degrees="degrees rad2deg")
+    | dict(asind="asind", acosd="acosd", atand="atand", atan2d="atan2d")
     | dict(Rational="Rational", number="Integer Float S sympify")
 )
 """Functions that may be called, each with its spellings."""
@@ -96,6 +98,8 @@ class Vocabulary:
         self.further = tuple(further)
         self.gravity = _gravity(description)
         self._meanings: dict[str, Meaning | None] = {}
+        self.aliases: set[str] = set()
+        """Names in ``own`` that are others for what the task has."""
         self.taken_for: dict[str, str] = {}
         """What was not exactly a known name, and what it was taken for."""
         self.refused: dict[str, str] = {}
@@ -134,6 +138,14 @@ class Vocabulary:
             It has another one already.
         """
         self._add(plain_name(name), meaning)
+        self._meanings.clear()
+
+    def define_aliases(self, aliases: Mapping[str, Meaning]) -> None:
+        """Give names a meaning that have none."""
+        for name, meaning in aliases.items():
+            if not self.knows(name):
+                self.own[name] = meaning
+                self.aliases.add(name)
         self._meanings.clear()
 
     def redefine(self, name: str, meaning: Meaning) -> None:
@@ -300,11 +312,17 @@ class Vocabulary:
         """Return a hint: why a name could not be defined, or the known name that is nearest."""
         if plain_name(name) in self.refused:
             return self.refused[plain_name(name)][:200]
-        known = [*self.own, *self.further, *self.symbols, *FUNCTION_NAMES]
+        known = [
+            *(other for other in self.own if other not in self.aliases),
+            *self.further,
+            *self.symbols,
+            *FUNCTION_NAMES,
+        ]
         known += [f"{kind}{i}" for i in range(1, len(self.kinds) + 1) for kind in ("q", "qd", "qdd", "c", "s")]
         known = [other for other in known if len(other) <= MAX_NAME]
         close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-        listed = [*(other for other in self.own if len(other) <= MAX_NAME), *self.symbols, "q1", "qd1", "c1", "s1"]
+        own = (other for other in self.own if len(other) <= MAX_NAME and other not in self.aliases)
+        listed = [*self.further[:4:3], *own, *self.symbols, "q1", "qd1", "c1", "s1"]
         return f"did you mean {close[0]!r}?" if close else f"known are {', '.join(dict.fromkeys(listed[:12]))}"
 
 

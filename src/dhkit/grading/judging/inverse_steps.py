@@ -75,7 +75,7 @@ def judge_steps(
     for k, step in enumerate(steps, start=1):
         if not 0 <= step.joint < n:
             raise AnswerError(f"ik, step {k}: joint {step.joint + 1}; expected 1 to {n}")
-        if step.joint in [other.joint for other in steps[: k - 1]]:
+        if not step.error and step.joint in [other.joint for other in steps[: k - 1]]:
             raise AnswerError(f"ik, step {k}: joint {step.joint + 1} has a step already")
     poses = Poses.random(description, samples, seed)
     with np.errstate(all="ignore"):
@@ -102,12 +102,12 @@ class _Judge(StepContext):
         wrong: list[int] = []
         self.solutions = Solutions(self)
         for k, step in enumerate(steps):
-            before = [other.joint for other in steps[:k]]
+            before = list(dict.fromkeys(other.joint for other in steps[:k]))
             entry, found, note = self._step(k, step, before, [j for j in before if j in wrong])
             entries.append(entry)
             diagnosis += found
             notes += note
-            if entry.verdict.severity >= Verdict.WRONG.severity and step.joint not in self.solutions.solved:
+            if entry.verdict is Verdict.WRONG and step.joint not in self.solutions.solved:
                 wrong.append(step.joint)
         missing = sorted({*range(self.description.n)} - {step.joint for step in steps})
         entries += [
@@ -124,7 +124,8 @@ class _Judge(StepContext):
         """Return the entry of step k, from 0, its diagnosis, and notes."""
         name = entry_name("ik", (k,))
         if step.error:
-            self.solutions.skip(step.joint)
+            if step.joint not in before:
+                self.solutions.skip(step.joint)
             return Entry("ik", (k,), Verdict.UNREADABLE, step.text, statement=step.error), [], []
         parts, notes = [], []
         try:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from dhkit.description import Array
 from dhkit.errors import AnswerError
-from dhkit.expressions.syntax import Number, Sum, Tree
+from dhkit.expressions.syntax import Number, Product, Sum, Tree
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.answers.inverse_steps import GivenStep
 from dhkit.grading.judging.changed_formulas import square_of
@@ -131,7 +131,7 @@ class Equations:
         return residual
 
     def _holds_always(self, tree: Tree) -> bool:
-        """Whether an equation holds for poses that have nothing to do with the joints: at one of them, if it has roots."""
+        """Whether an equation holds at poses that have nothing to do with the joints; at one of them, if it has roots."""
         rng = np.random.default_rng(5)
         n, scale = self.context.description.n, self.context.poses.scale
         T = np.tile(np.eye(4), (FREE_POSES, 1, 1))
@@ -231,16 +231,18 @@ def _joints(q: Array) -> dict[str, Array | float]:
 
 
 def _sizes(tree: Tree, values: Mapping[str, Array | float]) -> Array:
-    """Return the sum of the sizes of a formula's terms, shape (S,) or ()."""
-    sizes: Array = sum((np.abs(np.asarray(doubles(part, values))) for part in _terms(tree)), np.zeros(()))
-    return sizes
-
-
-def _terms(tree: Tree) -> list[Tree]:
-    """Return the terms of a sum, with those of sums in it."""
-    if isinstance(tree, Sum):
-        return [part for _, term in tree.terms for part in _terms(term)]
-    return [tree]
+    """Return the size of a formula before its terms cancel, shape (S,) or (): sums of sizes, and products of them."""
+    size: Array = np.ones(())
+    match tree:
+        case Sum(terms):
+            size = np.sum(np.broadcast_arrays(*(_sizes(term, values) for _, term in terms)), axis=0)
+        case Product(factors):
+            for is_factor, factor in factors:
+                other = _sizes(factor, values) if is_factor else np.abs(np.asarray(doubles(factor, values)))
+                size = size * other if is_factor else size / other
+        case _:
+            size = np.abs(np.asarray(doubles(tree, values)))
+    return size
 
 
 def _ranks(J: Array) -> NDArray[np.int_]:

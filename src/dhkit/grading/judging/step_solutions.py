@@ -1,9 +1,9 @@
 """Judging of the solutions of steps of inverse kinematics: a joint's values, given the joints of earlier steps.
 
 The student's roots are followed: each choice among the roots of earlier steps has a set of the arm's solutions that
-agree with it, and a formula is right if its value belongs to one of them, at all poses and after every choice. An earlier
-joint without a right solution has its true values: any of them if one formula is right for all, else those of one branch,
-or with one sign of the sine or cosine, the same in all following steps.
+agree with it, and a formula is right if its value belongs to one of them, at all poses and after every choice. An
+earlier joint without a right solution has its true values: any of them if one formula is right for all, else those of
+one branch, or with one sign of the sine or cosine, the same in all following steps.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Choice:
     @property
     def rows(self) -> Mask:
         """The poses at which a solution has the values, shape (S,)."""
-        rows: Mask = self.alive.any(axis=1)
+        rows: Mask = np.asarray(self.alive.any(axis=1))
         return rows
 
 
@@ -179,7 +179,7 @@ class Solutions:
         """Return why formulas cannot be evaluated in this order; None if they can."""
         own, poses = step.joint, self.context.poses
         if not poses.isolated:
-            raise AnswerError("solution: the arm reaches a pose with a curve of joint values; equations alone are judged")
+            raise AnswerError("solution: the joint values of a pose are not isolated; equations alone are judged")
         joints = [f"q{j + 1}" for j in range(self.context.description.n)]
         for tree in step.solutions:
             names = names_of(tree)
@@ -277,7 +277,7 @@ class Solutions:
         own, inside = step.joint, self.context.within_limits
         k = int(np.argmin(np.mean(trial.right_within_limits, axis=1)))
         which = f"solution {k + 1}" if len(step.solutions) > 1 else "solution"
-        places = [(c, s) for c, choice in enumerate(trial.choices) for s in np.flatnonzero(choice.rows & inside)]
+        places = [(c, int(s)) for c, one in enumerate(trial.choices) for s in np.flatnonzero(one.rows & inside)]
         if not places:
             return Part(Verdict.WRONG, f"{which}: no pose has the values of the joints before")
         right = np.array([trial.following[k][c].rows[s] for c, s in places])
@@ -309,7 +309,9 @@ class Solutions:
         given = [Name(f"{KNOWN}{j + 1}", 0) for j in range(n)]
         nothing = Product(((True, Number(Fraction(0), "0", 0)), (True, Name(f"q{own + 1}", 0))))
         later = [j for j in range(n) if j != own and j not in before]
-        trees: list[Tree] = [Sum(((True, name), (True, nothing))) if j in later else name for j, name in enumerate(given)]
+        trees: list[Tree] = [*given]
+        for j in later:
+            trees[j] = Sum(((True, given[j]), (True, nothing)))
         trees[own] = tree
         poses = self.context.solved_poses.at(rows).with_known(known)
         return Branch(poses, tuple(trees), given_order=(*before, own, *later))
@@ -337,6 +339,7 @@ class Solutions:
 
 def _same(values: Sequence[Sequence[Array]]) -> int | None:
     """Return the number, from 1, of a formula whose values are those of one before it after every choice."""
+
     def equal(a: Array, b: Array) -> bool:
         gap = np.abs(np.remainder(a - b + np.pi, 2 * np.pi) - np.pi)
         return bool(np.all((gap < MATCHES) | np.isnan(gap)))
