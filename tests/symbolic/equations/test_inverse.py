@@ -84,6 +84,23 @@ def test_exported_code_gives_the_branches_of_the_kernels(name, language, tmp_pat
         assert np.nanmax(angles, initial=0) <= np.pi and np.nanmin(angles, initial=0) > -np.pi - 1e-12
 
 
+@pytest.mark.parametrize("language", ["c", "python"])
+@pytest.mark.parametrize("name", SIX_JOINTS)
+def test_exported_code_reaches_singular_poses(name, language, tmp_path):
+    if language == "c":
+        require("gcc", shutil.which("gcc") is not None)
+    arm = library_robot(name)
+    solve = (
+        compiled(inverse_derivation(arm), tmp_path) if language == "c" else imported(inverse_derivation(arm), tmp_path)
+    )
+    q = random_states(arm, 40, seed=6)
+    q[:, 4] = np.array([0.0, 1e-15, 1e-12, 1e-8])[np.arange(40) % 4]
+    for pose in world_to_tool(arm, q):
+        found = solve(pose)
+        found = found[np.isfinite(found).all(axis=1)]
+        assert len(found) and np.abs(world_to_tool(arm, found) - pose).max() < 1e-9
+
+
 @pytest.mark.parametrize("name", ["puma560", "stanford", "cart_pendulum"])
 def test_exported_matlab_runs_in_octave(name, tmp_path):
     if shutil.which("octave") is None:

@@ -127,6 +127,30 @@ def test_every_robot_of_the_library_is_derived_proved_and_held_to_the_kernels(la
     assert derivation.solve(np.eye(4)).shape == (len(derivation.branches), arm.n)
 
 
+def special_states(arm, count, seed):
+    """Joint values (N, n) in quarter turns, some of them off by little: wrists, elbows and shoulders are singular."""
+    rng = np.random.default_rng(seed)
+    quarters = rng.integers(-2, 3, (count, arm.n)) * np.pi / 2
+    off = rng.choice([0, 1e-15, 1e-12, 1e-9, 1e-6, 0.3, 1.0], (count, arm.n))
+    return np.where(arm.numbers.prismatic, rng.choice([0.1, 0.3, 0.5], (count, arm.n)), quarters) + off
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_solutions_at_singular_poses_reach_them(law, name):
+    arm = library_robot(name)
+    derivation = inverse_derivation(arm)
+    q = special_states(arm, law.samples(20_000), seed=3)
+    T = world_to_tool(arm, q)
+    found = derivation.solve(T)
+    is_solved = np.isfinite(found).all(axis=-1).any(axis=1)
+    if derivation.family.name == "three_parallel":
+        # Where axis 6 is parallel to axis 2, theta6 is chosen, and axis 4 may then be out of reach.
+        is_solved |= np.abs(np.sin(q[:, 4])) < 2e-6
+    assert is_solved.all(), (name, q[~is_solved][:3])
+    if not derivation.family.aims:
+        law.holds("closure, singular", positions_close(arm, found, T, derivation), CLOSES_NEAR, name)
+
+
 def check_family(law, arm):
     law.samples(200)
     found = classify(arm)

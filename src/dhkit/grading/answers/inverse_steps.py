@@ -135,7 +135,7 @@ class _Reading:
             if EITHER_SIGN.search(known[-1]):
                 raise AnswerError(f"{quote(text)}: defines {quote(new[0])} with two signs; write ± where it is used")
             for name in new:
-                self.vocabulary.define(name, meaning_of(known[-1], self.vocabulary))
+                self.vocabulary.redefine(name, meaning_of(known[-1], self.vocabulary))
         return known if new else sides
 
     def _new_name(self, side: str) -> str:
@@ -146,7 +146,8 @@ class _Reading:
             return ""
         if len(tokens) != 1 or tokens[0].kind != "name" or tokens[0].text in FUNCTION_NAMES:
             return ""
-        return "" if self.vocabulary.knows(tokens[0].text) else tokens[0].text
+        name = tokens[0].text
+        return "" if self.vocabulary.knows(name) and not self.vocabulary.is_alias(name) else name
 
     def _equations(self, text: str) -> list[tuple[str, str]]:
         """Return the sides of the equations of a text: a chain has several, a definition none."""

@@ -148,8 +148,13 @@ class Vocabulary:
                 self.aliases.add(name)
         self._meanings.clear()
 
+    def is_alias(self, name: str) -> bool:
+        """Whether a name is another one for what the task has: a student may define it as something else."""
+        return plain_name(name) in self.aliases
+
     def redefine(self, name: str, meaning: Meaning) -> None:
         """Give a name a meaning in place of any other."""
+        self.aliases.discard(plain_name(name))
         self.own[plain_name(name)] = meaning
         self._meanings.clear()
 

@@ -23,6 +23,11 @@ def leaf_text(leaf: Name | Number) -> str:
     return leaf.text if isinstance(leaf, Name) else str(leaf.value)
 
 
+def is_joint(name: str) -> bool:
+    """Whether a name is that of a joint's value: q1."""
+    return name[:1] == "q" and name[1:].isdecimal()
+
+
 def equal_parts(trees: Sequence[Tree]) -> dict[int, frozenset[int]]:
     """Return, by the id of each part of some formulas, the ids of all parts equal to it."""
     places: dict[str, list[int]] = defaultdict(list)

@@ -38,12 +38,15 @@ class Branch:
         Joints, from 0, with changes of their values before later joints use them.
     given_order
         Joints, from 0, in the order in which their formulas are evaluated; by default as the formulas need it.
+    judged_joint
+        The joint, from 0, whose values alone count, where those of the others are known; by default all count.
     """
 
     poses: Poses
     trees: tuple[Tree, ...]
     repairs: tuple[tuple[int, Repair], ...] = ()
     given_order: tuple[int, ...] = ()
+    judged_joint: int | None = None
 
     @property
     def n(self) -> int:
@@ -90,14 +93,16 @@ class Branch:
 
     @cached_property
     def closed(self) -> Mask:
-        """Which poses it reaches, shape (S,)."""
+        """Which poses it reaches, shape (S,); where one joint counts, at which its value is a solution's."""
+        if self.judged_joint is not None:
+            return self.agrees(self.judged_joint, self.q[:, self.judged_joint])
         return self.poses.closes(self.q)
 
     @cached_property
     def reachable(self) -> Mask:
         """Which poses it should reach, shape (S,): all but those that none of the solutions it follows reaches."""
         solutions = self.poses.solutions
-        if not np.any(self.closed) or not self.poses.has_closed_form:
+        if self.judged_joint is not None or not np.any(self.closed) or not self.poses.has_closed_form:
             return np.ones(len(self.closed), dtype=bool)
         follows = np.mean(self.poses.matches(self.q, solutions)[self.closed], axis=0) > CHANCE_SHARE
         if not np.any(follows):
@@ -161,7 +166,7 @@ class Branch:
     def sample(self, most: int) -> Branch:
         """Return the branch at up to so many poses that it fails to reach, and at up to as many that it reaches."""
         chosen = [*np.flatnonzero(self.failing)[:most], *np.flatnonzero(self.closed)[:most]]
-        return Branch(self.poses.at(chosen), self.trees, given_order=self.given_order)
+        return replace(self, poses=self.poses.at(chosen), repairs=())
 
     def with_repair(self, joint: int, repair: Repair) -> Branch:
         """Return the branch with a change of a joint's values."""

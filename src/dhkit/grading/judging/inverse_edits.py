@@ -15,7 +15,7 @@ from itertools import chain, combinations, islice, permutations
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.judging import changed_formulas as formulas
-from dhkit.grading.judging.changed_formulas import applied, minus, square_of, times
+from dhkit.grading.judging.changed_formulas import applied, leaf_text, minus, square_of, times
 from dhkit.grading.judging.numeric import names_of, parts_of
 
 ORDER = (
@@ -26,12 +26,12 @@ ORDER = (
     "millimetres_for_metres",
     "joint_sign",
     "supplement",
-    "missing_offset",
     "cosine_law_factor",
+    "rotation_matrix_transposed",
     "cosine_law_sign",
     "cosine_law_squares",
-    "rotation_matrix_transposed",
     "earlier_joints_forgotten",
+    "root_too_much",
     "root_forgotten",
     "square_forgotten",
     "square_too_much",
@@ -39,13 +39,20 @@ ORDER = (
     "triangle_angle_forgotten",
     "axis_exchanged",
     "lengths_exchanged",
+    "rounded_length",
     "offset_forgotten",
     "tool_length_forgotten",
+    "tool_length_added",
+    "tool_axis_exchanged",
     "shoulder_offset_forgotten",
-    "length_forgotten",
     "term_function",
+    "sum_of_angles_forgotten",
+    "sum_of_angles_too_much",
     "term_parameter",
     "term_sign",
+    "missing_offset",
+    "angle_zero",
+    "length_forgotten",
     "term_factor",
     "term_extra",
 )
@@ -65,6 +72,10 @@ MAX_LAW_TERMS = 8
 """Largest number of terms of which pairs of signs are tried."""
 MIN_LAW_TERMS = 3
 """Smallest number of terms of the numerator in a law of cosines: two squared links, and a squared distance."""
+MIN_LAW_SQUARES = 2
+"""Smallest number of squares among them; a mistake may have removed one."""
+MAX_ROUNDED = 0.01
+"""Largest share by which a number differs from a length that it is a rounded value of."""
 
 
 @dataclass(frozen=True)
@@ -97,10 +108,13 @@ class Lengths:
         Names of the robot's parameters.
     trees
         Possible missing offsets: parameters, and those lengths of table, base and tool that are no parameters; m.
+    values
+        Their absolute values, m; may be empty.
     """
 
     parameters: tuple[str, ...]
     trees: tuple[Name | Number, ...]
+    values: tuple[float, ...] = ()
 
 
 def edits(
@@ -165,12 +179,11 @@ def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, di
         if names & {a, b}:
             yield "axis_exchanged", {a: Name(b, 0), b: Name(a, 0)}
     parts = [part for tree in trees for part in parts_of(tree) if isinstance(part, Number)]
-    numbers = {
-        formulas.leaf_text(number) for number in parts if number.value.denominator != 1
-    }  # integers are exponents
-    known = [length for length in lengths.trees if formulas.leaf_text(length) in names | numbers]
+    numbers = {leaf_text(number) for number in parts if number.value.denominator != 1}  # integers are exponents
+    yield from _other_angles(names)
+    known = [length for length in lengths.trees if leaf_text(length) in names | numbers]
     for first, second in combinations(known[:MAX_LENGTHS], 2):
-        yield "lengths_exchanged", {formulas.leaf_text(first): second, formulas.leaf_text(second): first}
+        yield "lengths_exchanged", {leaf_text(first): second, leaf_text(second): first}
     for length in lengths.trees[:MAX_LENGTHS]:
         for subtracted in (True, False):
             for p in POSITIONS:
@@ -183,6 +196,41 @@ def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, di
                 }
                 if names & {*POSITIONS}:
                     yield "tool_length_forgotten", tool
+                if names & {*POSITIONS} and leaf_text(length) in names | numbers:
+                    twice = {p: times(Number(Fraction(2), "2", 0), length) for p in POSITIONS}
+                    yield (
+                        "tool_length_added",
+                        {
+                            p: Sum(((True, Name(p, 0)), (not subtracted, times(twice[p], Name(f"r{i}{column}", 0)))))
+                            for i, p in enumerate(POSITIONS, start=1)
+                        },
+                    )
+    for j, k in combinations("123", 2):
+        columns: dict[str, Tree] = {f"r{i}{j}": Name(f"r{i}{k}", 0) for i in "123"}
+        columns |= {f"r{i}{k}": Name(f"r{i}{j}", 0) for i in "123"}
+        if names & {*columns}:
+            yield "tool_axis_exchanged", columns
+    for first, second in permutations(known[:MAX_LENGTHS], 2):
+        for added in (True, False):
+            yield "length_forgotten", {leaf_text(first): Sum(((True, first), (added, second)))}
+
+
+def _other_angles(names: set[str]) -> Iterator[tuple[str, dict[str, Tree]]]:
+    """Yield replacements of joint angles: sums of neighbours for one of them, and angles from another zero."""
+    joints = sorted((name for name in names if formulas.is_joint(name)), key=lambda name: int(name[1:]))
+    for name in joints:
+        last = int(name[1:])
+        sums = [*((first, last) for first in range(1, last)), (last, last + 1), (last, last + 2)]
+        for first, end in sums:
+            angles: list[tuple[bool, Tree]] = [(True, Name(f"q{i}", 0)) for i in range(first, end + 1)]
+            yield "sum_of_angles_forgotten", {name: Sum(tuple(angles))}
+        for other in joints:
+            if other != name:
+                difference = Sum(((True, Name(name, 0)), (False, Name(other, 0))))
+                yield "sum_of_angles_too_much", {name: difference}
+        for quarters in (1, -1, 2):
+            turn = times(Name("pi", 0), Number(Fraction(quarters, 2), str(Fraction(quarters, 2)), 0))
+            yield "angle_zero", {name: Sum(((True, Name(name, 0)), (True, turn)))}
 
 
 def with_signs_changed(tree: Tree) -> Iterator[Tree]:
@@ -192,7 +240,7 @@ def with_signs_changed(tree: Tree) -> Iterator[Tree]:
         if edit.mistake == "elbow_sign":
             yield edit.tree
     if formulas.has_call(tree, ROOTS):
-        yield formulas.with_calls_changed(tree, ROOTS, minus)
+        yield formulas.with_calls_changed(tree, ROOTS, lambda call: call if _is_constant(call) else minus(call))
 
 
 # Changes of a whole formula
@@ -203,7 +251,8 @@ def _of_the_whole(
 ) -> Iterator[tuple[str, Tree]]:
     if is_revolute:
         yield "degrees_for_radians", times(tree, Name("deg", 0))
-        yield "supplement", Sum(((True, Name("pi", 0)), (False, tree)))
+        if any(map(_is_law, parts_of(tree))):
+            yield "supplement", Sum(((True, Name("pi", 0)), (False, tree)))
     else:
         yield "millimetres_for_metres", times(tree, Name("mm", 0))
     yield "joint_sign", minus(tree)
@@ -218,7 +267,7 @@ def _of_the_whole(
         yield "arc_function_forgotten", minus(applied(arc, tree))
     yield "root_forgotten", applied("sqrt", tree)
     for mistake, functions, change in (
-        ("elbow_sign", ROOTS, minus),
+        ("elbow_sign", ROOTS, lambda call: call if _is_constant(call) else minus(call)),
         ("atan2_arguments", ("atan2",), formulas.exchange_arguments),
     ):
         new = formulas.with_calls_changed(tree, functions, change)
@@ -271,14 +320,21 @@ def _of_parts(tree: Tree, lengths: Lengths, rebuild: Rebuild, in_law: bool) -> I
         def around(part: Tree, k: int = k) -> Tree:
             return rebuild(formulas.with_operands(tree, [*children[:k], part, *children[k + 1 :]]))
 
-        yield from _of_parts(child, lengths, around, in_law or _is_law(child))
+        # A sum that is squared is a component of the point, no law of cosines of its own.
+        is_inside = in_law and not (isinstance(tree, Power) and isinstance(child, Sum))
+        yield from _of_parts(child, lengths, around, is_inside or _is_law(child))
 
 
 def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, Tree]]:
     """Yield mistakes in a part, each with the part corrected."""
+    if isinstance(tree, Sum | Call):
+        used = [length for length in lengths.trees[:MAX_LENGTHS] if leaf_text(length) in names_of(tree)]
+        for one, two in combinations(used, 2):
+            change: dict[str, Tree] = {leaf_text(one): two, leaf_text(two): one}
+            yield "lengths_exchanged", formulas.renamed(tree, change)
     match tree:
         case Number():
-            yield from _of_number(tree, in_law)
+            yield from _of_number(tree, lengths, in_law)
         case Name(text):
             yield from _of_name(text, lengths)
             yield "cosine_law_squares" if in_law else "square_forgotten", square_of(tree)
@@ -290,13 +346,21 @@ def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, 
             yield from _scaled(tree, in_law)
             for k in range(len(factors)):
                 yield "term_factor", formulas.product_of([*factors[:k], *factors[k + 1 :]])
+            if not all(is_factor for is_factor, _ in factors):
+                yield "cosine_law_squares" if in_law else "square_forgotten", square_of(tree)
+                for length in lengths.trees[:MAX_LENGTHS]:
+                    for is_factor in (False, True):
+                        yield "length_forgotten", Product((*factors, (is_factor, length)))
         case Sum(terms):
-            yield from _of_sum(terms, in_law)
+            yield from _of_sum(terms, lengths, in_law)
 
 
-def _of_number(number: Number, in_law: bool) -> Iterator[tuple[str, Tree]]:
+def _of_number(number: Number, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, Tree]]:
     if abs(number.value) == 1:
         return
+    for length, value in zip(lengths.trees[:MAX_LENGTHS], lengths.values, strict=False):
+        if 0 < abs(float(number.value) - value) < MAX_ROUNDED * value:
+            yield "rounded_length", length
     if number.value >= MIN_MEASURE:
         yield "degrees_for_radians", times(number, Name("deg", 0))
         yield "millimetres_for_metres", times(number, Name("mm", 0))
@@ -323,11 +387,13 @@ def _of_call(call: Call, in_law: bool) -> Iterator[tuple[str, Tree]]:
         case "atan2":
             second = call.arguments[-1]
             yield "atan2_arguments", formulas.exchange_arguments(call)
-            for signs in ((False, True), (True, False), (False, False)):
+            for signs in ((False, True), (True, False)):
                 signed = tuple(x if sign else minus(x) for sign, x in zip(signs, (first, second), strict=True))
                 yield "term_sign", replace(call, arguments=signed)
         case "sin" | "cos":
-            yield "term_function", replace(call, function="cos" if call.function == "sin" else "sin")
+            other = replace(call, function="cos" if call.function == "sin" else "sin")
+            yield "term_function", other
+            yield "angle_zero", minus(other)
         case "atan":
             if isinstance(first, Product) and not all(is_factor for is_factor, _ in first.factors):
                 y, x = (
@@ -337,16 +403,22 @@ def _of_call(call: Call, in_law: bool) -> Iterator[tuple[str, Tree]]:
                 yield "quadrant", Call("atan2", (y, x), 0)
         case "acos" | "asin":
             yield "elbow_sign", minus(call)
-            yield "supplement", replace(call, arguments=(minus(first), *call.arguments[1:]))
+            is_law = any(map(_is_law, parts_of(first)))
+            yield "supplement" if is_law else "term_sign", replace(call, arguments=(minus(first), *call.arguments[1:]))
             yield "term_function", replace(call, function="asin" if call.function == "acos" else "acos")
         case "sqrt":
-            yield "elbow_sign", minus(call)
-            yield "cosine_law_squares" if in_law else "square_forgotten", first
+            if not _is_constant(call):
+                yield "elbow_sign", minus(call)
+            yield "root_too_much", first
     yield "cosine_law_squares" if in_law else "square_forgotten", square_of(call)
 
 
-def _of_sum(terms: tuple[tuple[bool, Tree], ...], in_law: bool) -> Iterator[tuple[str, Tree]]:
+def _of_sum(terms: tuple[tuple[bool, Tree], ...], lengths: Lengths, in_law: bool) -> Iterator[tuple[str, Tree]]:
     yield "root_forgotten", applied("sqrt", Sum(terms))
+    for length in lengths.trees[:MAX_LENGTHS]:
+        for term in (length, square_of(length)):
+            for added in (False, True):
+                yield "length_forgotten", Sum((*terms, (added, term)))
     for count in (1, 2) if in_law and len(terms) <= MAX_LAW_TERMS else (1,):
         for chosen in combinations(range(len(terms)), count):
             changed = tuple((added ^ (k in chosen), term) for k, (added, term) in enumerate(terms))
@@ -364,13 +436,23 @@ def _scaled(tree: Tree, in_law: bool) -> Iterator[tuple[str, Tree]]:
         yield "cosine_law_factor" if in_law else "term_factor", times(tree, Number(factor, str(factor), 0))
 
 
+def _is_constant(tree: Tree) -> bool:
+    """Whether a formula contains no entry of the pose and no joint."""
+    return not any(name in POSE_NAMES or formulas.is_joint(name) for name in names_of(tree))
+
+
 def _is_law(tree: Tree) -> bool:
-    """Whether a part looks like a law of cosines: a sum of at least three terms over a product."""
+    """Whether a part looks like a law of cosines: a sum of three terms or more, with squares, over a product."""
     if not isinstance(tree, Product) or all(is_factor for is_factor, _ in tree.factors):
         return False
-    return any(is_factor and _count_terms(part) >= MIN_LAW_TERMS for is_factor, part in tree.factors)
+    sums = [_terms(part) for is_factor, part in tree.factors if is_factor]
+    return any(len(terms) >= MIN_LAW_TERMS and sum(map(_is_square, terms)) >= MIN_LAW_SQUARES for terms in sums)
 
 
-def _count_terms(tree: Tree) -> int:
-    """Return the number of terms of a sum, with those of sums in it."""
-    return sum(_count_terms(term) for _, term in tree.terms) if isinstance(tree, Sum) else 1
+def _terms(tree: Tree) -> list[Tree]:
+    """Return the terms of a sum, with those of sums in it."""
+    return [part for _, term in tree.terms for part in _terms(term)] if isinstance(tree, Sum) else [tree]
+
+
+def _is_square(tree: Tree) -> bool:
+    return isinstance(tree, Power) and isinstance(tree.exponent, Number) and tree.exponent.value == 2

@@ -16,10 +16,12 @@ from itertools import chain
 import numpy as np
 
 from dhkit.description import Array, Description
+from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Call, Name, Number, Sum, Tree
 from dhkit.grading.judging.changed_formulas import (
     equal_parts,
     has_call,
+    is_joint,
     minus,
     renamed,
     replaced_everywhere,
@@ -28,7 +30,7 @@ from dhkit.grading.judging.changed_formulas import (
 from dhkit.grading.judging.inverse_branch import Branch
 from dhkit.grading.judging.inverse_edits import Edit, Lengths, edits, renamings
 from dhkit.grading.judging.inverse_poses import Mask
-from dhkit.grading.judging.numeric import parts_of
+from dhkit.grading.judging.numeric import names_of, parts_of
 
 MAX_POSES = 100
 """Largest number of poses that fail, and of poses that are reached, at which mistakes are looked for."""
@@ -106,7 +108,7 @@ class Search:
         for joint in branch.order if not branch.poses.isolated else ():
             for edit in self._edits(branch, joint):
                 repaired = branch.with_tree(joint, edit.tree)
-                if repaired.is_right:
+                if not names_of(edit.tree) - names_of(branch.trees[joint]) and repaired.is_right:
                     return Explanation(edit.mistake, joint, repaired)
         return Explanation(None, None, is_near=branch.poses.isolated)
 
@@ -156,7 +158,10 @@ class Search:
             if len(equal[id(edit.old)]) > 1:
                 trees.append(replaced_everywhere(tree, equal[id(edit.old)], edit.new))
             for changed in trees:
-                x = branch.repaired(joint, formula.of(changed))
+                try:
+                    x = branch.repaired(joint, formula.of(changed))
+                except AnswerError:  # it would need a joint that follows from this one
+                    continue
                 if np.mean(branch.agrees(joint, x)[asked]) >= MIN_AGREEING_SHARE:
                     agreeing.append(replace(edit, tree=changed))
                     break
@@ -179,6 +184,8 @@ class Search:
             if sum(new is not old for new, old in zip(trees, branch.trees, strict=True)) > 1:
                 yield Explanation(edit.mistake, None, branch.with_trees(trees))
         for mistake, change in renamings(branch.trees, self.lengths):
+            if any(map(is_joint, change)):
+                continue  # formulas might then need each other
             trees = [renamed(tree, change) for tree in branch.trees]
             if self.left > size and sum(new is not old for new, old in zip(trees, branch.trees, strict=True)) > 1:
                 self.left -= size
@@ -191,13 +198,15 @@ def lengths_of(description: Description) -> Lengths:
     numbers, values = description.numbers, description.numbers.values
     known = [*numbers.d, *numbers.a, *numbers.T_world_base[:3, 3], *numbers.T_last_tool[:3, 3]]
     trees: list[Name | Number] = [Name(name, 0) for name in parameters]
-    seen = {round(abs(float(values[name])), 12) for name in parameters} | {0.0}
+    sizes = [abs(float(values[name])) for name in parameters]
+    seen = {round(size, 12) for size in sizes} | {0.0}
     for length in known:
         size = round(abs(float(length)), 12)
         if size not in seen:
             seen.add(size)
+            sizes.append(size)
             trees.append(Number(Fraction(str(size)), str(size), 0))
-    return Lengths(parameters, tuple(trees))
+    return Lengths(parameters, tuple(trees), tuple(sizes))
 
 
 def _edited(branch: Branch, joint: int, edit: Edit) -> Explanation:
@@ -232,14 +241,17 @@ def _lost_halves(branch: Branch, joint: int, first: int) -> list[tuple[str, Bran
     wrong, tree = _wrong(branch, first), branch.trees[joint]
     revolute = branch.poses.description.kinds[joint] == "R"
     own = joint == first
+    has_arc = has_call(tree, ("acos", "asin", "atan"))
+    half = "quadrant" if has_arc or not has_call(tree, ("atan2",)) else "divisor_sign_lost"
+    mirrored = "quadrant" if has_arc or not has_call(tree, ("sqrt",)) else "sign_lost"
 
     def where_wrong(change: Array) -> Array:
         return np.where(wrong, change, 0.0)
 
     branches = []
     if revolute and (own or has_call(tree, ("atan", "asin"))):
-        branches.append(("quadrant", branch.with_repair(joint, lambda x: x + where_wrong(np.full_like(x, np.pi)))))
-        branches.append(("quadrant", branch.with_repair(joint, lambda x: x + where_wrong(np.pi - 2 * x))))
+        branches.append((half, branch.with_repair(joint, lambda x: x + where_wrong(np.full_like(x, np.pi)))))
+        branches.append((mirrored, branch.with_repair(joint, lambda x: x + where_wrong(np.pi - 2 * x))))
     if own or has_call(tree, ("acos",)):
         branches.append(("sign_lost", branch.with_repair(joint, lambda x: x - where_wrong(2 * x))))
     arcs = [function for function in ARCS if has_call(tree, (function,))]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from dhkit.description import Description
+from dhkit.description import Array, Description
 from dhkit.errors import DescriptionError
 from dhkit.expressions.syntax import Name, Tree
 from dhkit.grading.judging.inverse_edits import Lengths
@@ -33,6 +33,14 @@ class Part:
     witness: Witness | None = None
     remark: str = ""
     """What a reader should know of a part that passes."""
+
+
+def undone(T: Array) -> Array:
+    """Return the inverse of a rigid transform, shape (4, 4)."""
+    inverse = np.eye(4)
+    inverse[:3, :3] = T[:3, :3].T
+    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    return inverse
 
 
 class StepContext:
@@ -67,12 +75,25 @@ class StepContext:
         return next((step for step in steps if step.unknown is not None and step.unknown.joint == joint), None)
 
     def lengths(self, trees: Sequence[Tree]) -> Lengths:
-        """Return the lengths that formulas may contain: by name where formulas use the names of the table's."""
+        """Return the lengths that formulas may contain: by name where formulas use the names of the table's.
+
+        Lengths of base and tool have no names.
+        """
         names, table = set().union(*map(names_of, trees)), table_lengths(self.description)
+        every = lengths_of(self.description)
         if not names & {*table}:
-            return lengths_of(self.description)
-        known = (*self.description.parameters, *table)
-        return Lengths(known, tuple(Name(name, 0) for name in known))
+            return every
+        numbers = self.description.numbers.values
+        values = {name: float(numbers[name]) for name in self.description.parameters}
+        values |= {name: float(value) for name, value in table.items()}
+        named = [abs(value) for value in values.values()]
+        others = [
+            (tree, value)
+            for tree, value in zip(every.trees, every.values, strict=True)
+            if not np.any(np.isclose(value, named, rtol=1e-9))
+        ]
+        trees_of_all = (*(Name(name, 0) for name in values), *(tree for tree, _ in others))
+        return Lengths(tuple(values), trees_of_all, (*named, *(value for _, value in others)))
 
     @cached_property
     def solved_poses(self) -> Poses:
@@ -98,6 +119,19 @@ class StepContext:
         found = np.sum(np.all(np.isfinite(every.solutions), axis=-1), axis=1)
         rows = np.flatnonzero(found == found.max())
         return every.at(rows), rows < count
+
+    def misread(self, poses: Poses) -> Iterator[tuple[str, dict[str, Array | float]]]:
+        """Yield mistakes in which the pose is another frame's, each with the values that formulas then mean."""
+        numbers = self.description.numbers
+        outside, inside = undone(numbers.T_world_base), undone(numbers.T_last_tool)
+        for mistake, before, behind in (
+            ("tool_not_taken_off", None, inside),
+            ("base_not_taken_off", outside, None),
+            ("base_and_tool_not_taken_off", outside, inside),
+        ):
+            if all(T is None or not np.allclose(T, np.eye(4), atol=1e-12) for T in (before, behind)):
+                T = poses.T if before is None else before @ poses.T
+                yield mistake, replace(poses, T=T if behind is None else T @ behind).values
 
     @cached_property
     def chains(self) -> tuple[Chain, Chain]:

@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from dhkit.description import Array
 from dhkit.errors import AnswerError
-from dhkit.expressions.syntax import Number, Product, Sum, Tree
+from dhkit.expressions.syntax import Call, Number, Power, Product, Sum, Tree
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.answers.inverse_steps import GivenStep
-from dhkit.grading.judging.changed_formulas import square_of
+from dhkit.grading.judging.changed_formulas import minus, square_of, with_calls_changed
 from dhkit.grading.judging.inverse_edits import Edit, Lengths, edits_of_parts
 from dhkit.grading.judging.numeric import EditedDoubles, doubles, names_of, parts_of
 from dhkit.grading.judging.quotients import OutsideTheRingError, RingReader
@@ -24,6 +24,7 @@ from dhkit.grading.report import Verdict, Witness
 from dhkit.symbolic import table_lengths
 from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.inverse.chain import POSE, Chain
+from dhkit.symbolic.inverse.steps import names_in
 from dhkit.symbolic.ring import Element, RingError
 from dhkit.symbolic.ring.ring import translated
 
@@ -131,7 +132,7 @@ class Equations:
         return residual
 
     def _holds_always(self, tree: Tree) -> bool:
-        """Whether an equation holds at poses that have nothing to do with the joints; at one of them, if it has roots."""
+        """Whether an equation holds at poses unrelated to the joints; at one of them, if it has roots."""
         rng = np.random.default_rng(5)
         n, scale = self.context.description.n, self.context.poses.scale
         T = np.tile(np.eye(4), (FREE_POSES, 1, 1))
@@ -196,33 +197,54 @@ class Equations:
         which = f"equation {k + 1}" if len(self.differences) > 1 else "equation"
         part = Part(Verdict.WRONG, f"{which}: no identity of the arm", difference=difference, witness=witness)
         if self.context.explain:
-            mistake = self._mistake(tree)
-            part.mistakes = [(mistake, "")] if mistake else [("equation_wrong", "")]
+            part.mistakes = [self._mistake(tree) or ("equation_wrong", "")]
         return part
 
-    def _mistake(self, tree: Tree) -> str | None:
-        """Return the mistake whose correction makes a wrong equation an identity."""
+    # Mistakes
+
+    def _mistake(self, tree: Tree) -> tuple[str, str] | None:
+        """Return the mistake whose correction makes a wrong equation an identity, and a detail."""
+        if (changed := self._single_change(tree)) is not None:
+            return changed, ""
+        for mistake, values in self.context.misread(self.context.poses):
+            if np.max(np.abs(self.residual(tree, {**values, **_joints(self.context.poses.q)}))) < ZERO:
+                return mistake, ""
+        zero = self._with_a_length_of_zero(tree)
+        step = self.context.derived(self.step.joint)
+        if zero is not None and self.step.joint == 0 and step is not None and zero in names_in(step.elements):
+            return "shoulder_offset_forgotten", ""
+        return None if zero is None else ("length_taken_as_zero", zero)
+
+    def _with_a_length_of_zero(self, tree: Tree) -> str | None:
+        """Return the length for which an equation would be an identity if it were zero; None if there is none."""
+        named = self.context.chains[0]
+        try:
+            element = self._element(tree, named, {})
+        except (OutsideTheRingError, RingError, AnswerError):
+            return None
+        for name in names_in([element]) & {*named.lengths}:
+            place = named.ring.place("constant", name)
+            if translated(element, named.ring, {place: named.ring.zero}).is_zero:
+                return name
+        return None
+
+    def _single_change(self, tree: Tree) -> str | None:
+        """Return the mistake whose correction, one change, makes a wrong equation an identity."""
         poses = self.context.poses.at(range(min(40, len(self.context.poses.q))))
-        values = {**poses.values, **_joints(poses.q)}
-        formula, lengths = EditedDoubles(tree, values), self.context.lengths([tree])
+        formula = EditedDoubles(tree, {**poses.values, **_joints(poses.q)})
+        lengths = self.context.lengths([tree])
         size = np.max(np.abs(np.asarray(formula.numbers))) + self.context.poses.scale
-        for edit in (*_with_a_length(tree, lengths, self.step.joint), *edits_of_parts(tree, lengths)):
+        own = self.step.joint
+        for edit in (*_with_a_length(tree, lengths, own), *_inner_angles(tree, own), *edits_of_parts(tree, lengths)):
             if edit.old is tree and edit.mistake in OF_BOTH_SIDES:
                 continue
-            off = np.max(np.abs(np.nan_to_num(np.asarray(formula.of(edit.tree)), nan=np.inf)))
+            try:
+                off = np.max(np.abs(np.nan_to_num(np.asarray(formula.of(edit.tree)), nan=np.inf)))
+            except AnswerError:  # it needs a joint that the arm does not have
+                continue
             if off < ZERO * size and not self._holds_always(edit.tree):
                 return edit.mistake
         return None
-
-
-def _with_a_length(tree: Tree, lengths: Lengths, joint: int) -> Iterator[Edit]:
-    """Yield an equation with a constant length, or its square, added to one of its sides."""
-    mistake = "shoulder_offset_forgotten" if joint == 0 else "length_forgotten"
-    for length in lengths.trees:
-        for term, name in ((length, mistake), (square_of(length), "length_forgotten")):
-            for added in (True, False):
-                new = Sum(((True, tree), (added, term)))
-                yield Edit(name, new, tree, new)
 
 
 def _joints(q: Array) -> dict[str, Array | float]:
@@ -243,6 +265,28 @@ def _sizes(tree: Tree, values: Mapping[str, Array | float]) -> Array:
         case _:
             size = np.abs(np.asarray(doubles(tree, values)))
     return size
+
+
+def _with_a_length(tree: Tree, lengths: Lengths, joint: int) -> Iterator[Edit]:
+    """Yield an equation with a constant length, or its square, added to one of its sides."""
+    mistake = "shoulder_offset_forgotten" if joint == 0 else "length_forgotten"
+    for length in lengths.trees:
+        for term, name in ((length, mistake), (square_of(length), "length_forgotten")):
+            for added in (True, False):
+                new = Sum(((True, tree), (added, term)))
+                yield Edit(name, new, tree, new)
+
+
+def _inner_angles(tree: Tree, joint: int) -> Iterator[Edit]:
+    """Yield a law of cosines with the angle inside the triangle in place of the joint's, which has the other sign."""
+    squares = [part for part in parts_of(tree) if isinstance(part, Power)]
+    if len(squares) < 2:
+        return
+    own = f"q{joint + 1}"
+    calls = [part for part in parts_of(tree) if isinstance(part, Call) and names_of(part) == {own}]
+    if {call.function for call in calls} == {"cos"}:
+        new = with_calls_changed(tree, ("cos",), lambda call: minus(call) if names_of(call) == {own} else call)
+        yield Edit("supplement", new, tree, new)
 
 
 def _ranks(J: Array) -> NDArray[np.int_]:

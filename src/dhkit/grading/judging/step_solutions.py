@@ -9,7 +9,7 @@ one branch, or with one sign of the sine or cosine, the same in all following st
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import chain
 from typing import TypeAlias
@@ -22,12 +22,11 @@ from dhkit.expressions.syntax import Name, Number, Product, Sum, Tree
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.answers.inverse_steps import GivenStep
 from dhkit.grading.judging.inverse_branch import MISSED_SHARE, Branch
-from dhkit.grading.judging.inverse_mistakes import Search
-from dhkit.grading.judging.inverse_poses import CLOSES, KNOWN, MATCHES, Mask
+from dhkit.grading.judging.inverse_poses import KNOWN, MATCHES, Mask
 from dhkit.grading.judging.numeric import doubles, names_of
 from dhkit.grading.judging.step_context import Part, StepContext
+from dhkit.grading.judging.step_mistakes import SolutionMistakes
 from dhkit.grading.report import Verdict, Witness
-from dhkit.symbolic.inverse.forms import Circle
 
 MAX_HYPOTHESES = 100
 """Largest number of ways to take earlier joints without a right solution that are followed at once."""
@@ -293,7 +292,7 @@ class Solutions:
         truth = float(truths[int(np.argmin(np.nan_to_num(gaps, nan=np.inf)))])
         part.witness = Witness(pose, answer if np.isfinite(answer) else None, truth)
         if self.context.explain:
-            part.mistakes = [(self._mistake(branch, own) or "solution_wrong", "")]
+            part.mistakes = [self._mistake(branch, step, step.solutions[k], before) or ("solution_wrong", "")]
         return part
 
     def _branch(
@@ -314,27 +313,16 @@ class Solutions:
             trees[j] = Sum(((True, given[j]), (True, nothing)))
         trees[own] = tree
         poses = self.context.solved_poses.at(rows).with_known(known)
-        return Branch(poses, tuple(trees), given_order=(*before, own, *later))
+        return Branch(poses, tuple(trees), given_order=(*before, own, *later), judged_joint=own)
 
-    def _mistake(self, branch: Branch, own: int) -> str | None:
-        if self._forgets_offset(branch, own):
-            return "shoulder_offset_forgotten"
-        search = Search(self.context.description, self.context.lengths([branch.trees[own]]))
-        explanation = next(search.explanations(branch), None)
-        return explanation.mistake if explanation is not None and explanation.joint == own else None
+    def _mistake(self, branch: Branch, step: GivenStep, tree: Tree, before: Sequence[int]) -> tuple[str, str] | None:
+        def is_right_for(other: StepContext) -> bool:
+            judge = Solutions(other)
+            judge.unsolved = list(before)
+            part, _ = judge.part(replace(step, solutions=(tree,)), before)
+            return part.verdict.passes
 
-    def _forgets_offset(self, branch: Branch, own: int) -> bool:
-        """Whether the formula is that of joint 1 without its offset: the direction of the point, or the opposite."""
-        step, derivation = self.context.derived(own), self.context.derivation
-        if derivation is None or step is None or own != 0 or not isinstance(step.form, Circle):
-            return False
-        values, _ = next(derivation.candidates(branch.poses.T))
-        A, B, C = (np.broadcast_to(values.of(step.form.letters[k]), len(branch.q)) for k in "ABC")
-        offset = derivation.chain.number(derivation.chain.offsets[0])
-        straight = np.arctan2(B, A) + np.pi / 2 - offset
-        x = branch.q[:, 0]
-        near = [np.abs((x - straight - turn + np.pi) % (2 * np.pi) - np.pi) < MATCHES for turn in (0.0, np.pi)]
-        return bool(np.any(np.abs(C) > CLOSES) and np.mean(near[0] | near[1]) > 0.99)
+        return SolutionMistakes(self.context, branch, step.joint).mistake(is_right_for)
 
 
 def _same(values: Sequence[Sequence[Array]]) -> int | None:

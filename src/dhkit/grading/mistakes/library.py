@@ -98,6 +98,8 @@ INVERSE = _catalogue(
             "quadrant": "the angle is in the wrong quadrant for some poses: atan, asin and acos know only half a turn,"
             " atan2 knows all of it",
             "sign_lost": "the sign is wrong for some poses: acos and sqrt know only one",
+            "divisor_sign_lost": "the angle is off by half a turn for some poses: both arguments of atan2 were divided "
+            "by a factor, such as a sine, that may be negative",
         },
         (Subject.INVERSE, "Look again at this branch: which sign belongs to it?"): {
             "elbow_sign": "a root or an arc cosine has the wrong sign: it belongs to another branch",
@@ -105,18 +107,27 @@ INVERSE = _catalogue(
             "duplicate_branch": "the branch gives the same solutions as another",
         },
         (Subject.INVERSE, "Look again at where this angle or length is counted from."): {
-            "missing_offset": "the joint value is off by a constant: an offset of the table is missing",
-            "supplement": "the angle inside the triangle is given in place of the joint's, which is 180 degrees less "
-            "it",
+            "missing_offset": "the joint value is off by a constant: it is counted from another zero than in the table",
+            "angle_zero": "an angle is off by a quarter or half turn: the table counts it from another zero",
+            "supplement": "the angle inside the triangle of the links stands where the joint's belongs: the two add up "
+            "to 180 degrees",
             "earlier_joints_forgotten": "the angles of the joints before are not subtracted: the sum of the angles is "
             "given",
+            "sum_of_angles_forgotten": "a joint's own angle stands where the sum of angles about parallel axes belongs",
+            "sum_of_angles_too_much": "a sum of angles about parallel axes stands where one joint's own angle belongs",
             "offset_forgotten": "a constant length of base or table is not taken off a component of the position",
             "triangle_angle_forgotten": "the angle in the triangle of two links is not taken off: the direction to the"
             " end of the second is given in place of the first link's",
             "tool_length_forgotten": "the tool's length is not taken off the position: the triangle ends at the wrist",
             "shoulder_offset_forgotten": "the shoulder's offset is missing: the point does not lie in the plane through"
             " axis 1, but beside it",
-            "length_forgotten": "a constant length is missing in the equation",
+            "tool_not_taken_off": "the tool is not taken off: the formula is right for the last frame, T tool^-1",
+            "base_not_taken_off": "the base is not taken off: the formula is right for the tool in frame 0, base^-1 T",
+            "base_and_tool_not_taken_off": "base and tool are not taken off: the formula is right for A_1 ... A_n",
+            "tool_length_added": "the tool's length is added to the position: it is to be taken off",
+            "length_forgotten": "a length of the arm is missing",
+            "length_taken_as_zero": "the formula is right for an arm in which a length is zero",
+            "rounded_length": "a length is rounded: the formula needs all of its digits, or its name",
         },
         (Subject.INVERSE, "Look again at this step: put the pose of one configuration into both sides, and compare."): {
             "equation_wrong": "the equation is no identity of the arm; no single mistake explains it",
@@ -134,6 +145,7 @@ INVERSE = _catalogue(
             "root_forgotten": "a root is missing: the square of a length stands where the length belongs",
             "square_forgotten": "a square is missing: a length or a cosine stands where its square belongs",
             "square_too_much": "the square of a length stands where the length belongs",
+            "root_too_much": "a root is taken where its square belongs",
             "arc_function_forgotten": "the sine, cosine or tangent of the angle is given in place of the angle",
         },
         (Subject.INVERSE, "Look again at which component of the pose and which length stand where."): {
@@ -142,6 +154,9 @@ INVERSE = _catalogue(
         },
         (Subject.INVERSE, "Look again at the tool's rotation: rows are the base's axes, columns the tool's."): {
             "rotation_matrix_transposed": "the rotation matrix is transposed: r_ij stands where r_ji belongs",
+            "tool_axis_exchanged": "another axis of the tool is taken: column j of the rotation is its j-th axis",
+            "rotation_not_reduced": "the tool's rotation in the base stands where its rotation in the frame behind the "
+            "joints before belongs: R_36 = R_03^T R_06 for the wrist of six joints",
         },
     }
 )

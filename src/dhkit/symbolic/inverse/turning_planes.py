@@ -173,14 +173,15 @@ def three_parallel(bench: Workbench) -> None:
     plane = turn_the_plane(bench, point, origin(arm @ chain.joint(5)), who)
     sense = relative_sense(chain, 2) * relative_sense(chain, 3)
     senses = _parallel_senses(chain)
-    ax, ay, k = turn_parallel_wrist(bench, sense)
+    definitions, cosine, sine = turn_parallel_wrist(bench, sense)
     phi = bench.phi(arm[0, 0], arm[1, 0], senses)
     bench.add(
         Step(
             "phi",
-            f"{sum_text(senses)} Joints 2, 3 and 4 turn axis 6 about their axes by phi.",
-            (),
-            Directed(phi, {"k": k, "X": ax, "Y": ay}),
+            f"{sum_text(senses)} Joint 6 is known, and with it the direction of axis 5 in the tool's x and y axes. "
+            "Axis 5 is at right angles to axes 2, 3 and 4, which turn it by phi.",
+            definitions,
+            Directed(phi, {"k": chain.ring.one, "X": cosine, "Y": sine}),
         )
     )
     _reach_axis_4(bench, plane, lever, sense, senses)

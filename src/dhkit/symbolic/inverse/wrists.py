@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dhkit.symbolic.inverse.forms import CosineAndSquare, Direction, Flip
 from dhkit.symbolic.inverse.regions import into_axis_2
-from dhkit.symbolic.inverse.steps import Choice, Step, Workbench
+from dhkit.symbolic.inverse.steps import Choice, Definition, Step, Workbench
 from dhkit.symbolic.ring import Element, Elements
 
 FLIPS = ("no-flip", "flip")
@@ -64,8 +64,8 @@ def turn_spherical_wrist(bench: Workbench, R: Elements) -> None:
     )
 
 
-def turn_parallel_wrist(bench: Workbench, sense: Element) -> tuple[Element, Element, Element]:
-    """Add the steps for joints 5 and 6 behind the parallel axes 2, 3 and 4, and for phi, the sum of their angles.
+def turn_parallel_wrist(bench: Workbench, sense: Element) -> tuple[tuple[Definition, ...], Element, Element]:
+    """Add the steps for joints 5 and 6 behind the parallel axes 2, 3 and 4.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def turn_parallel_wrist(bench: Workbench, sense: Element) -> tuple[Element, Elem
     Returns
     -------
     tuple
-        x and y components of axis 6 in the frame of axis 2, and the sine of theta5 times that of alpha_5.
+        Definitions for the step that finds phi, the sum of the angles of joints 2, 3 and 4, and its cosine and sine.
     """
     chain = bench.chain
     s_alpha4, s_alpha5 = chain.alpha[3][1], chain.alpha[4][1]
@@ -92,7 +92,7 @@ def turn_parallel_wrist(bench: Workbench, sense: Element) -> tuple[Element, Elem
             CosineAndSquare(bench.unknown(5), {"X": -sense * s_alpha4 * s_alpha5 * az, "S": ax * ax + ay * ay}),
             "",
             "axis 6 is parallel to axes 2, 3 and 4 (theta5 is 0 or pi): only the sum or the difference of theta6 and "
-            "phi is determined, and theta6 may be chosen",
+            "phi is determined; theta6 may be chosen, phi follows from it, and joints 2 and 3 have to reach axis 4",
             Choice(FLIPS, (-sense * s_alpha4 * s_alpha5 * s5,)),
         )
     )
@@ -106,4 +106,7 @@ def turn_parallel_wrist(bench: Workbench, sense: Element) -> tuple[Element, Elem
             Direction(bench.unknown(6), {"k": s5, "X": sense * s_alpha4 * nz, "Y": -sense * s_alpha4 * oz}),
         )
     )
-    return ax, ay, s_alpha5 * s5
+    c6, s6 = chain.cosine_and_sine(6)
+    in_plane, (nx, ny, ox, oy) = bench.define_all(nx=n[0], ny=n[1], ox=o[0], oy=o[1])
+    sign = sense * s_alpha4 * s_alpha5
+    return in_plane, -sign * (s6 * ny + c6 * oy), sign * (s6 * nx + c6 * ox)
