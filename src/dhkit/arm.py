@@ -780,7 +780,7 @@ class Arm:
         self,
         objective: ObjectiveLike = "time",
         limits: Limits | None = None,
-        constraints: Sequence[Constraint] = (),
+        constraints: Constraint | Sequence[Constraint] = (),
         intervals: int | None = None,
         friction: bool | Friction = False,
     ) -> Planner:
@@ -795,7 +795,7 @@ class Arm:
         goal: ArrayLike | str,
         objective: ObjectiveLike = "time",
         *,
-        constraints: Sequence[Constraint] = (),
+        constraints: Constraint | Sequence[Constraint] = (),
         intervals: int | None = None,
         friction: bool | Friction = False,
         via: Sequence[ArrayLike | str] = (),
@@ -824,8 +824,10 @@ class Arm:
         (True, True)
         """
         from dhkit.planning import Objective
+        from dhkit.planning.request import checked_constraints
 
-        key = (Objective.of(objective), tuple(constraints), intervals, friction)
+        constraints = checked_constraints(constraints)
+        key = (Objective.of(objective), constraints, intervals, friction)
         planner = self._planners.get(key)
         if planner is None:
             planner = self._planners.setdefault(key, self.planner(key[0], None, constraints, intervals, friction))
@@ -858,7 +860,7 @@ class Arm:
         *,
         duration: float | None = None,
         limits: Limits | None = None,
-        constraints: Sequence[Constraint] = (),
+        constraints: Constraint | Sequence[Constraint] = (),
         intervals: int = 200,
         time_limit: float = 10.0,
         progress: ProgressCall | None = None,

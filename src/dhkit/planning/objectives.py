@@ -14,6 +14,7 @@ from dhkit.description import Array
 from dhkit.display import value_line
 from dhkit.planning.point import Point, gear_ratios
 from dhkit.planning.states import States
+from dhkit.planning.value_objects import require_value
 
 if TYPE_CHECKING:
     import casadi
@@ -246,6 +247,7 @@ class Objective:
         if isinstance(objective, Objective):
             return objective
         if isinstance(objective, Term):
+            require_value(objective)
             return cls((objective,))
         if isinstance(objective, str):
             if objective not in OBJECTIVES:

@@ -13,6 +13,7 @@ from dhkit.description import Array, Description, Payload, joint_array
 from dhkit.planning.collision_avoidance import CollisionAvoidance
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.loaded import LoadedArm, loaded
+from dhkit.planning.value_objects import require_value
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 
@@ -102,12 +103,13 @@ def checked_constraints(constraints: Constraint | Sequence[Constraint]) -> tuple
     Raises
     ------
     TypeError
-        Something else.
+        Something else, or a class that is no frozen dataclass.
     """
     given = (constraints,) if isinstance(constraints, Constraint) else tuple(constraints)
     for constraint in given:
         if not isinstance(constraint, Constraint):
             raise TypeError(f"constraints has {constraint!r}; expected ToolSpeed(...) and the like")
+        require_value(constraint)
     return given
 
 

@@ -51,7 +51,7 @@ def along_path(
     objective: ObjectiveLike = "time",
     duration: float | None = None,
     limits: Limits | None = None,
-    constraints: Sequence[Constraint] = (),
+    constraints: Constraint | Sequence[Constraint] = (),
     intervals: int = 200,
     time_limit: float = 10.0,
     progress: ProgressCall | None = None,
