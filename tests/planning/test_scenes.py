@@ -149,6 +149,38 @@ def test_ten_obstacles(law, name):
             law.holds(f"{what} above its limit", excess, 1e-6, k)
 
 
+def beside_two_balls(arm, count, seed):
+    """Yield start, goal and two balls, one of them halfway: the links of the wrist are about 25 mm from each other."""
+    rng = np.random.default_rng(seed)
+    while count:
+        start = np.array([0, -1.2, 1.5, -1.9, -1.57, 0]) + rng.uniform(-0.4, 0.4, 6)
+        goal = start + rng.uniform(-0.3, 0.3, 6) + [1.5, 0, 0, 0, 0, 0]
+        middle = world_to_tool(arm, (start + goal) / 2)[:3, 3]
+        balls = [
+            Obstacle.sphere(0.07, middle + rng.uniform(-0.05, 0.05, 3)),
+            Obstacle.sphere(0.07, rng.uniform([-0.8, -0.8, 0], [0.8, 0.8, 0.8])),
+        ]
+        if distance(arm, np.stack([start, goal]), balls, self_collision=True).distance.min() > 0.022:
+            count -= 1
+            yield start, goal, balls
+
+
+def test_links_that_move_together_near_each_other_cost_no_time(law):
+    """A plane between two links that is fixed in the world would have to separate them while both move."""
+    arm = library_robot("ur5")
+    planner = Planner(arm)
+    for k, (start, goal, balls) in enumerate(beside_two_balls(arm, max(law.samples(10), 3), seed=1)):
+        free = planner.solve(start, goal, obstacles=balls, clearance=CLEARANCE)
+        motion = planner.solve(start, goal, obstacles=balls, clearance=CLEARANCE, self_collision=True, time_limit=30)
+        assert motion.report.is_converged, k
+        q = motion.q(np.linspace(0, motion.duration, 2000))
+        clear = distance(arm, q, balls, self_collision=True).distance.min()
+        law.holds("m short of the clearance", CLEARANCE - clear, ROUNDING, k)
+        law.holds(
+            "duration beside the motion without self-collision, less 1", motion.duration / free.duration - 1, 0.05, k
+        )
+
+
 def test_a_way_that_is_hardly_wider_than_the_clearance_is_found():
     # Paths that keep 5 mm more than the clearance do not exist here; OMPL's BKPIECE1 finds one that keeps 20 mm in 2 s.
     *_, scene = itertools.islice(random_scenes(SceneKind("puma560"), 0), 22)

@@ -339,12 +339,12 @@ class AvoidingSearch:
         pairs = self.separation.pairs
         reduced = self.task.avoidance.at_ends(pairs) < self.clearance
         ends = self.separation.gaps(self.task.points[[0, -1], None])
-        normal, level, middle = gaps.normal.copy(), gaps.level.copy(), gaps.middle.copy()
+        normal, level = gaps.normal.copy(), gaps.level.copy()
         for end, interval in ((0, 0), (1, -1)):
             which = reduced[:, end]
-            for own, at_end in ((normal, ends.normal), (level, ends.level), (middle, ends.middle)):
+            for own, at_end in ((normal, ends.normal), (level, ends.level)):
                 own[interval, which] = at_end[end, which]
-        return replace(gaps, normal=normal, level=level, middle=middle)
+        return replace(gaps, normal=normal, level=level)
 
     def _shortfall(self, certificate: Certificate) -> float:
         """Return how much the smallest gap is below the clearance on the certificate's grid and between, m."""

@@ -59,7 +59,7 @@ class Problem:
         self.description, self.objective, self.constraints, self.mesh = description, objective, constraints, mesh
         self.n, self.payload, self.jerk_limited = description.n, payload, jerk_limited
         self.point = Point(description, limits, friction, payload)
-        self._plane_functions: dict[int, LocalFunction] = {}
+        self._plane_functions: dict[tuple[int, int | None], LocalFunction] = {}
         every = enumerate(motion_constraints(limits, NO_AVOIDANCE, constraints))
         # Positions, rates and accelerations are variables; their limits are bounds, and rows inside intervals.
         self._every = dict(every)
@@ -197,29 +197,35 @@ class Problem:
         """Return the program with points of links kept on their sides of planes, and its additional parameters."""
         at, begin = self.variables, self.program.parameters
         blocks, values = list(self.program.blocks), [np.zeros(0)]
-        for link in sorted({row.link for row in rows}):
-            of_link = [row for row in rows if row.link == link]
+        for link, frame in dict.fromkeys((row.link, row.frame) for row in rows):
+            of_link = [row for row in rows if (row.link, row.frame) == (link, frame)]
             knots = np.array([row.knot for row in of_link])
             planes = np.array([[*row.point, *row.normal, row.level] for row in of_link])
             intervals = np.clip(np.stack([knots - 1, knots], axis=1), 0, self.mesh.intervals - 1)
             parameters = (begin + np.arange(planes.size)).reshape(planes.shape).T
             kinds = (Rows(RowKind.PLANE, Limit.CLEARANCE.what, 1),)
-            blocks.append(Block(self._beside_plane(link), at.q[:, knots], parameters, kinds, intervals))
+            blocks.append(Block(self._beside_plane(link, frame), at.q[:, knots], parameters, kinds, intervals))
             values.append(planes.ravel())
             begin += planes.size
         return BlockProgram(at.count, begin, tuple(blocks)), np.concatenate(values)
 
-    def _beside_plane(self, link: int) -> LocalFunction:
-        """Return how far a point of a link, given in its frame, is beyond a plane, m."""
+    def _beside_plane(self, link: int, frame: int | None) -> LocalFunction:
+        """Return how far a point of a link, given in its frame, is beyond a plane of the world or another frame, m."""
         import casadi
 
-        if link not in self._plane_functions:
+        if (link, frame) not in self._plane_functions:
             point, normal, level = casadi.SX.sym("point", 3), casadi.SX.sym("normal", 3), casadi.SX.sym("level")
-            T = SymbolicTable.of(self.description).world_to_frames(self.point.q)[link]
-            beyond = casadi.dot(normal, T[:3, :3] @ point + T[:3, 3]) - level
+            table, q = SymbolicTable.of(self.description), self.point.q
+            x = casadi.vertcat(point, 1)
+            for i in reversed(range(frame or 0, link)):
+                x = table.link_transform(i, q[i]) @ x
+            if frame is None:
+                x = table.world_to_frames(q)[0] @ x
+            x = x[:3]
             parameters = casadi.vertcat(point, normal, level)
-            self._plane_functions[link] = LocalFunction(self.point.q, parameters, beyond)
-        return self._plane_functions[link]
+            beyond = casadi.dot(normal, x) - level
+            self._plane_functions[link, frame] = LocalFunction(self.point.q, parameters, beyond)
+        return self._plane_functions[link, frame]
 
     @property
     def _durations(self) -> Block:

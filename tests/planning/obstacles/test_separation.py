@@ -70,13 +70,20 @@ def test_planes_have_the_obstacle_on_one_side_and_the_link_on_the_other(ur5):
         clear = gaps.gap[:, p] > 1e-6
         n, level = gaps.normal[clear, p], gaps.level[clear, p]
         np.testing.assert_allclose(np.linalg.norm(n, axis=1), 1.0, atol=1e-12)
+        if pair.obstacle is None:  # the plane touches the first link, in its frame, and the other is beyond
+            frame = world_to_frames(ur5, q[clear])[:, capsules[pair.capsule].link]
+            first, second = (
+                np.einsum("kei,kij,kj->ke", axes[clear, i] - frame[:, None, :3, 3], frame[:, :3, :3], n)
+                for i in (pair.capsule, pair.other)
+            )
+            np.testing.assert_allclose(first.max(axis=1) + capsules[pair.capsule].radius, level, atol=1e-9)
+            beyond = second.min(axis=1) - capsules[pair.other].radius - level
+            np.testing.assert_allclose(beyond, gaps.gap[clear, p], atol=1e-9)
+            continue
         own = np.einsum("kei,ki->ke", axes[clear, pair.capsule], n)[:, list(pair.ends)]
         beyond = own.min(axis=1) - capsules[pair.capsule].radius - level
         np.testing.assert_allclose(beyond, gaps.gap[clear, p], atol=1e-9)
-        if pair.obstacle is None:
-            other = np.einsum("kei,ki->ke", axes[clear, pair.other], n).max(axis=1) + capsules[pair.other].radius
-            assert np.all(other <= level + 1e-9)
-        elif isinstance(SCENE[pair.obstacle], Obstacle):
+        if isinstance(SCENE[pair.obstacle], Obstacle):
             solid = SCENE[pair.obstacle]
             corners = np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T * solid.half_sizes
             world = corners @ solid.T_world_obstacle[:3, :3].T + solid.centre
@@ -93,7 +100,7 @@ def test_rows_hold_at_a_clear_state_by_their_gaps(ur5):
         rows = separation.rows(gaps, gaps.gap < 0.3, np.full(gaps.gap.shape, 0.03))
         frames = world_to_frames(ur5, state)
         for row in rows:
-            T = frames[row.link]
+            T = frames[row.link] if row.frame is None else np.linalg.solve(frames[row.frame], frames[row.link])
             assert row.normal @ (T[:3, :3] @ row.point + T[:3, 3]) >= row.level - 1e-12
         assert {row.knot for row in rows} == {0, 1, 2}
 

@@ -2,7 +2,8 @@
 
 Solids are convex. The plane at a solid's nearest point, at right angles to the shortest connection, therefore has the
 solid on one side: while a link stays on the other side, the two cannot meet. Planes are linear in the positions of the
-links, so that an optimizer needs no distances.
+links, so that an optimizer needs no distances. A plane between two links moves with one of them, so that it need not
+move when they move together.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dhkit.description import Array, Box, Description
+from dhkit.description import Array, Box, Description, world_to_frames
 from dhkit.planning.obstacles.capsules import link_capsules, world_axes
 from dhkit.planning.obstacles.pairs import Pair, capsules_beside, checked_pairs, ends_above
 from dhkit.planning.obstacles.scene import Floor, Obstacle
@@ -32,17 +33,17 @@ UP = np.array([0.0, 0.0, 1.0])
 class Gaps:
     """Smallest gaps of P pairs in K groups of states, and a plane between each pair.
 
-    The plane is that of the state whose plane both the first and the last state of the group keep best.
+    The plane is that of the state whose plane both the first and the last state of the group keep best. Beside an
+    obstacle it is fixed in the world and touches the obstacle; between links it is fixed in the frame of the pair's
+    first capsule and touches that one.
     """
 
     gap: Array
     """Shape (K, P), m; for axes that intersect, minus the sum of the radii."""
     normal: Array
-    """Normals of the planes, from the other body to the capsule, shape (K, P, 3)."""
+    """Normals of the planes, from the body that they touch to the other one, shape (K, P, 3)."""
     level: Array
-    """Position of the other body's surface along the normal, shape (K, P), m."""
-    middle: Array
-    """Position halfway between the surfaces along the normal, shape (K, P), m."""
+    """Position of that body's surface along the normal, shape (K, P), m."""
 
 
 class PlaneRow(NamedTuple):
@@ -50,11 +51,13 @@ class PlaneRow(NamedTuple):
 
     link: int
     """Index of its DH frame."""
+    frame: int | None
+    """Index of the DH frame in which the plane is fixed; None for the world."""
     knot: int
     point: Array
     """In that frame, shape (3,), m."""
     normal: Array
-    """In the world, shape (3,)."""
+    """In that frame, shape (3,)."""
     level: float
     """m."""
 
@@ -103,17 +106,20 @@ class Separation:
         others = [None if pair.obstacle is None else self.obstacles[pair.obstacle] for pair in pairs]
         solids = [item for item in others if isinstance(item, Obstacle)]
         floor = others[0] if isinstance(others[0], Floor) else None
-        self._groups.append(_Group(part, capsules, Solids.of(solids) if solids else None, floor))
+        second = np.array([-1 if pair.other is None else pair.other for pair in pairs])
+        self._groups.append(_Group(part, capsules, second, Solids.of(solids) if solids else None, floor))
         self.pairs += pairs
 
     def gaps(self, q: Array, near: float = np.inf) -> Gaps:
         """Return the gaps of K groups of states, shape (K, S, n), rad and m; infinite if surely above ``near``, m."""
         axes = world_axes(self.description, q)
         shape = (len(q), len(self.pairs))
-        found = Gaps(np.full(shape, np.inf), np.zeros((*shape, 3)), np.zeros(shape), np.zeros(shape))
+        found = Gaps(np.full(shape, np.inf), np.zeros((*shape, 3)), np.zeros(shape))
         for group in self._groups:
             at = self._near(axes, group, near)
-            if len(at[0]):
+            if group.is_of_links:
+                self._measure_links(world_to_frames(self.description, q), axes, group, found)
+            elif len(at[0]):
                 self._measure(axes, group, at, found)
         return found
 
@@ -140,21 +146,15 @@ class Separation:
         for k, p in np.argwhere(self._needed(gaps, active, margins)):
             pair, n = self.pairs[p], gaps.normal[k, p]
             capsule, need = self.capsules[pair.capsule], float(margins[k, p])
-            if pair.other is None:
-                sides = [(capsule, pair.ends, n, float(gaps.level[k, p]) + need)]
-            else:
-                # Both may move: each stays on its side of the plane halfway between them.
-                other = self.capsules[pair.other]
-                middle = float(gaps.middle[k, p])
-                sides = [(capsule, (0, 1), n, middle + need / 2), (other, (0, 1), -n, -middle + need / 2)]
-            for body, ends, normal, level in sides:
-                points = [(body.start, body.end)[end] for end in (ends if body.length > 0 else ends[:1])]
-                rows += [
-                    PlaneRow(body.link, knot, point, normal, level + body.radius)
-                    for point in points
-                    for knot in (int(k), int(k) + 1)
-                    if body.link > 0 and knot not in fixed
-                ]
+            body = capsule if pair.other is None else self.capsules[pair.other]
+            frame = None if pair.other is None else capsule.link
+            points = [(body.start, body.end)[end] for end in (pair.ends if body.length > 0 else pair.ends[:1])]
+            rows += [
+                PlaneRow(body.link, frame, knot, point, n, float(gaps.level[k, p]) + need + body.radius)
+                for point in points
+                for knot in (int(k), int(k) + 1)
+                if body.link > 0 and knot not in fixed
+            ]
         return rows
 
     def _needed(self, gaps: Gaps, active: NDArray[np.bool_], margins: Array) -> NDArray[np.bool_]:
@@ -197,7 +197,6 @@ class Separation:
         capsules = group.capsules[p]
         own, solids = axes[k[:, None], np.arange(axes.shape[1]), capsules[:, None]], group.solids
         radius = np.zeros(len(k))
-        theirs = own
         if group.floor is not None:
             is_checked = np.array([[end in pair.ends for end in (0, 1)] for pair in pairs])[p][:, None]
             low = np.argmin(np.where(is_checked, own[..., 2], np.inf), axis=-1)[..., None, None]
@@ -206,36 +205,66 @@ class Separation:
             nearest[..., 2] = group.floor.height
             # Gaps of axes are not negative: an axis below the floor counts as on it.
             on_axis[..., 2] = np.maximum(on_axis[..., 2], group.floor.height)
-        elif solids is None:
-            others = np.array([pair.other for pair in pairs])[p]
-            radius = self.radii[others]
-            theirs = axes[k[:, None], np.arange(axes.shape[1]), others[:, None]]
-            on_axis, nearest = nearest_points(own, theirs)
-        elif solids.are_boxes:
+        elif solids is not None and solids.are_boxes:
             on_axis, nearest = nearest_on_box(own, solids.placements[p][:, None], solids.half_sizes[p][:, None])
-        else:
+        elif solids is not None:
             radius = solids.radii[p]
             on_axis, nearest = nearest_points(own, solids.axes[p][:, None])
-        along = on_axis - nearest
-        length = np.sqrt(np.sum(along * along, axis=-1))
-        normal = along / np.maximum(length, ZERO)[..., None]
-        normal[length < ZERO] = UP
-        own_radius = self.radii[capsules]
-        level = np.sum(normal * nearest, axis=-1) + radius[:, None]
-        gap = length - own_radius[:, None] - radius[:, None]
-        # How far the first and the last state are on their sides of each state's plane, shape (pairs, states).
-        sides = own[:, [0, -1]] if group.floor is None else on_axis[:, [0, -1], None]
-        beyond = np.einsum("msi,mkei->mske", normal, sides).min(axis=(2, 3)) - own_radius[:, None]
-        if solids is None and group.floor is None:
-            behind = np.einsum("msi,mkei->mske", normal, theirs[:, [0, -1]]).max(axis=(2, 3)) + radius[:, None]
-            margin = np.minimum(beyond - (level + gap / 2), level + gap / 2 - behind)
-        else:
-            margin = beyond - level
-        which = np.arange(len(k)), np.argmax(margin, axis=1)
-        here = k, p + group.part.start
-        found.gap[here] = gap.min(axis=1)
-        found.normal[here], found.level[here] = normal[which], level[which]
-        found.middle[here] = (level + gap / 2)[which]
+        # The states that decide which plane is kept best.
+        ends = own[:, [0, -1]] if group.floor is None else on_axis[:, [0, -1], None]
+        _keep(found, (k, p + group.part.start), (nearest, radius), (on_axis, self.radii[capsules]), ends)
+
+    def _measure_links(self, frames: Array, axes: Array, group: _Group, found: Gaps) -> None:
+        """Write the gaps between links in groups of states; frames are those of links, shape (K, S, n+1, 4, 4)."""
+        K, S = axes.shape[:2]
+        firsts, seconds = group.capsules, group.others
+        frame = frames[:, :, [self.capsules[i].link for i in firsts]]
+
+        def in_frame(which: Indices) -> Array:
+            """Return axes in the frames of the first capsules, shape (K P, S, 2, 3), m."""
+            away = axes[:, :, which] - frame[..., None, :3, 3]
+            return np.moveaxis(away @ frame[..., :3, :3], 1, 2).reshape(-1, S, 2, 3)
+
+        own, other = in_frame(firsts), in_frame(seconds)
+        nearest, on_other = nearest_points(own, other)
+        k, p = np.indices((K, len(firsts))).reshape(2, -1)
+        touched, beyond = (nearest, self.radii[firsts[p]]), (on_other, self.radii[seconds[p]])
+        _keep(found, (k, p + group.part.start), touched, beyond, other[:, [0, -1]])
+
+
+def _keep(
+    found: Gaps,
+    here: tuple[Indices, Indices],
+    touched: tuple[Array, Array],
+    other: tuple[Array, Array],
+    ends: Array,
+) -> None:
+    """Write gaps, each at its smallest, and the planes that are kept best.
+
+    Parameters
+    ----------
+    found
+        Where they are written.
+    here
+        Groups of states and pairs, shape (m,) each.
+    touched, other
+        Nearest points of the axes, shape (m, S, 3), and radii, shape (m,), of the body that the plane touches and of
+        the other one; m.
+    ends
+        Points of the other body at the first and the last state, shape (m, 2, e, 3), m.
+    """
+    (nearest, radius), (on_axis, own_radius) = touched, other
+    along = on_axis - nearest
+    length = np.sqrt(np.sum(along * along, axis=-1))
+    normal = along / np.maximum(length, ZERO)[..., None]
+    normal[length < ZERO] = UP
+    level = np.sum(normal * nearest, axis=-1) + radius[:, None]
+    gap = length - own_radius[:, None] - radius[:, None]
+    # How far the first and the last state are on their side of each state's plane, shape (m, S).
+    beyond = np.einsum("msi,mkei->mske", normal, ends).min(axis=(2, 3)) - own_radius[:, None]
+    which = np.arange(len(gap)), np.argmax(beyond - level, axis=1)
+    found.gap[here] = gap.min(axis=1)
+    found.normal[here], found.level[here] = normal[which], level[which]
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,6 +275,13 @@ class _Group:
     """Their indices."""
     capsules: Indices
     """Of each pair, shape (P,)."""
+    others: Indices
+    """The other capsule of each pair of links, shape (P,); -1 of other pairs."""
     solids: Solids | None
     """Of each pair."""
     floor: Floor | None
+
+    @property
+    def is_of_links(self) -> bool:
+        """Whether its pairs are links."""
+        return self.solids is None and self.floor is None
