@@ -76,7 +76,7 @@ class SceneKind:
 KINDS = {
     "mixed": tuple(SceneKind(robot) for robot in ARMS),
     "spheres": tuple(SceneKind(robot, (10, 10), has_boxes=False) for robot in ("ur5", "panda")),
-    "itself": (SceneKind("puma560", (10, 10), has_boxes=False, self_collision=True),),
+    "itself": tuple(SceneKind(robot, (10, 10), has_boxes=False, self_collision=True) for robot in ARMS),
 }
 """Kinds of scenes by name: 3 to 10 boxes and spheres, ten spheres, and ten spheres with self-collision."""
 

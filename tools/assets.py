@@ -28,7 +28,8 @@ def inverse_page(name: str) -> str:
     derivation = inverse_derivation(library_robot(name))
     return (
         f"# {name}: inverse kinematics worked out\n"
-        f"Printed by `dhkit equations {name} --what ik`; `make assets` writes this file. "
+        f"Printed by `dhkit equations {name} --what ik`, with the proof of `derivation.prove()` as its last line; "
+        "`make assets` writes this file. "
         "[inverse-kinematics.md](inverse-kinematics.md) says what is proved of it.\n"
         f"```text\n{derivation.text()}\n{derivation.prove()}\n```\n"
     )

@@ -85,6 +85,20 @@ def test_exported_code_gives_the_branches_of_the_kernels(name, language, tmp_pat
 
 
 @pytest.mark.parametrize("language", ["c", "python"])
+def test_exported_code_refuses_what_is_no_pose(language, tmp_path):
+    if language == "c":
+        require("gcc", shutil.which("gcc") is not None)
+    derivation = inverse_derivation(library_robot("puma560"))
+    solve = compiled(derivation, tmp_path) if language == "c" else imported(derivation, tmp_path)
+    T = world_to_tool(derivation.description, np.full((1, 6), 0.3))[0]
+    assert np.isfinite(solve(T)).any()
+    for entry, value in (((0, 3), np.nan), ((1, 3), np.inf), ((2, 2), np.nan), ((0, 0), 2.0), ((1, 2), T[1, 2] + 1e-4)):
+        other = T.copy()
+        other[entry] = value
+        assert np.isnan(solve(other)).all(), entry
+
+
+@pytest.mark.parametrize("language", ["c", "python"])
 @pytest.mark.parametrize("name", SIX_JOINTS)
 def test_exported_code_reaches_singular_poses(name, language, tmp_path):
     if language == "c":

@@ -62,21 +62,21 @@ def _body(derivation: InverseDerivation) -> str:
 
 def _step(derivation: InverseDerivation, write: Phrases, step: Step) -> Iterator[str]:
     yield f"<p>{_words(step.look)}</p>"
+    if used := solved_before(derivation, step):
+        yield f'<p class="ik-known">Known from before: {_words(", ".join(used))}.</p>'
     for definition in step.definitions:
         yield _display(f"{write.name(definition.name)} = {write.element(definition.element)}")
     if step.form is None:
         return
-    if used := solved_before(derivation, step):
-        yield f'<p class="ik-known">Known from before: {_words(", ".join(used))}.</p>'
     solution = write.solution(step.form)
     solved = (solution.unknown, solution.alternatives[0])
     for left, right in write.equations(step):
         if (left, right) != solved:
             yield _display(f"{left} = {right}")
-    alternatives = r" \quad\text{or}\quad ".join(solution.alternatives)
-    yield _display(f"{solution.unknown} = {alternatives}", "display solution")
     for letter, value in solution.letters:
         yield _display(f"{letter} = {value}")
+    alternatives = r" \quad\text{or}\quad ".join(solution.alternatives)
+    yield _display(f"{solution.unknown} = {alternatives}", "display solution")
     if step.choice:
         yield f"<p>The two solutions: {_sentence(rule_in_dollars(write, step.choice))}.</p>"
     for head, text in (("No solution where", step.nothing), ("Singular where", step.singular)):

@@ -36,18 +36,24 @@ def inverse_text(derivation: InverseDerivation) -> str:
 
 
 def inverse_table(derivation: InverseDerivation) -> str:
-    """Return a derivation's equations and solutions as a table of HTML, a row for each step."""
+    """Return a derivation's definitions, equations and solutions as a table of HTML, a row for each step."""
     write = Phrases(derivation, latex=False)
     rows = []
     for step in derivation.steps:
-        if step.form is None:
-            continue
-        equations = "; ".join(f"{left} = {right}" for left, right in write.equations(step))
-        solution = write.solution(step.form)
-        rows.append([equations, f"{solution.unknown} = {' or '.join(solution.alternatives)}"])
-    return html_table(
-        ("what is looked at", "equation", "solution"), rows, f"{derivation.description.name}: joint by joint"
-    )
+        definitions = "; ".join(f"{write.name(d.name)} = {write.element(d.element)}" for d in step.definitions)
+        equations, solved = "", ""
+        if step.form is not None:
+            equations = "; ".join(f"{left} = {right}" for left, right in write.equations(step))
+            solution = write.solution(step.form)
+            solved = "; ".join(
+                [
+                    f"{solution.unknown} = {' or '.join(solution.alternatives)}",
+                    *(f"{letter} = {value}" for letter, value in solution.letters),
+                ]
+            )
+        rows.append([_title(write, step), definitions, equations, solved])
+    columns = ("what is found", "with", "equation", "solution")
+    return html_table(columns, rows, f"{derivation.description.name}: joint by joint")
 
 
 def introduction(derivation: InverseDerivation) -> list[str]:
@@ -81,20 +87,20 @@ def _title(write: Phrases, step: Step) -> str:
 def _step(derivation: InverseDerivation, write: Phrases, step: Step) -> Iterator[str]:
     indent = "   "
     yield from textwrap.wrap(step.look, WIDTH, initial_indent=indent, subsequent_indent=indent)
+    if used := solved_before(derivation, step):
+        yield f"{indent}known from before: {', '.join(used)}"
     for definition in step.definitions:
         yield from broken_lines(f"{indent}{write.name(definition.name)} = ", write.element(definition.element))
     if step.form is None:
         return
-    if used := solved_before(derivation, step):
-        yield f"{indent}known from before: {', '.join(used)}"
     equations = write.equations(step)
     solution = write.solution(step.form)
     if equations != [(solution.unknown, solution.alternatives[0])]:
         for left, right in equations:
             yield from broken_lines(f"{indent}{left} = ", right)
-    yield f"{indent}{solution.unknown} = {' or '.join(solution.alternatives)}"
     for letter, value in solution.letters:
-        yield from broken_lines(f"{indent}with {letter} = ", value)
+        yield from broken_lines(f"{indent}{letter} = ", value)
+    yield f"{indent}{solution.unknown} = {' or '.join(solution.alternatives)}"
     if step.choice:
         yield from textwrap.wrap(
             f"the two solutions: {write.rule(step.choice)}", WIDTH, initial_indent=indent, subsequent_indent=indent
@@ -116,7 +122,7 @@ def inverse_latex(derivation: InverseDerivation) -> str:
             solution = write.solution(step.form)
             solved = (solution.unknown, r" \quad\text{or}\quad ".join(solution.alternatives))
             displays += [pair for pair in write.equations(step) if pair != solved]
-            displays += [solved, *solution.letters]
+            displays += [*solution.letters, solved]
         rows = [f"{left} &= {right}" for left, right in displays]
         parts.append("\\begin{align*}\n" + " \\\\\n".join(rows) + "\n\\end{align*}")
         if step.choice:
@@ -144,7 +150,12 @@ def rule_in_dollars(write: Phrases, choice: Choice) -> str:
     factors = [write.element(factor) for factor in choice.factors]
     text = write.rule(choice)
     for factor in sorted(factors, key=len, reverse=True):
-        text = text.replace(factor, f"${factor}$") if len(factor) > 1 else text
+        if len(factor) > 1:
+            text = (
+                text.replace(f"{factor} > 0", f"${factor} > 0$")
+                if f"{factor} > 0" in text
+                else text.replace(factor, f"${factor}$")
+            )
     return text
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from dhkit.symbolic.equations.collected import collected
@@ -12,7 +12,7 @@ from dhkit.symbolic.equations.latex_names import latex_names
 from dhkit.symbolic.equations.text import TextWriter
 from dhkit.symbolic.equations.writing import Printer
 from dhkit.symbolic.inverse.derivation import InverseDerivation
-from dhkit.symbolic.inverse.forms import CosineAndSquare, Flip, Form, Remainder, Unknown
+from dhkit.symbolic.inverse.forms import Circle, CosineAndSquare, Flip, Form, Remainder, Unknown
 from dhkit.symbolic.inverse.steps import Choice, Step
 from dhkit.symbolic.ring import Element
 from dhkit.symbolic.ring.notation import Notation, notation, symbols_of
@@ -120,6 +120,10 @@ class Phrases:
         words = {k: self._letters(derived[k][0]) if k in derived else "0" if k in zero else k for k in used}
         needed = sorted(set(re.findall(r"[A-Zk](?![a-z])", " ".join(words.values()))))
         letters = tuple((k, self.element(form.letters[k])) for k in needed if k in form.letters)
+        if isinstance(form, Circle) and "B" in zero:
+            zero_angle = r"\mathrm{atan2}(0,\, A)" if self.is_latex else "atan2(0, A)"
+            otherwise = r"0 \text{ where } A > 0, \text{ else } \pi" if self.is_latex else "0 where A > 0, else pi"
+            letters += ((zero_angle, otherwise),)
         return Solution(name, tuple(_filled(template, words) for template in templates), letters)
 
     def rule(self, choice: Choice) -> str:
@@ -197,8 +201,36 @@ def solved_before(derivation: InverseDerivation, step: Step) -> list[str]:
     elements = [*step.elements, *(definition.element for definition in step.definitions)]
     if isinstance(step.form, Flip):  # what the unknown is multiplied by is not known yet
         elements = [step.form.letters["X"], step.form.letters["Y"], *(d.element for d in step.definitions)]
-    used = {k for element in elements for monomial in element.terms for k, exponent in enumerate(monomial) if exponent}
+    through = _joints_of_quantities(derivation, step)
     own = step.unknown.joint if step.unknown else None
-    joints = sorted({g.joint for k in used if (g := ring.generators[k]).kind != "constant"} - {own})
+    generators = [ring.generators[k] for k in _used(elements)]
+    joints = {g.joint for g in generators if g.kind != "constant"}
+    joints = joints.union(*(through.get(g.text, set()) for g in generators if g.kind == "constant")) - {own}
     kinds = derivation.description.kinds
-    return [f"theta{i + 1}" if kinds[i] == "R" else f"q{i + 1}" for i in joints if i >= 0]
+    return [f"theta{i + 1}" if kinds[i] == "R" else f"q{i + 1}" for i in sorted(joints) if i >= 0]
+
+
+def _joints_of_quantities(derivation: InverseDerivation, step: Step) -> dict[str, set[int]]:
+    """Return the joints behind each quantity that steps before one define, or find as phi, by name."""
+    generators, names = derivation.chain.ring.generators, derivation.chain.names
+    found: dict[str, set[int]] = {}
+    for earlier in derivation.steps:
+        if earlier is step:
+            break
+        for definition in earlier.definitions:
+            used = [generators[k] for k in _used([definition.element])]
+            found[definition.name] = {g.joint for g in used if g.kind != "constant"}.union(
+                *(found.get(g.text, set()) for g in used if g.kind == "constant")
+            )
+        if earlier.unknown is not None and earlier.unknown.joint is None:
+            used = [generators[k] for k in _used(earlier.elements)]
+            joints = {g.joint for g in used if g.kind != "constant"}.union(
+                *(found.get(g.text, set()) for g in used if g.kind == "constant")
+            )
+            found[names["cphi"]] = found[names["sphi"]] = {i for i in joints if i >= 0}
+    return found
+
+
+def _used(elements: Iterable[Element]) -> set[int]:
+    """Return the indices of the generators in elements."""
+    return {k for element in elements for monomial in element.terms for k, exponent in enumerate(monomial) if exponent}

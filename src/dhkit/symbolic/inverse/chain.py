@@ -28,7 +28,7 @@ POSITION = ("px", "py", "pz")
 ROTATION = tuple(f"r{i}{j}" for i in "123" for j in "123")
 POSE = (*POSITION, *ROTATION)
 """Names of the entries of the tool's pose in the world."""
-INNER = tuple(name.replace("p", "u").replace("r", "u") for name in POSE)
+INNER = tuple(name.replace("p", "h").replace("r", "h") for name in POSE)
 """Names of the entries of the pose without base and tool."""
 DEFINED = (
     *INNER,

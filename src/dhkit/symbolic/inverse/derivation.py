@@ -384,6 +384,11 @@ def _proof(bench: Workbench, what: str, sides: Sequence[tuple[Element, Element]]
     return Proof(f"{what}: holds for the pose of the arm itself", element_array(differences))
 
 
+def _subjects(note: str) -> set[str]:
+    """Return the symbols that a note on constant angles is about: "cos(0.3) and sin(0.3) are symbols, ..."."""
+    return set(note.partition(" are symbols")[0].split(" and "))
+
+
 @takes_robot
 def inverse_derivation(description: Description) -> InverseDerivation:
     """Derive an arm's inverse kinematics in closed form, step by step.
@@ -417,7 +422,8 @@ def inverse_derivation(description: Description) -> InverseDerivation:
     own = [f"{name} = {value:.6g}" for name, value in named.items() if name not in description.parameters]
     if own:
         notes.append(f"lengths of the table by the numbers of their rows, m: {', '.join(own)}")
-    notes += chain.notes
+    # Notes on constant angles begin with the symbols that they are about.
+    notes += [note for note in chain.notes if " are symbols" not in note or _subjects(note) & used]
     return InverseDerivation(
         chain, family, tuple(steps), tuple(bench.conditions), tuple(notes), bench.sum, bench.meanings
     )

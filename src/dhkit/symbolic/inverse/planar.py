@@ -199,6 +199,6 @@ def slider(bench: Workbench) -> None:
             Choice(("ahead", "behind"), (chain.alpha[0][1] * own[1],)),
         )
     )
-    look = "With theta2 known, the slide has to bring the tool to its height."
+    look = "With theta2 known, the slide has to bring the tool to its place along its direction."
     height_of_slide(bench, 1, origin(bench.T)[2], place[2], look)
     bench.conditions.append(Condition(IN_THE_PLANE, seen[2] - start[2], own[2]))

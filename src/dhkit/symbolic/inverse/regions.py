@@ -207,7 +207,9 @@ def reach_with_slide(bench: Workbench, i: int, vector: Elements, place: tuple[El
             f"q{i + 1} alone (Pythagoras).",
             (),
             Square(unknown, {"M": middle, "S": S, "Q": x * x + y * y}),
-            f"{who} is nearer to axis {i} than the line along which it slides",
+            ""
+            if (rest - middle * middle).is_zero
+            else f"{who} is nearer to axis {i} than the line along which it slides",
             f"{who} is as near to axis {i} as the slide allows: both solutions coincide",
             Choice(("out", "in"), (unknown.symbols[0] + middle,)),
             Figure(View.SLIDE, (f"axis {i}", who)),

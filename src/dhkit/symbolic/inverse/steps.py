@@ -172,8 +172,8 @@ class Workbench:
         self.steps.append(
             Step(
                 f"The pose without {what}",
-                f"The constant transforms before axis 1{' and behind joint n' * self.undoes_tool} are taken off: what "
-                f"remains, u, depends on the joints alone.",
+                f"The constant transforms before axis 1{f' and behind joint {chain.n}' * self.undoes_tool} are taken "
+                "off: what remains, h, depends on the joints alone.",
                 tuple(Definition(self.chain.names[name], values[name]) for name in INNER),
             )
         )

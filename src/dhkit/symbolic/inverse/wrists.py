@@ -54,7 +54,8 @@ def turn_spherical_wrist(bench: Workbench, R: Elements) -> None:
         Step(
             "theta6",
             "Joint 4 has turned axis 5 into the direction (s4, -c4, 0) in the axes of link 3, up to its sense. "
-            "The tool's x and y axes, (nx, ny, nz) and (ox, oy, oz) in them, have its sine and cosine as components.",
+            "The components of the tool's x and y axes along it are its sine and cosine; nx, ny and ox, oy are the x "
+            "and y components of these axes in the axes of link 3.",
             more,
             Direction(
                 bench.unknown(6),
