@@ -1,11 +1,12 @@
 """Every way in which there is no motion, and what is said of it.
 
-Modules: feasibility, goals.
+Modules: feasibility, goals, value_objects.
 """
 
 import math
 import re
 import time
+from dataclasses import dataclass
 
 import casadi
 import numpy as np
@@ -267,3 +268,50 @@ def test_payloads_with_impossible_inertia():
     message = r"^payload: inertia has the eigenvalue -1 kg m\^2; expected none below 0$"
     refused(message, lambda: Payload(1.0, inertia=np.diag([-1.0, 1, 1])), DescriptionError)
     assert Payload(1.0, inertia=np.diag([-1e-13, 1, 1])).inertia[1][1] == 1.0
+
+
+class PlainSpeed(Constraint):
+    """A constraint of joint 1's speed whose class is no dataclass: two of them would count as equal."""
+
+    what = "speed of joint 1"
+
+    def __init__(self, most):
+        self.most = most
+
+    def rows(self, point, parameters):
+        return point.qd[0] / self.most
+
+    def measured(self, states, parameters):
+        return states.qd[:, :1] / self.most
+
+
+@dataclass(frozen=True)
+class ListedSpeed(PlainSpeed):
+    """One with a field that cannot be hashed."""
+
+    most: list[float]
+
+
+@dataclass(frozen=True)
+class OwnSpeed(PlainSpeed):
+    """As it should be."""
+
+    most: float
+
+
+def test_constraints_that_are_no_values_are_refused():
+    start, goal, arm = np.zeros(2), np.array([1.0, 0.5]), dhkit.Arm.load("planar2r")
+    for planned in (
+        lambda constraint: arm.plan(start, goal, constraints=constraint),
+        lambda constraint: Planner(arm.description, constraints=[constraint]),
+    ):
+        with pytest.raises(
+            TypeError, match=r"PlainSpeed.most is no field; expected a class with @dataclass.frozen=True"
+        ):
+            planned(PlainSpeed(0.5))
+        with pytest.raises(TypeError, match=r"ListedSpeed: .*unhashable.*; expected @dataclass"):
+            planned(ListedSpeed([0.5]))
+    for most in (0.5, 0.3):
+        motion = arm.plan(start, goal, constraints=OwnSpeed(most))
+        speed = np.abs(motion.qd(np.linspace(0, motion.duration, 500))[:, 0]).max()
+        assert 0.9 * most < speed < most * (1 + 1e-6)

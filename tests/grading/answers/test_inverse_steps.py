@@ -1,6 +1,6 @@
 """Steps of inverse kinematics on a sheet: what cannot be read is refused, or says why.
 
-Modules: inverse_steps, sheet_values.
+Modules: inverse_steps, pose_entries, sheet_values.
 """
 
 import re

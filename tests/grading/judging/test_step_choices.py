@@ -1,6 +1,6 @@
 """Steps of inverse kinematics followed along the student's own roots, and what else a step may hold.
 
-Modules: pose_entries, step_mistakes, step_solutions.
+Modules: step_mistakes, step_solutions.
 """
 
 import numpy as np

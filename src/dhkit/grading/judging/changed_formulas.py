@@ -8,7 +8,13 @@ from dataclasses import replace
 from fractions import Fraction
 
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
-from dhkit.grading.judging.numeric import parts_of
+from dhkit.grading.answers.given import POSE_NAMES
+from dhkit.grading.judging.numeric import names_of, parts_of
+
+MIN_LAW_TERMS = 3
+"""Smallest number of terms of the numerator in a law of cosines: two squared links, and a squared distance."""
+MIN_LAW_SQUARES = 2
+"""Smallest number of squares among them; a mistake may have removed one."""
 
 
 def renamed(tree: Tree, change: Mapping[str, Tree]) -> Tree:
@@ -111,6 +117,28 @@ def square_of(tree: Tree) -> Tree:
 def applied(function: str, argument: Tree) -> Tree:
     """Return a function of a formula."""
     return Call(function, (argument,), 0)
+
+
+def is_constant(tree: Tree) -> bool:
+    """Whether a formula contains no entry of the pose and no joint."""
+    return not any(name in POSE_NAMES or is_joint(name) for name in names_of(tree))
+
+
+def is_law(tree: Tree) -> bool:
+    """Whether a part looks like a law of cosines: a sum of three terms or more, with squares, over a product."""
+    if not isinstance(tree, Product) or all(is_factor for is_factor, _ in tree.factors):
+        return False
+    sums = [_terms(part) for is_factor, part in tree.factors if is_factor]
+    return any(len(terms) >= MIN_LAW_TERMS and sum(map(_is_square, terms)) >= MIN_LAW_SQUARES for terms in sums)
+
+
+def _terms(tree: Tree) -> list[Tree]:
+    """Return the terms of a sum, with those of sums in it."""
+    return [part for _, term in tree.terms for part in _terms(term)] if isinstance(tree, Sum) else [tree]
+
+
+def _is_square(tree: Tree) -> bool:
+    return isinstance(tree, Power) and isinstance(tree.exponent, Number) and tree.exponent.value == 2
 
 
 def _texts(tree: Tree) -> Iterator[tuple[Tree, str]]:

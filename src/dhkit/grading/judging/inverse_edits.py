@@ -70,10 +70,6 @@ MIN_MEASURE = 10
 """Smallest number that is taken for degrees or millimetres; smaller ones are factors and exponents."""
 MAX_LAW_TERMS = 8
 """Largest number of terms of which pairs of signs are tried."""
-MIN_LAW_TERMS = 3
-"""Smallest number of terms of the numerator in a law of cosines: two squared links, and a squared distance."""
-MIN_LAW_SQUARES = 2
-"""Smallest number of squares among them; a mistake may have removed one."""
 MAX_ROUNDED = 0.01
 """Largest share by which a number differs from a length that it is a rounded value of."""
 
@@ -147,7 +143,7 @@ def edits_of_parts(tree: Tree, lengths: Lengths) -> list[Edit]:
     )
     changes = [
         *(Edit("term_function", new, tree, new) for new in exchanged),
-        *islice(_of_parts(tree, lengths, lambda part: part, _is_law(tree)), 2 * MAX_EDITS),
+        *islice(_of_parts(tree, lengths, lambda part: part, formulas.is_law(tree)), 2 * MAX_EDITS),
         *(
             Edit(mistake, new, tree, new)
             for mistake, change in renamings([tree], lengths)
@@ -240,7 +236,7 @@ def with_signs_changed(tree: Tree) -> Iterator[Tree]:
         if edit.mistake == "elbow_sign":
             yield edit.tree
     if formulas.has_call(tree, ROOTS):
-        yield formulas.with_calls_changed(tree, ROOTS, lambda call: call if _is_constant(call) else minus(call))
+        yield formulas.with_calls_changed(tree, ROOTS, lambda call: call if formulas.is_constant(call) else minus(call))
 
 
 # Changes of a whole formula
@@ -251,7 +247,7 @@ def _of_the_whole(
 ) -> Iterator[tuple[str, Tree]]:
     if is_revolute:
         yield "degrees_for_radians", times(tree, Name("deg", 0))
-        if any(map(_is_law, parts_of(tree))):
+        if any(map(formulas.is_law, parts_of(tree))):
             yield "supplement", Sum(((True, Name("pi", 0)), (False, tree)))
     else:
         yield "millimetres_for_metres", times(tree, Name("mm", 0))
@@ -267,7 +263,7 @@ def _of_the_whole(
         yield "arc_function_forgotten", minus(applied(arc, tree))
     yield "root_forgotten", applied("sqrt", tree)
     for mistake, functions, change in (
-        ("elbow_sign", ROOTS, lambda call: call if _is_constant(call) else minus(call)),
+        ("elbow_sign", ROOTS, lambda call: call if formulas.is_constant(call) else minus(call)),
         ("atan2_arguments", ("atan2",), formulas.exchange_arguments),
     ):
         new = formulas.with_calls_changed(tree, functions, change)
@@ -322,7 +318,7 @@ def _of_parts(tree: Tree, lengths: Lengths, rebuild: Rebuild, in_law: bool) -> I
 
         # A sum that is squared is a component of the point, no law of cosines of its own.
         is_inside = in_law and not (isinstance(tree, Power) and isinstance(child, Sum))
-        yield from _of_parts(child, lengths, around, is_inside or _is_law(child))
+        yield from _of_parts(child, lengths, around, is_inside or formulas.is_law(child))
 
 
 def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, Tree]]:
@@ -403,11 +399,11 @@ def _of_call(call: Call, in_law: bool) -> Iterator[tuple[str, Tree]]:
                 yield "quadrant", Call("atan2", (y, x), 0)
         case "acos" | "asin":
             yield "elbow_sign", minus(call)
-            is_law = any(map(_is_law, parts_of(first)))
+            is_law = any(map(formulas.is_law, parts_of(first)))
             yield "supplement" if is_law else "term_sign", replace(call, arguments=(minus(first), *call.arguments[1:]))
             yield "term_function", replace(call, function="asin" if call.function == "acos" else "acos")
         case "sqrt":
-            if not _is_constant(call):
+            if not formulas.is_constant(call):
                 yield "elbow_sign", minus(call)
             yield "root_too_much", first
     yield "cosine_law_squares" if in_law else "square_forgotten", square_of(call)
@@ -434,25 +430,3 @@ def _of_sum(terms: tuple[tuple[bool, Tree], ...], lengths: Lengths, in_law: bool
 def _scaled(tree: Tree, in_law: bool) -> Iterator[tuple[str, Tree]]:
     for factor in (Fraction(2), Fraction(1, 2)):
         yield "cosine_law_factor" if in_law else "term_factor", times(tree, Number(factor, str(factor), 0))
-
-
-def _is_constant(tree: Tree) -> bool:
-    """Whether a formula contains no entry of the pose and no joint."""
-    return not any(name in POSE_NAMES or formulas.is_joint(name) for name in names_of(tree))
-
-
-def _is_law(tree: Tree) -> bool:
-    """Whether a part looks like a law of cosines: a sum of three terms or more, with squares, over a product."""
-    if not isinstance(tree, Product) or all(is_factor for is_factor, _ in tree.factors):
-        return False
-    sums = [_terms(part) for is_factor, part in tree.factors if is_factor]
-    return any(len(terms) >= MIN_LAW_TERMS and sum(map(_is_square, terms)) >= MIN_LAW_SQUARES for terms in sums)
-
-
-def _terms(tree: Tree) -> list[Tree]:
-    """Return the terms of a sum, with those of sums in it."""
-    return [part for _, term in tree.terms for part in _terms(term)] if isinstance(tree, Sum) else [tree]
-
-
-def _is_square(tree: Tree) -> bool:
-    return isinstance(tree, Power) and isinstance(tree.exponent, Number) and tree.exponent.value == 2
