@@ -7,7 +7,7 @@ TEST_READY := $(VENV)/.ready-test
 CHECK_READY := $(VENV)/.ready-check
 ACCEPT_READY := $(VENV)/.ready-accept
 BENCH_READY := $(VENV)/.ready-bench
-PYTEST := $(BIN)/python -m pytest -n 2 --dist loadgroup -q
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile -q
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
 .PHONY: help demo test test-all coverage check accept bench assets lowest format clean
@@ -80,7 +80,7 @@ lowest:  ## the tests with the oldest versions that pyproject.toml allows
 	$(PYTHON) -m venv $(VENV)-lowest
 	$(VENV)-lowest/bin/python -m pip install --quiet uv
 	VIRTUAL_ENV=$(VENV)-lowest $(VENV)-lowest/bin/uv pip install --quiet --resolution lowest-direct --editable '.[test]'
-	$(VENV)-lowest/bin/python -m pytest -n 2 --dist loadgroup -q -W ignore::DeprecationWarning tests
+	$(VENV)-lowest/bin/python -m pytest -n 2 --dist loadfile -q -W ignore::DeprecationWarning tests
 
 format: $(CHECK_READY)  ## let ruff format the sources
 	$(BIN)/ruff format .

@@ -102,6 +102,7 @@ def test_scenes_are_the_same_again_and_their_straight_way_collides():
     assert distance(arm, way, first.obstacles).distance.min() < 0.02
 
 
+@only_accepting
 @pytest.mark.slow
 def test_motions_in_scenes_that_ompl_solves():
     pytest.importorskip("ompl")

@@ -59,8 +59,6 @@ COMPENSATED_BOUND = {"puma560": 5e-5, "planar2r": 2.3e-4, "puma560_cao": 4.5e-5}
 """Largest joint error of computed torque with friction that is compensated, rad, twice that seen."""
 MODEL_BASED = ("feed-forward", "computed-torque", "operational-space", "adaptive")
 
-in_one_process = pytest.mark.xdist_group("controllers")  # what they compare takes ten seconds an arm
-
 
 def case_of(name):
     return next(case for case in cases() if case.arm.description.name == name)
@@ -98,7 +96,6 @@ def test_some_rows_of_the_page_are_made_again():
 
 
 @pytest.mark.slow
-@in_one_process
 @pytest.mark.parametrize("name", IN_TURN)
 def test_the_tables_of_the_page_are_made_again(name):
     printed, errors = printed_rows(name), all_errors(name)
@@ -108,7 +105,6 @@ def test_the_tables_of_the_page_are_made_again(name):
 
 
 @pytest.mark.slow
-@in_one_process
 @pytest.mark.parametrize("name", IN_TURN)
 def test_errors_are_as_small_as_controllers_can_make_them(name, law):
     law.samples(1)
@@ -124,7 +120,6 @@ def test_errors_are_as_small_as_controllers_can_make_them(name, law):
 
 
 @pytest.mark.slow
-@in_one_process
 @pytest.mark.parametrize("name", IN_TURN)
 def test_what_the_page_says_of_the_tables(name):
     errors = all_errors(name)

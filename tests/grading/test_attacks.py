@@ -61,7 +61,6 @@ from grading_attacks import (
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not hasattr(os, "fork"), reason="no os.fork: no attack is stopped there"),
-    pytest.mark.xdist_group("attacks"),  # what they prepare takes ten seconds a process
 ]
 
 PLANAR = library_robot("planar2r")

@@ -18,7 +18,7 @@ from dhkit.description import library_robot, read_robot
 from dhkit.errors import AnswerError
 from dhkit.grading import grade
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("heldout")]
+pytestmark = pytest.mark.slow
 
 DATA = Path(__file__).parent / "data"
 CORPUS = [json.loads(line) for line in (DATA / "heldout.jsonl").read_text().splitlines()]

@@ -97,7 +97,9 @@ def equations(
             help="Use the base parameters (the fewest inertial parameters), and print their definitions.",
         ),
     ] = False,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write; a folder for matlab.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write; a folder for matlab, and for ik as code.")
+    ] = None,
     uniform: Uniform = False,
     json: Json = False,
 ) -> None:
@@ -105,11 +107,14 @@ def equations(
     arm = load_arm(robot, uniform)
     if form not in FORMATS:
         raise DescriptionError(f"--format: found {form!r}; expected {', '.join(FORMATS)}")
-    if what.strip() == INVERSE:
+    if what.strip().lower() == INVERSE:
         if base or symbols != "file":
-            raise DescriptionError("--what ik: names the lengths of the table itself; leave --symbols out")
+            option = "--base-parameters" if base else "--symbols"
+            raise DescriptionError(f"--what ik: names the lengths of the table itself; leave {option} out")
         _inverse(arm.description, form, output, json)
         return
+    if INVERSE in what.replace(",", " ").split():
+        raise DescriptionError(f"--what: found {what!r}; expected ik alone, which is printed by itself")
     if is_kinematic(what):
         kinematics = _kinematics_of(arm.description, symbols, base)
         lag: Source = kinematics

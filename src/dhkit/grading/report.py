@@ -11,6 +11,8 @@ from pydantic import TypeAdapter
 
 from dhkit.display import counted, html_block, html_lines, html_table, plain, repr_line
 
+NO_STEP = "no step finds"
+"""How the statement of an entry begins that stands for a joint without a step."""
 MAX_ENTRIES_NAMED = 6
 """Entries that a message names; of more, the rest is counted."""
 MAX_CHARACTERS_SHOWN = 400
@@ -360,6 +362,15 @@ class GradeReport:
         return tuple(entry.name for entry in self._incomplete if not entry.answer)
 
     @property
+    def missing_text(self) -> str:
+        """What is missing, by name; of steps of inverse kinematics with the joint that none finds."""
+        incomplete = (entry for entry in self._incomplete if not entry.answer)
+        return ", ".join(
+            f"{entry.name} ({entry.statement})" if entry.statement.startswith(NO_STEP) else entry.name
+            for entry in incomplete
+        )
+
+    @property
     def unfinished(self) -> tuple[Entry, ...]:
         """Entries on the sheet that are not wrong, but do not give what was asked for; their statements say why."""
         return tuple(entry for entry in self._incomplete if entry.answer)
@@ -388,7 +399,7 @@ class GradeReport:
     def _diagnosis_lines(self) -> list[str]:
         lines = [f"{diagnosis.place}: {diagnosis.sentence}" for diagnosis in self.diagnosis]
         lines += [f"{entry.name}: {entry.statement}" for entry in self.unfinished]
-        return lines + ([f"missing: {', '.join(self.missing)}"] if self.missing else [])
+        return lines + ([f"missing: {self.missing_text}"] if self.missing else [])
 
     @property
     def quantities(self) -> tuple[str, ...]:

@@ -246,7 +246,8 @@ def template(description: Description, robot: str | None = None) -> str:
     if classify(description).family is not None:
         lines += [
             "",
-            "# [answer.ik]                # joint by joint from T: px, py, pz, r11 ... r33, and joints found before",
+            "# [answer.ik]                # joint by joint from T: px, py, pz, r11 ... r33, and joints found before;",
+            "#                            # lengths by name or row (a2, d3); D = ... in equation defines a quantity",
             "# steps = [                  # for two solutions: ±, or a list",
             *(f'#   {{ joint = {i + 1}, equation = "", solution = "" }},' for i in range(n)),
             "# ]",

@@ -70,7 +70,10 @@ def solve_many(
             report(len(found), count)
         return found
     _require_sendable(planner)
-    lost = PlanningError("its process was ended from outside, for want of memory perhaps; fewer workers= need less")
+    lost = PlanningError(
+        "its process ended: for want of memory perhaps (fewer workers= need less), or because the script that plans "
+        "has no line if __name__ == '__main__':"
+    )
     results: list[Trajectory | PlanningError] = [lost] * count
     pool = ProcessPoolExecutor(min(workers, count), get_context("spawn"), _begin, (planner,))
     try:

@@ -299,4 +299,4 @@ def more_text(share: float) -> str:
 
 def _duration_text(branch: BranchReport) -> str:
     """Return a branch's duration as text, or the reason why it has none."""
-    return branch.reason or f"{'' if branch.solved else 'at least '}{seconds_text(branch.duration)}"
+    return branch.reason or f"{'' if branch.solved else 'not tried, at least '}{seconds_text(branch.duration)}"

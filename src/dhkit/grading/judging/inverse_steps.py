@@ -25,7 +25,7 @@ from dhkit.grading.judging.step_context import Part, StepContext
 from dhkit.grading.judging.step_equations import Equations
 from dhkit.grading.judging.step_solutions import Solutions
 from dhkit.grading.mistakes.library import hint_of, sentence_of
-from dhkit.grading.report import Diagnosis, Entry, KinematicJudgement, Note, NoteKind, Verdict, entry_name
+from dhkit.grading.report import NO_STEP, Diagnosis, Entry, KinematicJudgement, Note, NoteKind, Verdict, entry_name
 
 
 def steps_in_table_angles(description: Description, steps: Sequence[GivenStep]) -> list[GivenStep] | None:
@@ -111,7 +111,7 @@ class _Judge(StepContext):
                 wrong.append(step.joint)
         missing = sorted({*range(self.description.n)} - {step.joint for step in steps})
         entries += [
-            Entry("ik", (len(steps) + k,), Verdict.INCOMPLETE, statement=f"no step finds q{j + 1}")
+            Entry("ik", (len(steps) + k,), Verdict.INCOMPLETE, statement=f"{NO_STEP} q{j + 1}")
             for k, j in enumerate(missing)
         ]
         if not self.poses.asks_rotation and self.poses.pose_parts:

@@ -44,7 +44,7 @@ code { font: .92em/1.4 "Source Code Pro", "DejaVu Sans Mono", monospace; }
 article { border-top: 1px solid var(--line); padding: .7rem 0; break-inside: avoid; }
 details { margin-top: 1rem; } summary { cursor: pointer; }
 table { border-collapse: collapse; margin: .6rem 0; }
-th, td { text-align: left; padding: .25rem 1rem .25rem 0; border-bottom: 1px solid var(--line); }
+th, td { overflow-wrap: normal; text-align: left; padding: .25rem 1rem .25rem 0; border-bottom: 1px solid var(--line); }
 td:first-child { white-space: nowrap; }
 th { font-weight: normal; } td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 td.bar { width: 50%; min-width: 8rem; } td.bar i { display: block; height: .8rem; background: var(--wrong); }

@@ -100,7 +100,7 @@ def remark_lines(report: GradeReport) -> Iterator[str]:
     """Yield what a reader needs besides verdicts: unfinished and missing entries, statements left out, notes."""
     yield from (f"{plain(entry.name)}: {plain(entry.statement)}" for entry in report.unfinished)
     if report.missing:
-        yield f"missing: {', '.join(map(plain, report.missing))}"
+        yield f"missing: {plain(report.missing_text, 1000)}"
     yield from (f"left out: {plain(line)}" for line in report.left_out)
     yield from (f"note: {plain(note_text(note))}" for note in report.notes)
 

@@ -280,8 +280,15 @@ class InverseDerivation:
         Array
             Shape (..., B, n), rad in (-pi, pi] and m, in the order of :attr:`branches`; NaN where a branch has no
             solution. For checking: ``arm.ik`` is faster and keeps its accuracy at singular poses.
+
+        Raises
+        ------
+        ValueError
+            T has another shape.
         """
         T = np.asarray(T, dtype=float)
+        if T.shape[-2:] != (4, 4):
+            raise ValueError(f"T has shape {T.shape}; expected (..., 4, 4)")
         poses = T.reshape(-1, 4, 4)
         result = np.full((len(poses), len(self.branches), self.n), np.nan)
         with np.errstate(all="ignore"):
