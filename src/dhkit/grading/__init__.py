@@ -3,7 +3,8 @@
 from dhkit.grading.entry_points import grade, grade_answers, robot_of
 from dhkit.grading.marks import Mark, Marks, marks
 from dhkit.grading.mistakes.library import LIBRARY
-from dhkit.grading.report import Diagnosis, Entry, GradeReport, Note, NoteKind, Verdict, Witness
+from dhkit.grading.remarks import Note, NoteKind
+from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict, Witness
 from dhkit.grading.rubric import Credit, Rubric
 
 __all__ = [

@@ -33,13 +33,12 @@ from dhkit.grading.judging.quantities import JudgedQuantity, judge_quantity
 from dhkit.grading.judging.quotients import RingReader
 from dhkit.grading.judging.truth import Truth, truth_of
 from dhkit.grading.mistakes.explaining import explain as explain_mistakes
+from dhkit.grading.remarks import Note, NoteKind
 from dhkit.grading.report import (
     Diagnosis,
     Entry,
     GradeReport,
     KinematicJudgement,
-    Note,
-    NoteKind,
     Verdict,
     entry_name,
 )

@@ -13,7 +13,8 @@ from dhkit.expressions import read
 from dhkit.grading.judging.inverse import CLOSES, POSE_NAMES, Closure, judge_inverse
 from dhkit.grading.judging.numeric import doubles
 from dhkit.grading.mistakes.library import LIBRARY
-from dhkit.grading.report import Note, NoteKind, Verdict
+from dhkit.grading.remarks import Note, NoteKind
+from dhkit.grading.report import Verdict
 
 CORRECT, WRONG = Verdict.CORRECT, Verdict.WRONG
 

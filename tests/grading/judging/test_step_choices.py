@@ -10,7 +10,7 @@ import dhkit
 from dhkit.description import library_robot, pose
 from dhkit.grading import Verdict
 from dhkit.grading.answers.sheet import sheet_of
-from dhkit.grading.report import NoteKind
+from dhkit.grading.remarks import NoteKind
 from dhkit.grading.sheet_judge import judge_sheet
 from grading.inverse_steps_corpus import PUMA
 

@@ -11,7 +11,7 @@ from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading import Rubric, Verdict, grade_answers, marks
 from dhkit.grading.answers import Vocabulary, read_answer
 from dhkit.grading.judging.numeric import doubles
-from dhkit.grading.report import Note, NoteKind
+from dhkit.grading.remarks import Note, NoteKind
 
 ARM = Arm.load("planar2r")
 M = [

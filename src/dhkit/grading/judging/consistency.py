@@ -10,7 +10,7 @@ import numpy as np
 from dhkit.grading.answers.sheet import quantity_names
 from dhkit.grading.judging.quantities import Index, JudgedQuantity, place_of
 from dhkit.grading.judging.truth import Truth
-from dhkit.grading.report import Note, NoteKind
+from dhkit.grading.remarks import Note, NoteKind
 from dhkit.symbolic.ring import Element, Elements, Ring, element_array
 
 

@@ -23,7 +23,8 @@ from dhkit.grading.judging.inverse_mistakes import Explanation, Search
 from dhkit.grading.judging.inverse_poses import CLOSES, Poses
 from dhkit.grading.judging.numeric import names_of, parts_of
 from dhkit.grading.mistakes.library import hint_of, sentence_of
-from dhkit.grading.report import Diagnosis, Entry, KinematicJudgement, Note, NoteKind, Verdict, Witness, entry_name
+from dhkit.grading.remarks import Note, NoteKind
+from dhkit.grading.report import Diagnosis, Entry, KinematicJudgement, Verdict, Witness, entry_name
 from dhkit.symbolic import table_lengths
 
 MAX_NODES = 5_000

@@ -25,7 +25,8 @@ from dhkit.grading.judging.step_context import Part, StepContext
 from dhkit.grading.judging.step_equations import Equations
 from dhkit.grading.judging.step_solutions import Solutions
 from dhkit.grading.mistakes.library import hint_of, sentence_of
-from dhkit.grading.report import NO_STEP, Diagnosis, Entry, KinematicJudgement, Note, NoteKind, Verdict, entry_name
+from dhkit.grading.remarks import Note, NoteKind
+from dhkit.grading.report import NO_STEP, Diagnosis, Entry, KinematicJudgement, Verdict, entry_name
 
 
 def steps_in_table_angles(description: Description, steps: Sequence[GivenStep]) -> list[GivenStep] | None:

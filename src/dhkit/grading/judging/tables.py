@@ -23,7 +23,8 @@ from dhkit.grading.judging.same_arm import Overlay, overlaid
 from dhkit.grading.judging.table_arms import TableArm
 from dhkit.grading.judging.table_rows import COLUMNS, Answer, JudgedRow, TableRows, other_convention
 from dhkit.grading.mistakes.library import hint_of, sentence_of
-from dhkit.grading.report import Diagnosis, Entry, KinematicJudgement, Note, NoteKind, Verdict, entry_name
+from dhkit.grading.remarks import Note, NoteKind
+from dhkit.grading.report import Diagnosis, Entry, KinematicJudgement, Verdict, entry_name
 
 OPEN_TASK = Requirements()
 """Requirements that leaves frames and zero pose open."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from dhkit.grading.report import Note, NoteKind
+from dhkit.grading.remarks import Note, NoteKind
 
 AGREEMENT = {
     "M": "the matrix of second derivatives of the sheet's own {} by the rates",

@@ -15,7 +15,7 @@ from dhkit.grading.answers.documents.entry_statements import statements_of
 from dhkit.grading.answers.documents.statements import left_hand_name
 from dhkit.grading.answers.sheet_values import Chain, Entries, Refusal
 from dhkit.grading.answers.sources import read_source
-from dhkit.grading.report import NoteKind
+from dhkit.grading.remarks import NoteKind
 
 ROBOT = library_robot("planar2r")
 V = r"\tfrac12 m_1 g l_1 s_1 + m_2 g (l_1 s_1 + \tfrac12 l_2 s_{12})"
