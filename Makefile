@@ -64,7 +64,7 @@ bench: $(BENCH_READY)  ## kinematics, dynamics, motions and simulation beside pe
 	$(BIN)/python -m benchmarks.planning_cases
 	$(BIN)/python -m benchmarks.scenes
 	$(BIN)/python -m benchmarks.scenes --kind spheres --scenes 48 --compared 0 --output benchmarks/results/scenes_spheres
-	$(BIN)/python -m benchmarks.scenes --kind itself --scenes 20 --compared 20 --output benchmarks/results/scenes_itself
+	$(BIN)/python -m benchmarks.scenes --kind itself --scenes 30 --compared 6 --output benchmarks/results/scenes_itself
 	$(BIN)/python -m benchmarks.control
 
 $(BENCH_READY): $(READY)
