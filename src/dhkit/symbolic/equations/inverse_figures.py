@@ -12,7 +12,7 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.symbolic.inverse.derivation import InverseDerivation, Values
 from dhkit.symbolic.inverse.forms import Circle, Form
-from dhkit.symbolic.inverse.steps import Figure, Step, View
+from dhkit.symbolic.inverse.steps import Step, View
 
 WIDTH, HEIGHT, MARGIN = 340, 250, 46
 """Of a figure, in pixels."""
@@ -105,7 +105,21 @@ def figure_of(derivation: InverseDerivation, step: Step, T: Array) -> str:
     if not found:
         return ""
     draw = {View.TOP: _top, View.TRIANGLE: _triangle, View.SLIDE: _slide}[step.figure.view]
-    return draw(derivation, step.form, step.figure, found[0]).svg(f"{step.title}: {', '.join(step.figure.labels)}")
+    return draw(derivation, step, step.form, found[0]).svg(f"{step.title}: {', '.join(step.figure.labels)}")
+
+
+def _named_roots(step: Step, form: Form, values: Values) -> list[tuple[float, str, list[float]]]:
+    """Return the two roots of a step at the pose: value, name, and the values of the factors of the rule."""
+    if step.choice is None:
+        return []
+    letters, roots = {k: np.array(v) for k, v in _letters(form, values).items()}, []
+    for sign in (1.0, -1.0):
+        found, _ = form.solve(letters, sign)
+        values.set_unknown(form.unknown, np.ravel(found))
+        factors = [float(np.ravel(values.of(factor))[0]) for factor in step.choice.factors]
+        is_first = sum(factor < 0 for factor in factors) % 2 == 0
+        roots.append((float(np.ravel(found)[0]), step.choice.names[0 if is_first else 1], factors))
+    return roots
 
 
 def sample_pose(derivation: InverseDerivation) -> Array:
@@ -131,14 +145,15 @@ def _letters(form: Form, values: Values) -> dict[str, float]:
     return {letter: float(np.ravel(values.of(element))[0]) for letter, element in form.letters.items()}
 
 
-def _top(derivation: InverseDerivation, form: Form, figure: Figure, values: Values) -> Drawing:
+def _top(derivation: InverseDerivation, step: Step, form: Form, values: Values) -> Drawing:
     drawing, letters, origin = Drawing(), _letters(form, values), np.zeros(2)
-    axis, who = figure.labels
+    axis, who = _labels(step)
     is_beside = isinstance(form, Circle)
     point = np.array([letters["B"], -letters["A"]] if is_beside else [letters["X"], letters["Y"]])
     beside = abs(letters["C"]) if is_beside else 0.0
-    for sign, colour in ((1.0, FIRST), (-1.0, SECOND)):
-        angle, _ = form.solve({k: np.array(v) for k, v in letters.items()}, sign)
+    for (angle, name, _), sign, colour in zip(
+        _named_roots(step, form, values), (1.0, -1.0), (FIRST, SECOND), strict=True
+    ):
         ahead = np.array([np.cos(angle), np.sin(angle)])
         foot = point - (point @ ahead) * ahead
         if beside > SHORT * float(np.linalg.norm(point)):
@@ -148,7 +163,7 @@ def _top(derivation: InverseDerivation, form: Form, figure: Figure, values: Valu
             drawing.line(origin, point, colour)
         tip = foot + 0.35 * float(np.linalg.norm(point)) * ahead
         drawing.line(foot, tip, colour, "dashed")
-        drawing.name(tip, "theta1" + (" + pi" if sign < 0 and not is_beside else ""), colour)
+        drawing.name(tip, f"theta1, {name}", colour)
     if beside:
         drawing.circle(origin, beside)
     drawing.dot(origin, axis)
@@ -156,23 +171,32 @@ def _top(derivation: InverseDerivation, form: Form, figure: Figure, values: Valu
     return drawing
 
 
+def _labels(step: Step) -> tuple[str, ...]:
+    return step.figure.labels if step.figure is not None else ()
+
+
 def _place(derivation: InverseDerivation, values: Values) -> Array:
     return np.array([float(np.ravel(values.of(derivation.chain.symbol(name)))[0]) for name in "xy"])
 
 
-def _triangle(derivation: InverseDerivation, form: Form, figure: Figure, values: Values) -> Drawing:
+def _triangle(derivation: InverseDerivation, step: Step, form: Form, values: Values) -> Drawing:
     drawing, letters, origin = Drawing(), _letters(form, values), np.zeros(2)
     point = _place(derivation, values)
     R, N = float(np.linalg.norm(point)), float(np.hypot(letters["A"], letters["B"]))
-    L1 = float(np.hypot(*(np.ravel(values.of(element))[0] for element in figure.first)))
+    L1 = float(np.hypot(*(np.ravel(values.of(element))[0] for element in (step.figure.first if step.figure else ()))))
     L2 = N / (2 * L1)
     opening = np.arccos(np.clip((L1 * L1 + R * R - L2 * L2) / (2 * L1 * R), -1.0, 1.0))
-    first_axis, second_axis, who = figure.labels
-    for sign, colour in ((1.0, FIRST), (-1.0, SECOND)):
-        elbow = _turned(point, sign * opening) * L1 / R
+    first_axis, second_axis, who = _labels(step)
+    roots = _named_roots(step, form, values)
+    # The first factor of the rule is positive where the elbow is on the left of the line to the point.
+    elbows = {name: _turned(point, opening if side > 0 else -opening) * L1 / R for _, name, (side, *_) in roots}
+    if "up" in elbows and "down" in elbows and elbows["up"][1] < elbows["down"][1]:
+        # The plane's y axis points down: the figure is seen from the other side of y.
+        point, elbows = point * [1, -1], {name: elbow * [1, -1] for name, elbow in elbows.items()}
+    for (name, elbow), colour in zip(elbows.items(), (FIRST, SECOND), strict=True):
         drawing.line(origin, elbow, colour)
         drawing.line(elbow, point, colour)
-        drawing.dot(elbow, second_axis, colour)
+        drawing.dot(elbow, f"{second_axis}, {name}", colour)
     drawing.line(origin, point, FAINT, "dashed")
     drawing.label(origin, point, "sqrt(x^2 + y^2)", FAINT)
     drawing.dot(origin, first_axis)
@@ -180,11 +204,11 @@ def _triangle(derivation: InverseDerivation, form: Form, figure: Figure, values:
     return drawing
 
 
-def _slide(derivation: InverseDerivation, form: Form, figure: Figure, values: Values) -> Drawing:
+def _slide(derivation: InverseDerivation, step: Step, form: Form, values: Values) -> Drawing:
     drawing, letters, origin = Drawing(), _letters(form, values), np.zeros(2)
     point = _place(derivation, values)
     R, near = float(np.linalg.norm(point)), float(np.sqrt(max(letters["Q"] - letters["S"], 0.0)))
-    axis, who = figure.labels
+    axis, who = _labels(step)
     if near > SHORT * R:
         for sign, colour in ((1.0, FIRST), (-1.0, SECOND)):
             foot = _turned(point, sign * np.arccos(near / R)) * near / R

@@ -15,6 +15,10 @@ from dhkit.symbolic.inverse.steps import Choice, Step
 GIVEN = "Given is the pose T of the tool in the world: its position px, py, pz and its rotation r11 ... r33."
 
 
+LONGEST_LINE = 200
+"""Largest length of an equation in a notebook's table, in characters."""
+
+
 def inverse_text(derivation: InverseDerivation) -> str:
     """Return a derivation as text, step by step."""
     write = Phrases(derivation, latex=False)
@@ -40,20 +44,16 @@ def inverse_table(derivation: InverseDerivation) -> str:
     write = Phrases(derivation, latex=False)
     rows = []
     for step in derivation.steps:
-        definitions = "; ".join(f"{write.name(d.name)} = {write.element(d.element)}" for d in step.definitions)
-        equations, solved = "", ""
+        lines = [("", f"{write.name(d.name)} = {write.element(d.element)}") for d in step.definitions]
         if step.form is not None:
-            equations = "; ".join(f"{left} = {right}" for left, right in write.equations(step))
             solution = write.solution(step.form)
-            solved = "; ".join(
-                [
-                    f"{solution.unknown} = {' or '.join(solution.alternatives)}",
-                    *(f"{letter} = {value}" for letter, value in solution.letters),
-                ]
-            )
-        rows.append([_title(write, step), definitions, equations, solved])
-    columns = ("what is found", "with", "equation", "solution")
-    return html_table(columns, rows, f"{derivation.description.name}: joint by joint")
+            solved = f"{solution.unknown} = {' or '.join(solution.alternatives)}"
+            lines += [("", text) for left, right in write.equations(step) if (text := f"{left} = {right}") != solved]
+            lines += [*(("", f"{letter} = {value}") for letter, value in solution.letters), (solved, "")]
+        for k, (solved, line) in enumerate(lines):
+            rows.append([_title(write, step) if k == 0 else "", line, solved])
+    caption = f"{derivation.description.name}: joint by joint"
+    return html_table(("what is found", "equations", "solution"), rows, caption, most=len(rows), longest=LONGEST_LINE)
 
 
 def introduction(derivation: InverseDerivation) -> list[str]:
