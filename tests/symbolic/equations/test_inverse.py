@@ -63,14 +63,18 @@ def imported(derivation, folder):
     return solve
 
 
+def exported(derivation, language, folder):
+    if language == "c":
+        require("gcc", shutil.which("gcc") is not None)
+        return compiled(derivation, folder)
+    return imported(derivation, folder)
+
+
 @pytest.mark.parametrize("language", ["c", "python"])
 @pytest.mark.parametrize("name", LIBRARY)
 def test_exported_code_gives_the_branches_of_the_kernels(name, language, tmp_path):
-    if language == "c":
-        require("gcc", shutil.which("gcc") is not None)
     arm = library_robot(name)
-    derivation = inverse_derivation(arm)
-    solve = compiled(derivation, tmp_path) if language == "c" else imported(derivation, tmp_path)
+    solve = exported(inverse_derivation(arm), language, tmp_path)
     T = world_to_tool(arm, random_states(arm, 100, seed=4))
     T[::10, :3, 3] *= 3  # out of reach
     kernels = inverse_kinematics(arm, T)
@@ -86,10 +90,8 @@ def test_exported_code_gives_the_branches_of_the_kernels(name, language, tmp_pat
 
 @pytest.mark.parametrize("language", ["c", "python"])
 def test_exported_code_refuses_what_is_no_pose(language, tmp_path):
-    if language == "c":
-        require("gcc", shutil.which("gcc") is not None)
     derivation = inverse_derivation(library_robot("puma560"))
-    solve = compiled(derivation, tmp_path) if language == "c" else imported(derivation, tmp_path)
+    solve = exported(derivation, language, tmp_path)
     T = world_to_tool(derivation.description, np.full((1, 6), 0.3))[0]
     assert np.isfinite(solve(T)).any()
     for entry, value in (((0, 3), np.nan), ((1, 3), np.inf), ((2, 2), np.nan), ((0, 0), 2.0), ((1, 2), T[1, 2] + 1e-4)):
@@ -101,12 +103,8 @@ def test_exported_code_refuses_what_is_no_pose(language, tmp_path):
 @pytest.mark.parametrize("language", ["c", "python"])
 @pytest.mark.parametrize("name", SIX_JOINTS)
 def test_exported_code_reaches_singular_poses(name, language, tmp_path):
-    if language == "c":
-        require("gcc", shutil.which("gcc") is not None)
     arm = library_robot(name)
-    solve = (
-        compiled(inverse_derivation(arm), tmp_path) if language == "c" else imported(inverse_derivation(arm), tmp_path)
-    )
+    solve = exported(inverse_derivation(arm), language, tmp_path)
     q = random_states(arm, 40, seed=6)
     q[:, 4] = np.array([0.0, 1e-15, 1e-12, 1e-8])[np.arange(40) % 4]
     for pose in world_to_tool(arm, q):

@@ -22,6 +22,7 @@ EQUALS = re.compile(r"&?\s*(?<![<>!=:])==?(?!=)\s*&?")
 EITHER_SIGN = re.compile(r"±|∓|\\pm\b|\\mp\b|\+/-|-/\+")
 """Plus or minus, and minus or plus: two formulas in one."""
 UNCLEAR_SIGN = re.compile(r"\+-(?=\s*[A-Za-z\\(])")
+"""Signs that may be meant as plus or minus, or as a minus that a program wrote."""
 EQUATION_NUMBER = re.compile(
     r"(?:\\(?:tag|label|eqno)\s*\{[^{}]*\}|\\(?:nonumber|notag|quad|qquad)\b|\\\\|(?<=[\w)\]}²])\s+\(\s*(?:[A-Z]\.)?\d+(?:\.\d+)*[a-z]?\s*\)"
     r"|[.,;\s])+$"
@@ -36,6 +37,7 @@ TURNED_BACK = re.compile(
 """A formula whose whole turns are taken off, which changes nothing."""
 ANOTHER = re.compile(r"[,;]\s*(?:where|with)?\s*(?=[^,;=()]*=)")
 """What stands between a formula and the definition of a quantity in it."""
+COMMA = re.compile(",")
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,7 @@ class _Reading:
         A chain that only defines has one side left.
         """
         made = OBJECT.match(text)
-        sides = _split_at_comma(made[1]) if made else EQUALS.split(text)
+        sides = _parts(made[1], COMMA) if made else EQUALS.split(text)
         new = [name for name in map(self._new_name, sides) if name]
         known = [side for side in sides if not self._new_name(side)]
         if new and known:
@@ -189,7 +191,7 @@ class _Reading:
 
     def _solutions(self, text: str) -> list[Tree]:
         """Return the formulas of a solution; definitions may stand behind it, and the joint's name in front."""
-        formula, *others = _statements(text)
+        formula, *others = _parts(text, ANOTHER)
         for other in others:
             if len(self._sides(other)) != 1:
                 raise AnswerError(f"{quote(other)}: no definition of a new name, behind a solution")
@@ -210,23 +212,12 @@ def _with_sign(text: str, sign: str) -> str:
     return EITHER_SIGN.sub(lambda match: other if match[0] in ("∓", r"\mp", "-/+") else sign, text)
 
 
-def _statements(text: str) -> list[str]:
-    """Return a formula and the definitions behind it."""
+def _parts(text: str, separator: re.Pattern[str]) -> list[str]:
+    """Return the parts of a text between separators outside brackets."""
     depth, begin, parts = 0, 0, []
     for at, character in enumerate(text):
         depth += nesting(character)
-        if depth == 0 and at >= begin and (match := ANOTHER.match(text, at)):
+        if depth == 0 and at >= begin and (match := separator.match(text, at)):
             parts.append(text[begin:at])
             begin = match.end()
-    return [*parts, text[begin:]]
-
-
-def _split_at_comma(text: str) -> list[str]:
-    """Return the parts of a text between commas outside brackets."""
-    depth, begin, parts = 0, 0, []
-    for at, character in enumerate(text):
-        depth += nesting(character)
-        if character == "," and depth == 0:
-            parts.append(text[begin:at])
-            begin = at + 1
     return [*parts, text[begin:]]

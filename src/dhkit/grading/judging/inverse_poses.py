@@ -102,10 +102,6 @@ class Poses:
         known = None if self.known is None else self.known[index]
         return replace(self, q=self.q[index], T=self.T[index], solutions=self.solutions[index], known=known)
 
-    def with_known(self, known: Array) -> Poses:
-        """Return the poses with joint values (S, n), rad and m, that formulas may use as known1, known2 ..."""
-        return replace(self, known=known)
-
     def followed_by(self, other: Poses) -> Poses:
         """Return these poses and then those of another set of the same arm."""
         pairs = ((getattr(self, name), getattr(other, name)) for name in ("q", "T", "solutions"))

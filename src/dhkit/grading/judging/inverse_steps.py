@@ -80,19 +80,16 @@ def judge_steps(
             raise AnswerError(f"ik, step {k}: joint {step.joint + 1} has a step already")
     poses = Poses.random(description, samples, seed)
     with np.errstate(all="ignore"):
-        judged = _Judge(description, poses, seed, explain).judgement(steps)
+        judge = _Judge(description, poses, seed, explain)
+        judged = judge.judgement(steps)
         in_table_angles = steps_in_table_angles(description, steps)
-        if in_table_angles is None or not _count(judged, Verdict.WRONG):
+        if in_table_angles is None or all(entry.verdict is not Verdict.WRONG for entry in judged.entries):
             return judged
-        other = _Judge(description, poses, seed, explain).judgement(in_table_angles)
+        other = judge.judgement(in_table_angles)
     # One reading for the whole sheet: the joint values, unless more steps pass in the table's angles.
     if sum(e.verdict.passes for e in other.entries) <= sum(e.verdict.passes for e in judged.entries):
         return judged
     return replace(other, notes=(*other.notes, Note(NoteKind.TABLE_ANGLES, "ik")))
-
-
-def _count(judgement: KinematicJudgement, verdict: Verdict) -> int:
-    return sum(entry.verdict is verdict for entry in judgement.entries)
 
 
 class _Judge(StepContext):

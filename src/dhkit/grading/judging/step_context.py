@@ -35,14 +35,6 @@ class Part:
     """What a reader should know of a part that passes."""
 
 
-def undone(T: Array) -> Array:
-    """Return the inverse of a rigid transform, shape (4, 4)."""
-    inverse = np.eye(4)
-    inverse[:3, :3] = T[:3, :3].T
-    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
-    return inverse
-
-
 class StepContext:
     """An arm and the poses at which steps are tried.
 
@@ -123,7 +115,7 @@ class StepContext:
     def misread(self, poses: Poses) -> Iterator[tuple[str, dict[str, Array | float]]]:
         """Yield mistakes in which the pose is another frame's, each with the values that formulas then mean."""
         numbers = self.description.numbers
-        outside, inside = undone(numbers.T_world_base), undone(numbers.T_last_tool)
+        outside, inside = np.linalg.inv(numbers.T_world_base), np.linalg.inv(numbers.T_last_tool)
         for mistake, before, behind in (
             ("tool_not_taken_off", None, inside),
             ("base_not_taken_off", outside, None),

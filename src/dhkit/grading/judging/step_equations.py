@@ -39,6 +39,7 @@ OF_BOTH_SIDES = ("square_forgotten", "square_too_much", "root_forgotten")
 STEP = 1e-6
 """Step of finite differences, rad, and relative to the reach."""
 WITH_NUMBERS = "proved: an identity of the arm with its own lengths"
+"""Statement on an equation that is no identity whatever the lengths are."""
 NO_CHANGE = 1e-7
 """Change of an equation, relative to the size of its terms, by a step of one, that is rounding."""
 SAME_RANK = 1e-5
@@ -138,10 +139,9 @@ class Equations:
         T = np.tile(np.eye(4), (FREE_POSES, 1, 1))
         T[:, :3, :3] = Rotation.random(FREE_POSES, rng=rng).as_matrix()
         T[:, :3, 3] = rng.uniform(-scale, scale, (FREE_POSES, 3))
-        free = Equations(self.context, self.step, self.before)
         poses = replace(self.context.poses, q=rng.uniform(-2, 2, (FREE_POSES, n)), T=T, known=None)
         values = {**poses.values, **_joints(poses.q)}
-        return bool(np.min(np.abs(free.residual(tree, values))) < ZERO)
+        return bool(np.min(np.abs(self.residual(tree, values))) < ZERO)
 
     def _share_of_a_root(self, tree: Tree) -> float | None:
         """Return at how many poses, in %, an equation holds that is true of one root at all poses; None for another.
@@ -152,8 +152,7 @@ class Equations:
         truths = poses.truths
         holds = np.zeros(truths.shape[:2], dtype=bool)
         for b in range(truths.shape[1]):
-            at = {**poses.values, **{f"q{i + 1}": column for i, column in enumerate(truths[:, b].T)}}
-            holds[:, b] = np.abs(self.residual(tree, at)) < ZERO
+            holds[:, b] = np.abs(self.residual(tree, {**poses.values, **_joints(truths[:, b])})) < ZERO
         share = 100 * float(np.mean(np.abs(self.residual(tree)) < ZERO))
         return share if share > 0 and poses.has_closed_form and np.all(holds.any(axis=1)) else None
 

@@ -159,7 +159,7 @@ class Solutions:
             return self._wrong(trial, step, before), None
         first = right[0]
         count = self._count(first.choices, step.joint)
-        if (same := _same(first.values)) is not None:
+        if (same := self._same(first.values, step.joint)) is not None:
             self.skip(step.joint)
             return Part(Verdict.WRONG, f"solution {same}: gives the same as another", [("duplicate_branch", "")]), None
         self._hypotheses = [tuple(chain(*trial.following)) for trial in right]
@@ -270,6 +270,18 @@ class Solutions:
             most = max(most, int(np.sum(choice.alive & ~repeated, axis=1).max(initial=0)))
         return most
 
+    def _same(self, values: Sequence[Sequence[Array]], joint: int) -> int | None:
+        """Return the number, from 1, of a formula whose values are those of one before it after every choice."""
+
+        def equal(a: Array, b: Array) -> bool:
+            gap = self.context.solved_poses.gaps(a, b, joint)
+            return bool(np.all((gap < MATCHES) | np.isnan(gap)))
+
+        for k, own in enumerate(values):
+            if any(all(map(equal, own, other)) for other in values[:k]):
+                return k + 1
+        return None
+
     # Mistakes
 
     def _wrong(self, trial: Trial, step: GivenStep, before: Sequence[int]) -> Part:
@@ -312,7 +324,7 @@ class Solutions:
         for j in later:
             trees[j] = Sum(((True, given[j]), (True, nothing)))
         trees[own] = tree
-        poses = self.context.solved_poses.at(rows).with_known(known)
+        poses = replace(self.context.solved_poses.at(rows), known=known)
         return Branch(poses, tuple(trees), given_order=(*before, own, *later), judged_joint=own)
 
     def _mistake(self, branch: Branch, step: GivenStep, tree: Tree, before: Sequence[int]) -> tuple[str, str] | None:
@@ -323,16 +335,3 @@ class Solutions:
             return part.verdict.passes
 
         return SolutionMistakes(self.context, branch, step.joint).mistake(is_right_for)
-
-
-def _same(values: Sequence[Sequence[Array]]) -> int | None:
-    """Return the number, from 1, of a formula whose values are those of one before it after every choice."""
-
-    def equal(a: Array, b: Array) -> bool:
-        gap = np.abs(np.remainder(a - b + np.pi, 2 * np.pi) - np.pi)
-        return bool(np.all((gap < MATCHES) | np.isnan(gap)))
-
-    for k, own in enumerate(values):
-        if any(all(map(equal, own, other)) for other in values[:k]):
-            return k + 1
-    return None

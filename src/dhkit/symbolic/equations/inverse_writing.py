@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from dhkit.symbolic.equations.collected import collected
@@ -197,40 +197,34 @@ def _filled(template: str, texts: dict[str, str]) -> str:
 
 def solved_before(derivation: InverseDerivation, step: Step) -> list[str]:
     """Return the joints and defined quantities of earlier steps that a step uses, in their order."""
-    ring = derivation.chain.ring
     elements = [*step.elements, *(definition.element for definition in step.definitions)]
     if isinstance(step.form, Flip):  # what the unknown is multiplied by is not known yet
         elements = [step.form.letters["X"], step.form.letters["Y"], *(d.element for d in step.definitions)]
-    through = _joints_of_quantities(derivation, step)
+    joints = _joints_in(elements, _joints_of_quantities(derivation, step))
     own = step.unknown.joint if step.unknown else None
-    generators = [ring.generators[k] for k in _used(elements)]
-    joints = {g.joint for g in generators if g.kind != "constant"}
-    joints = joints.union(*(through.get(g.text, set()) for g in generators if g.kind == "constant")) - {own}
     kinds = derivation.description.kinds
-    return [f"theta{i + 1}" if kinds[i] == "R" else f"q{i + 1}" for i in sorted(joints) if i >= 0]
+    return [f"theta{i + 1}" if kinds[i] == "R" else f"q{i + 1}" for i in sorted(joints - {own}) if i >= 0]
 
 
 def _joints_of_quantities(derivation: InverseDerivation, step: Step) -> dict[str, set[int]]:
     """Return the joints behind each quantity that steps before one define, or find as phi, by name."""
-    generators, names = derivation.chain.ring.generators, derivation.chain.names
-    found: dict[str, set[int]] = {}
+    names, found = derivation.chain.names, dict[str, set[int]]()
     for earlier in derivation.steps:
         if earlier is step:
             break
         for definition in earlier.definitions:
-            used = [generators[k] for k in _used([definition.element])]
-            found[definition.name] = {g.joint for g in used if g.kind != "constant"}.union(
-                *(found.get(g.text, set()) for g in used if g.kind == "constant")
-            )
+            found[definition.name] = _joints_in([definition.element], found)
         if earlier.unknown is not None and earlier.unknown.joint is None:
-            used = [generators[k] for k in _used(earlier.elements)]
-            joints = {g.joint for g in used if g.kind != "constant"}.union(
-                *(found.get(g.text, set()) for g in used if g.kind == "constant")
-            )
-            found[names["cphi"]] = found[names["sphi"]] = {i for i in joints if i >= 0}
+            found[names["cphi"]] = found[names["sphi"]] = _joints_in(earlier.elements, found)
     return found
 
 
-def _used(elements: Iterable[Element]) -> set[int]:
-    """Return the indices of the generators in elements."""
-    return {k for element in elements for monomial in element.terms for k, exponent in enumerate(monomial) if exponent}
+def _joints_in(elements: Iterable[Element], of_quantities: Mapping[str, set[int]]) -> set[int]:
+    """Return the joints in elements, from 0, and those behind the quantities in them."""
+    joints: set[int] = set()
+    for element in elements:
+        used = {k for monomial in element.terms for k, exponent in enumerate(monomial) if exponent}
+        for generator in (element.ring.generators[k] for k in used):
+            is_quantity = generator.kind == "constant"
+            joints |= of_quantities.get(generator.text, set()) if is_quantity else {generator.joint}
+    return joints
