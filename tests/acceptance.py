@@ -29,6 +29,11 @@ def sample_size(full: int) -> int:
     return full if ACCEPTING else max(min(full, LEAST), full // SHARE)
 
 
+def in_time(seconds: float, required: float) -> None:
+    """Hold a time to what is required in `make accept` alone: elsewhere a tracer or a busy machine decides."""
+    assert not ACCEPTING or seconds <= required, f"{seconds:.3g} s, required at most {required:.3g} s"
+
+
 class Law:
     """What one test has seen, quantity by quantity."""
 

@@ -389,7 +389,7 @@ VALUES = {
     planning.Obstacle: lambda: planning.Obstacle.box((0.1, 0.2, 0.3), pose(), HOSTILE),
     planning.PlanReport: plan,
     planning.Planner: lambda: planar().planner(),
-    planning.Progress: lambda: planning.Progress(12, 2 / 3, 1.2345678901234567e-8, 1 / 7),
+    planning.Progress: lambda: planning.Progress(12, 2 / 3, 1.2345678901234567e-8, 1 / 7, 1 / 3),
     planning.Time: planning.Time,
     planning.ToolAcceleration: lambda: planning.ToolAcceleration(5.0),
     planning.ToolDirection: lambda: planning.ToolDirection((1, 1, 1), (0.1, 0.2, 0.3)),

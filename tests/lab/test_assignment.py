@@ -19,7 +19,8 @@ from dhkit.lab import Assignment, Lab, serve
 from dhkit.lab.assignment import JointsAt, MotionBetween, OwnScore, ToolAt, is_assignment
 from dhkit.lab.assignment_form import AssignmentForm, assignment_schema, panel_names
 from dhkit.viewer.page import page_files
-from lab.test_requests import states, wait_for
+from lab.test_requests import states
+from waiting import wait_for
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = sorted((ROOT / "docs" / "examples").glob("assignment_*.toml"))
@@ -62,7 +63,7 @@ def test_an_example_can_be_done(file, begin, tmp_path):
     for goal in goals(assignment):
         attempt(lab, goal.condition)
     if wants_program:
-        wait_for(lambda: states(lab)["own"].get("report"), seconds=60.0)
+        wait_for(lambda: states(lab)["own"].get("report"))
     wait_for(lambda: all(met(lab)))
     task = states(lab)["task"]
     assert task["points"] == task["most"] == assignment.points > 0
@@ -269,7 +270,7 @@ def test_the_share_of_a_score(begin, read, tmp_path):
     wait_for(lambda: states(lab)["own"].get("report"))
     assert met(lab) == [False] and states(lab)["task"]["note"] is None
     program.write_text(OWN.replace("puma560_cao", "planar2r"))
-    wait_for(lambda: met(lab) == [True], seconds=60.0)
+    wait_for(lambda: met(lab) == [True])
     report = states(lab)["own"]["report"]
     assert OwnScore("fk", 1.0).is_reached(report)
     assert not OwnScore("controller", 0.1).is_reached(report) and not OwnScore("fk", 0.1).is_reached(
@@ -293,10 +294,8 @@ def test_the_largest_assignment_is_published(begin, read):
     text = HEAD + 20 * (STEP.replace("some words", 800 * "x") + 20 * goal)
     assert 90_000 < len(text.encode()) <= 100_000
     lab = begin(read(text))
-    start = time.perf_counter()
     for k in range(50):
         lab.answer("joints.set", {"q": [0.01 * k, 0.0]})
-    assert time.perf_counter() - start < 5.0
     assert len(met(lab)) == 400
     json.dumps(states(lab)["task"], allow_nan=False)
 

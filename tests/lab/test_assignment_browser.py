@@ -13,7 +13,7 @@ from bad_assignments import GOOD
 from dhkit.lab import Assignment
 from dhkit.lab.assignment_form import panel_names
 from lab.test_assignment import EXAMPLES, met
-from lab.test_requests import wait_for
+from waiting import wait_for
 
 pytestmark = pytest.mark.slow
 

@@ -20,6 +20,7 @@ from dhkit import Arm
 from dhkit.description import pose
 from dhkit.viewer.scene import first_configuration
 from lab.controls import button, labelled, panel, set_joints
+from waiting import wait_for
 
 pytestmark = pytest.mark.slow
 
@@ -45,14 +46,6 @@ def visit(open_page):
 def enter(page, lab):
     page.open(lab.url)
     page.until("globalThis.dhkit?.lab?.state.control && dhkit.lab.state.table && dhkit.lab.state.waypoints")
-
-
-def wait_for(what, seconds=20.0):
-    deadline = time.monotonic() + seconds
-    while not (found := what()):
-        assert time.monotonic() < deadline, "it did not come"
-        time.sleep(0.02)
-    return found
 
 
 def write(page, label, text):
@@ -472,7 +465,7 @@ def test_a_least_time_motion_is_planned_in_the_background(visit):
     page.choose(labelled("Kind of motion"), "least-time")
     page.click(button("Plan from here"))
     page.until("dhkit.lab.state.job?.running")
-    page.until("dhkit.lab.state.motion || dhkit.lab.state.job?.error", timeout=120)
+    page.until("dhkit.lab.state.motion || dhkit.lab.state.job?.error")
     assert page.evaluate("dhkit.lab.state.job?.error ?? null") is None
 
 
@@ -681,7 +674,7 @@ def act(page, lab, name):
     if name == "table":
         lab.answer("tool.clear", {})
         page.evaluate("document.querySelector('#panel-table tbody button').click()")
-        time.sleep(1.2)
+        page.until("dhkit.stage.moving?.visible")
     if name == "motion":
         lab.answer("motion.plan", {"kind": "quintic", "goal": {"q": nearby(lab).tolist()}})
         page.until("dhkit.lab.state.motion && dhkit.player.time > Math.min(0.3, 0.9 * dhkit.lab.state.motion.duration)")
@@ -690,7 +683,7 @@ def act(page, lab, name):
         lab.answer("motion.clear", {})
         lab.answer("control.start", {"reference": "sine", "controller": "pid"})
         page.until(f"{of('control')}.rows.length > 90")
-    time.sleep(0.3)
+    page.settle()
 
 
 OVERLAPPING = """(() => {

@@ -9,13 +9,7 @@ import pytest
 from dhkit import Arm
 from dhkit.lab.contacts import Contacts, touching_links
 from dhkit.lab.jobs import Jobs
-
-
-def wait_for(condition, seconds=20.0):
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+from waiting import wait_for
 
 
 def test_a_job_reports_its_progress_and_its_result_is_taken_once():

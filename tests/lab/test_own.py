@@ -1,18 +1,21 @@
 """A person's own program beside the arm: loaded anew when it is saved, and never in the way of the lab."""
 
 import time
+from contextlib import suppress
 
 import numpy as np
 import psutil
 import pytest
 
+from acceptance import in_time
 from dhkit import Arm
 from dhkit.lab import Lab
 from dhkit.lab.control_panel import CONTROL_RATE, FRAME_RATE
 from dhkit.viewer.session import Slot
-from lab.test_requests import states, wait_for
+from lab.test_requests import states
 from programs.puma_solutions import solution
 from viewer.messages import decode_ghosts
+from waiting import wait_for
 
 CONTROLLER = "def controller(t, q, qd, setpoint):\n    return 300 * (setpoint.q - q) - 30 * qd\n"
 
@@ -33,9 +36,17 @@ def beside(tmp_path):
     yield make
     for lab in opened:
         lab.close()
-    time.sleep(0.1)
-    names = [" ".join(child.cmdline()) for child in psutil.Process().children(recursive=True)]
-    assert not [name for name in names if "runner" in name or "supervisor" in name]
+    wait_for(lambda: not runners(), "the end of its processes")
+
+
+def runners():
+    """Return the processes of this one that run programs."""
+    found = []
+    for child in psutil.Process().children(recursive=True):
+        with suppress(psutil.Error):
+            command = " ".join(child.cmdline())
+            found += [command] * ("runner" in command or "supervisor" in command)
+    return found
 
 
 def own(lab):
@@ -80,13 +91,13 @@ def test_a_program_that_dawdles_or_dies_keeps_nobody_waiting(text, tmp_path):
     file = tmp_path / "mine.py"
     file.write_text(text)
     with Lab(Arm.load("puma560"), own=file) as lab:
-        time.sleep(0.5)
+        wait_for(lambda: text == DIES or runners(), "its process")
         for k in range(20):
             begin = time.monotonic()
             lab.answer("joints.set", {"q": [0.01 * k] * 6})
-            assert time.monotonic() - begin < 0.5
+            in_time(time.monotonic() - begin, 0.5)
         begin = time.monotonic()
-    assert time.monotonic() - begin < 8.0
+    in_time(time.monotonic() - begin, 8.0)
 
 
 def test_its_controller_is_in_the_list_and_drives_the_arm(beside):
@@ -128,14 +139,11 @@ def test_a_score_is_about_the_arm_on_show_alone(tmp_path):
     source = tmp_path / "mine.py"
     source.write_text("def fk(q):\n    return [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n")
     with Lab(Arm.load("planar2r"), own=source) as lab:
-        deadline = time.monotonic() + 60
-        while not lab._own._state.get("report"):
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        wait_for(lambda: lab._own._state.get("report"))
         lab.answer("table.edit", {"row": 0, "column": "a", "text": "0.7"})
         assert lab._own._state["report"] is None
         assert lab._own._state["edited"]
         lab.answer("own.score", {})
         lab.answer("table.reset", {})  # before the score of the edited arm is there
-        time.sleep(1.0)
+        wait_for(lambda: lab._own._scores._thread is None)
         assert lab._own._state["report"] is None

@@ -1,9 +1,10 @@
 """The panels of dynamics, workspace, transforms and answers: their numbers are the API's, and pages show them."""
 
 import json
-import time
+from contextlib import suppress
 
 import numpy as np
+import psutil
 import pytest
 import trimesh
 
@@ -13,6 +14,7 @@ from dhkit.errors import ModelError
 from dhkit.lab import Lab
 from dhkit.lab.transforms_panel import MAX_TRIANGLES, Solid
 from dhkit.lab.workspace_panel import boundary_distance
+from waiting import wait_for
 
 PRINTED = 5.1e-5
 """Half of the last digit of an entry of M on the page, and rounding."""
@@ -26,12 +28,9 @@ def state(lab, name):
     return json.loads(server._state[server._panels[name]][1][16:])["data"]
 
 
-def wait(lab, name, condition, seconds=60.0):
-    end = time.monotonic() + seconds
-    while not condition(found := state(lab, name)):
-        assert time.monotonic() < end, found
-        time.sleep(0.02)
-    return found
+def wait(lab, name, condition):
+    wait_for(lambda: condition(state(lab, name)), name)
+    return state(lab, name)
 
 
 # Dynamics
@@ -319,30 +318,26 @@ def test_an_answer_that_cannot_be_read_is_said_in_a_line(open_lab):
 
 
 def test_judging_is_ended_with_the_lab_and_when_it_is_cancelled():
-    import psutil
-
     with Lab(Arm.load("puma560")) as lab:
         lab.answer(
             "submit.grade", {"kind": "lines", "text": "M11 = " + " + ".join(f"c{k % 3 + 1}^{k}" for k in range(1, 60))}
         )
-        time.sleep(0.4)
+        wait_for(judges)
         lab.answer("submit.cancel", {})
         assert state(lab, "verdict") is None
+        wait_for(lambda: not judges())
         lab.answer("submit.grade", {"kind": "lines", "text": RIGHT})
-        time.sleep(0.3)
-    end = time.monotonic() + 10
-    while any("grade" in " ".join(child.cmdline()) for child in _children(psutil)):
-        assert time.monotonic() < end
-        time.sleep(0.05)
+        wait_for(judges)
+    wait_for(lambda: not judges())
 
 
-def _children(psutil):
+def judges():
+    """Return the processes of this one that judge an answer."""
+    found = []
     for child in psutil.Process().children(recursive=True):
-        try:
-            child.cmdline()
-            yield child
-        except psutil.Error:
-            continue
+        with suppress(psutil.Error):
+            found += [child] * ("grade" in child.cmdline())
+    return found
 
 
 def test_the_end_of_a_slide_is_a_boundary():

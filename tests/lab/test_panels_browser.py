@@ -108,7 +108,7 @@ def test_a_box_is_turned_and_moved_step_by_step(open_page):
     page.until("document.querySelectorAll('#panel-transforms .step li').length === 2")
     T = pose(euler=(np.pi / 4, 0, 0), order="ZYX") @ pose((0, 0.5, 0))
     own = "dhkit.lab.panels.find(p => p.name === 'transforms').panel"
-    page.until(f"{own}.T.every((x, i) => Math.abs(x - {T.ravel().tolist()}[i]) < 1e-12)", timeout=10)
+    page.until(f"{own}.T.every((x, i) => Math.abs(x - {T.ravel().tolist()}[i]) < 1e-12)")
     assert texts(page, "#panel-transforms .step math")[3].startswith("T2=T1")
     assert "T1−1p" in "".join(texts(page, "#panel-transforms .step math")).replace(" ", "")
     # Numbers stand at the vertices, where the page projects them.
@@ -136,13 +136,13 @@ def test_an_answer_is_judged_on_the_page(open_page):
     assert "m1, m2" in texts(page, "#panel-submit .hint")[0]
     page.evaluate(f"{labelled('Answer')}.value = 'M22 = m2*l2^2/3\\ng2 = m2*g*l2*c2/2'")
     page.click(button("Judge"))
-    page.until("document.querySelectorAll('#panel-submit article').length === 2", timeout=60)
+    page.until("document.querySelectorAll('#panel-submit article').length === 2")
     assert texts(page, "#panel-submit h3") == ["M22: correct", "g2: wrong"]
     assert page.evaluate("document.querySelectorAll('#panel-submit article math').length") == 3
     assert "angle" in texts(page, "#panel-submit .diagnosis")[0]
     page.evaluate(f"{labelled('Answer')}.value = {json.dumps(f'V = {HOSTILE}')}")
     page.click(button("Judge"))
-    page.until("document.querySelector('#panel-submit .note').textContent === 'unreadable'", timeout=60)
+    page.until("document.querySelector('#panel-submit .note').textContent === 'unreadable'")
     assert texts(page, "#panel-submit h3") == ["V: unreadable"]
     assert page.evaluate("document.querySelectorAll('img').length") == 0
     assert page.evaluate("globalThis.hacked ?? null") is None

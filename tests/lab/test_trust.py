@@ -12,7 +12,8 @@ import pytest
 import dhkit
 from dhkit import Arm
 from dhkit.description import from_toml, pose
-from lab.test_requests import samples, states, wait_for
+from lab.test_requests import samples, states
+from waiting import wait_for
 
 
 def held(lab, t):
@@ -78,13 +79,20 @@ def test_a_download_is_of_the_arm_that_ran(puma):
     assert puma.answer("control.download", {"format": "csv"}) == first
 
 
+def stands(live):
+    """Return whether a run makes no steps during some frames."""
+    count = live._count
+    time.sleep(0.1)
+    return live._count == count
+
+
 def test_a_load_that_comes_during_a_run_leaves_its_energies_right(puma):
     puma.answer("control.start", {"reference": "sine"})
     wait_for(lambda: samples(puma) and np.any(samples(puma)[0].rows[:, 0] > 0.5))
     puma.answer("control.change", {"payload": 5.0})
     wait_for(lambda: puma._control._live._count > 300)
     puma.answer("control.pause", {})
-    time.sleep(0.05)
+    wait_for(lambda: stands(puma._control._live))
     audit = puma._control._live.result().audit
     assert audit.error < 1e-9
 
@@ -298,7 +306,7 @@ def test_copied_lines_make_the_same_motion(kind, open_lab, tmp_path, monkeypatch
         )
     else:
         lab.answer("motion.plan", {"kind": kind, "goal": {} if kind == "circle" else {"q": [0.7, 1.0]}})
-    wait_for(lambda: states(lab)["motion"] or (states(lab)["job"] or {}).get("error"), 60.0)
+    wait_for(lambda: states(lab)["motion"] or (states(lab)["job"] or {}).get("error"))
     if kind == "circle" and states(lab)["motion"] is None:
         pytest.skip("a planar arm has no circle about its own axis here")
     motion = copied(lab, tmp_path, monkeypatch)["motion"]

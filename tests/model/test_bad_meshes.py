@@ -132,10 +132,10 @@ def test_five_million_triangles_are_refused_from_the_header(tmp_path):
     with (tmp_path / "link1.stl").open("wb") as file:
         file.write(stl_header(count))
         file.truncate(84 + 50 * count)
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(ModelError, match=r"5000000 triangles; expected at most 200000; .*--simplify"):
         import_cad(tmp_path, one_joint(tmp_path))
-    assert time.perf_counter() - start < 1.0
+    assert time.process_time() - start < 1.0
     with pytest.raises(ModelError, match="more than 50 MB"):
         read_mesh(tmp_path / "link1.stl")
 

@@ -129,10 +129,10 @@ def test_bad_files_get_one_line_and_soon(name, tmp_path):
     text, message = REFUSED[name]
     file = tmp_path / "bad.urdf"
     file.write_text(text)
-    begin = time.perf_counter()
+    begin = time.process_time()
     with pytest.raises(ModelError) as caught:
         extract_dh(file, tip="c" if "chain" in name else None)
-    assert time.perf_counter() - begin < 5
+    assert time.process_time() - begin < 5
     assert str(caught.value).startswith(f"{file}: ")
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)

@@ -91,7 +91,7 @@ def test_a_needle_in_the_way_of_a_rod_is_not_passed(intervals, angle):
     needle = [Obstacle.sphere(0.0005, (0.85 * np.cos(angle), 0.85 * np.sin(angle), 0))]
     options = {"obstacles": needle, "clearance": 0.0005}
     with pytest.raises(PlanningError, match="sphere"):
-        Arm(ONE).plan([0.0], [3.0], intervals=intervals, time_limit=0.5, compare=False, **options)
+        Arm(ONE).plan([0.0], [3.0], intervals=intervals, max_iterations=50, compare=False, **options)
     with pytest.raises(PlanningError, match=r"path at s = .* sphere"):
         Arm(ONE).plan_path(JointPath.straight(ONE, [0.0], [3.0]), intervals=intervals, **options)
 

@@ -3,6 +3,7 @@
 Modules: feasibility, goals, value_objects.
 """
 
+import itertools
 import math
 import re
 import time
@@ -119,18 +120,28 @@ def test_an_obstacle_around_the_only_branch_of_a_pose():
     )
 
 
+WALL = [Obstacle.capsule(0.03, (0.2, 0, 0), (3.0, 0, 0), name="wall")]
+"""Over the whole reach of planar2r, which cannot pass it."""
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("seconds", [pytest.param(60.0, marks=only_accepting), 2.0])
-def test_no_way_around_an_obstacle(law, seconds):
-    """An arm in a plane cannot pass a wall from its base outwards: that is said, within the time limit."""
+@pytest.mark.parametrize("iterations", [pytest.param(2000, marks=only_accepting), 200])
+def test_no_way_around_an_obstacle(law, iterations):
+    """It is said within the limit of work, the same twice."""
     arm = library_robot("planar2r")
-    wall = [Obstacle.capsule(0.03, (0.2, 0, 0), (3.0, 0, 0), name="wall")]
     began = time.perf_counter()
-    refused(
-        r"^no motion found that keeps 10 mm clear of wall( within the time limit)?, (in \d+ start|sampling found no)",
-        lambda: Planner(arm, intervals=24).solve([-0.8, 0.0], [0.8, 0.0], obstacles=wall, time_limit=seconds),
+    messages = set()
+    for _ in range(2):
+        with pytest.raises(PlanningError) as refusal:
+            Planner(arm, intervals=24).solve([-0.8, 0.0], [0.8, 0.0], obstacles=WALL, max_iterations=iterations)
+        messages.add(str(refusal.value))
+    (message,) = messages
+    assert re.match(
+        rf"no motion found that keeps 10 mm clear of wall( within {iterations} iterations)?, "
+        r"(in \d+ start|sampling found no)",
+        message,
     )
-    law.takes("seconds beyond the time limit", time.perf_counter() - began - seconds, 5.0)
+    law.takes("seconds until it is said twice", time.perf_counter() - began, 60.0)
 
 
 def test_not_converged():
@@ -166,8 +177,38 @@ def test_nothing_that_limits_a_smooth_motion():
     )
 
 
-def test_the_time_limit(planner):
-    refused("^no motion found within the time limit, in 1 start$", lambda: planner.solve(START, GOAL, time_limit=1e-4))
+def test_the_limit_of_iterations_is_kept_exactly(planner):
+    """A motion is found with as many iterations as it takes, and not with one less."""
+    needed = planner.solve(START, GOAL).report.iterations
+    assert planner.solve(START, GOAL, max_iterations=needed + 1).report.iterations == needed
+    less = needed - 1
+    refused(
+        f"^no motion found within {less} iterations, in 1 start$",
+        lambda: planner.solve(START, GOAL, max_iterations=less),
+    )
+
+
+def test_a_limit_of_time_is_there_for_those_who_ask(planner):
+    refused(
+        "^no motion found within 2000 iterations and 0.0001 s, in 1 start$",
+        lambda: planner.solve(START, GOAL, time_limit=1e-4),
+    )
+
+
+def test_the_default_limit_does_not_read_the_clock(monkeypatch):
+    """On a machine that is busy for hours between two iterations the same motion is found, among obstacles too."""
+    arm = library_robot("planar2r")
+    ball = [Obstacle.sphere(0.05, (0.9, 0.0, 0.0))]
+
+    def solve():
+        return Planner(arm, intervals=12).solve([-0.8, 0.3], [0.8, 0.3], obstacles=ball)
+
+    calm = solve()
+    hours = itertools.count(step=3600.0)
+    monkeypatch.setattr(time, "perf_counter", lambda: next(hours))
+    busy = solve()
+    assert np.array_equal(busy.sample(n=50).q, calm.sample(n=50).q)
+    assert busy.report.iterations == calm.report.iterations
 
 
 def test_a_constraint_that_an_end_breaks():
@@ -224,7 +265,11 @@ def test_what_is_no_planner(make, kind, message):
     ("options", "message"),
     [
         ({"duration": -1.0}, "duration is -1.0"),
-        ({"time_limit": 0}, "time_limit is 0"),
+        ({"time_limit": 0}, "time_limit is 0; expected a positive number, s, or None"),
+        ({"time_limit": "1"}, "time_limit is '1'"),
+        ({"max_iterations": 0}, "max_iterations is 0; expected a positive whole number"),
+        ({"max_iterations": 1e3}, "max_iterations is 1000.0; expected a positive whole number"),
+        ({"max_iterations": True}, "max_iterations is True"),
         ({"clearance": -0.1}, "clearance is -0.1"),
         ({"start_velocity": [0, 0]}, "start_velocity"),
         ({"goal_velocity": [math.inf] * 6}, "goal_velocity"),

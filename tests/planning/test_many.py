@@ -3,7 +3,6 @@
 import multiprocessing
 import os
 import pickle
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,13 +101,15 @@ def test_what_can_go_wrong_with_processes_is_said():
 
 
 def test_an_exception_in_progress_ends_the_rest():
+    calls = []
+
     def stop(done, total):
+        calls.append(done)
         raise KeyboardInterrupt
 
-    began = time.perf_counter()
     with pytest.raises(KeyboardInterrupt):
         planner().solve_many(np.zeros((200, 2)), np.tile([[0.5, 0.2]], (200, 1)), workers=2, progress=stop)
-    assert time.perf_counter() - began < 60
+    assert calls == [1]
 
 
 def test_an_error_of_a_callers_constraint_is_not_swallowed():

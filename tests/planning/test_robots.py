@@ -21,7 +21,7 @@ def test_every_robot(law, name):
         pytest.skip("in make accept")
     limits, planner = Limits.of(arm), Planner(arm)
     for k, (start, goal) in enumerate(random_pairs(arm, samples if samples == 20 else 1)):
-        motion = planner.solve(start, goal, time_limit=30)
+        motion = planner.solve(start, goal)
         for what, excess in worst_excess(arm, motion, limits).items():
             law.holds(f"{what} above its limit", excess, 1e-6, k)
         assert np.abs(motion.q(motion.duration) - goal).max() < 1e-9

@@ -82,7 +82,7 @@ def test_scenes(law):
     planner = Planner(PUMA)
     seconds, solves, longer = [], [], []
     for k, (start, goal, obstacle) in enumerate(scenes(law.samples(20))):
-        motion = planner.solve(start, goal, obstacles=[obstacle], clearance=CLEARANCE, time_limit=30)
+        motion = planner.solve(start, goal, obstacles=[obstacle], clearance=CLEARANCE)
         law.holds("m short of the clearance, by coal", CLEARANCE - coal_gap(motion, obstacle), ROUNDING, k)
         for what, excess in worst_excess(PUMA, motion, planner.limits).items():
             law.holds(f"{what} above its limit", excess, 1e-6, k)
@@ -143,7 +143,7 @@ def test_ten_obstacles(law, name):
     arm = library_robot(name)
     planner = Planner(arm)
     for k, (start, goal, obstacles) in enumerate(cluttered(arm, law.samples(30) // 10, seed=7)):
-        motion = planner.solve(start, goal, obstacles=obstacles, clearance=CLEARANCE, time_limit=30)
+        motion = planner.solve(start, goal, obstacles=obstacles, clearance=CLEARANCE)
         q = motion.q(np.linspace(0, motion.duration, 2000))
         law.holds("m short of the clearance", CLEARANCE - distance(arm, q, obstacles).distance.min(), ROUNDING, k)
         for what, excess in worst_excess(arm, motion, planner.limits).items():
@@ -172,7 +172,7 @@ def test_links_that_move_together_near_each_other_cost_no_time(law):
     planner = Planner(arm)
     for k, (start, goal, balls) in enumerate(beside_two_balls(arm, max(law.samples(10), 2), seed=1)):
         free = planner.solve(start, goal, obstacles=balls, clearance=CLEARANCE)
-        motion = planner.solve(start, goal, obstacles=balls, clearance=CLEARANCE, self_collision=True, time_limit=30)
+        motion = planner.solve(start, goal, obstacles=balls, clearance=CLEARANCE, self_collision=True)
         assert motion.report.is_converged, k
         q = motion.q(np.linspace(0, motion.duration, 2000))
         clear = distance(arm, q, balls, self_collision=True).distance.min()
@@ -186,7 +186,7 @@ def test_links_that_move_together_near_each_other_cost_no_time(law):
 def test_a_way_that_is_hardly_wider_than_the_clearance_is_found():
     # Paths that keep 5 mm more than the clearance do not exist here; OMPL's BKPIECE1 finds one that keeps 20 mm in 2 s.
     *_, scene = itertools.islice(random_scenes(SceneKind("puma560"), 0), 22)
-    motion = Planner(PUMA).solve(scene.start, scene.goal, obstacles=scene.obstacles, clearance=CLEARANCE, time_limit=30)
+    motion = Planner(PUMA).solve(scene.start, scene.goal, obstacles=scene.obstacles, clearance=CLEARANCE)
     q = motion.q(np.linspace(0, motion.duration, 5000))
     assert CLEARANCE - ROUNDING < distance(PUMA, q, scene.obstacles).distance.min() < CLEARANCE + 5e-3
 
@@ -240,7 +240,7 @@ def test_goals_just_above_a_box_take_hardly_longer_than_without_it():
         except PlanningError:
             continue  # the torques do not hold the arm at an end
         easy = planner.solve(start, goal, obstacles=[box], clearance=0.7 * near[1]).duration
-        motion = planner.solve(start, goal, obstacles=[box], time_limit=30)
+        motion = planner.solve(start, goal, obstacles=[box])
         assert motion.duration < 1.02 * max(free, easy)
         tried += 1
 
@@ -249,7 +249,7 @@ def test_where_the_optimizer_finds_nothing_a_sampled_path_is_slowed_down():
     arm = library_robot("ur5")
     start, goal = [-1.4379, 1.779, 1.5791, -0.7181, 1.0835, 0.3996], [-0.2954, 0.8203, -1.0922, -0.8264, 1.1664, -0.204]
     plate = Obstacle.box((0.3003, 0.3003, 0.00075), (-0.21556, -0.24517, -0.79135), name="plate")
-    motion = Planner(arm).solve(start, goal, obstacles=[plate], self_collision=True, time_limit=30)
+    motion = Planner(arm).solve(start, goal, obstacles=[plate], self_collision=True)
     assert motion.report.certificate.ok
     if not motion.report.is_converged:
         assert "not optimal: a sampled path around the obstacles, slowed down" in str(motion.report)

@@ -21,6 +21,8 @@ import pytest
 from PIL import Image
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
+from waiting import HANGS
+
 BINARY = next(
     (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
 )
@@ -37,8 +39,6 @@ FLAGS = [
     "--hide-scrollbars",
     "--remote-debugging-port=0",
 ]
-START_TIMEOUT = 30.0
-TIMEOUT = 20.0
 KEY_CODES = {
     "Tab": 9,
     "Enter": 13,
@@ -79,7 +79,7 @@ class Chromium:
 
     def _port(self) -> int:
         announced = Path(self.profile.name) / "DevToolsActivePort"
-        deadline = time.monotonic() + START_TIMEOUT
+        deadline = time.monotonic() + HANGS
         while not (announced.exists() and announced.read_text().count("\n")):
             assert self.process.poll() is None and time.monotonic() < deadline, "Chromium did not start"
             time.sleep(0.05)
@@ -88,7 +88,7 @@ class Chromium:
     def page(self, width: int = 900, height: int = 700, *, dark: bool = False, scale: float = 1.0) -> Page:
         """Open an empty page of a size in CSS px."""
         request = urllib.request.Request(f"http://127.0.0.1:{self.port}/json/new", method="PUT")
-        with urllib.request.urlopen(request, timeout=TIMEOUT) as answer:
+        with urllib.request.urlopen(request, timeout=HANGS) as answer:
             target = json.load(answer)
         page = Page(self.loop, target["webSocketDebuggerUrl"])
         page.resize(width, height, scale)
@@ -122,7 +122,7 @@ class Page:
     def call(self, method: str, **parameters: object) -> dict:
         """Return a DevTools command's result."""
         self.count += 1
-        return self.loop.run_until_complete(asyncio.wait_for(self._call(self.count, method, parameters), TIMEOUT))
+        return self.loop.run_until_complete(asyncio.wait_for(self._call(self.count, method, parameters), HANGS))
 
     async def _call(self, number: int, method: str, parameters: dict) -> dict:
         await self.socket.write_message(json.dumps({"id": number, "method": method, "params": parameters}))
@@ -180,11 +180,11 @@ class Page:
         assert "exceptionDetails" not in result, result["exceptionDetails"]
         return result["result"].get("value")
 
-    def until(self, condition: str, timeout: float = TIMEOUT) -> None:
+    def until(self, condition: str) -> None:
         """Wait for a JavaScript condition."""
-        deadline = time.monotonic() + timeout
+        deadline = time.monotonic() + HANGS
         while not self.evaluate(f"Boolean({condition})"):
-            assert time.monotonic() < deadline, f"{condition} not true after {timeout} s; errors: {self.errors}"
+            assert time.monotonic() < deadline, f"{condition} not true after {HANGS:g} s; errors: {self.errors}"
             time.sleep(0.02)
 
     def settle(self) -> None:
@@ -269,7 +269,7 @@ class Page:
     def close(self) -> None:
         """Close the page."""
         self.call("Page.close")
-        self.loop.run_until_complete(asyncio.wait_for(self._close(), TIMEOUT))
+        self.loop.run_until_complete(asyncio.wait_for(self._close(), HANGS))
 
     async def _close(self) -> None:
         self.socket.close()

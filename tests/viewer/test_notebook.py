@@ -16,6 +16,7 @@ from dhkit.description import library_robot
 from dhkit.viewer import View, notebook
 from viewer.messages import decode_ghosts
 from viewer.pictures import shows_the_arm
+from waiting import HANGS, wait_for
 
 FLOAT32 = 1e-6
 """m, on an arm of 2 m."""
@@ -116,9 +117,9 @@ def test_the_widget_moves_the_arm_in_the_frame_and_strangers_do_not(chromium, tm
         page.close()
 
 
-def _still(page, seconds=20.0):
+def _still(page):
     """Return the picture once it shows the arm and two in a row are the same."""
-    end, before = time.monotonic() + seconds, None
+    end, before = time.monotonic() + HANGS, None
     while True:
         time.sleep(0.4)
         now = page.screenshot()
@@ -152,20 +153,11 @@ def test_a_notebook_that_nbconvert_has_run_and_rendered_shows_the_arm(chromium, 
         page.call("Page.navigate", url=f"file://{tmp_path}/notebook.html")
         page.until("document.querySelector('iframe[sandbox]')")
         page.evaluate("document.querySelector('iframe').scrollIntoView()")
-        time.sleep(2.0)
-        picture = _settled(page)
-        cream = (picture.min(axis=-1) > 150) & (picture[..., 0] - picture[..., 2] > 8)  # the PUMA's links
-        assert cream.sum() > 3000
+        wait_for(lambda: _links(page.screenshot()) > 3000, "the arm")
     finally:
         page.close()
 
 
-def _settled(page):
-    before = page.screenshot()
-    for _ in range(20):
-        time.sleep(0.5)
-        now = page.screenshot()
-        if np.array_equal(now, before):
-            return now
-        before = now
-    return before
+def _links(picture):
+    """Return the number of pixels in the cream of the PUMA's links."""
+    return ((picture.min(axis=-1) > 150) & (picture[..., 0] - picture[..., 2] > 8)).sum()

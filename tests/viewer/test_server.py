@@ -18,9 +18,9 @@ from dhkit.viewer.protocol import encode_frames
 from dhkit.viewer.server import MAX_CONNECTIONS, ViewerServer
 from dhkit.viewer.session import Slot
 from viewer.messages import decode_header
+from waiting import HANGS
 
 CONNECTIONS = 200
-PATIENCE = 10.0
 
 
 def message(flag=False):
@@ -35,7 +35,7 @@ def server():
 
 
 def get(server, path, **headers):
-    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=PATIENCE)
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=HANGS)
     connection.request("GET", path, headers=headers)
     answer = connection.getresponse()
     content = answer.read()
@@ -50,17 +50,17 @@ async def connect(server, **headers):
     socket = await websocket_connect(HTTPRequest(url, headers={k: v for k, v in headers.items() if v}))
     yield socket
     socket.close()
-    while await asyncio.wait_for(socket.read_message(), PATIENCE) is not None:
+    while await asyncio.wait_for(socket.read_message(), HANGS) is not None:
         pass
 
 
 def run(coroutine):
-    return asyncio.run(asyncio.wait_for(coroutine, PATIENCE * 3))
+    return asyncio.run(asyncio.wait_for(coroutine, HANGS * 3))
 
 
 async def read(socket):
     """Return the next binary message; beats are text."""
-    while isinstance(text := await asyncio.wait_for(socket.read_message(), PATIENCE), str):
+    while isinstance(text := await asyncio.wait_for(socket.read_message(), HANGS), str):
         assert json.loads(text)["type"] == "beat"
     return text
 
@@ -85,7 +85,7 @@ def test_the_page_and_its_files_are_served(server):
 
 def test_it_listens_on_the_loopback_interface_only(server):
     assert server.url.startswith("http://127.0.0.1:")
-    own = asyncio.run_coroutine_threadsafe(listening(server), server._loop).result(PATIENCE)
+    own = asyncio.run_coroutine_threadsafe(listening(server), server._loop).result(HANGS)
     assert own == {"127.0.0.1"}
 
 
@@ -173,7 +173,7 @@ def test_a_slow_page_gets_the_latest_and_nothing_in_between(server):
                 await shown(socket, received[-1])
                 received.append(await read(socket))
             await shown(socket, received[-1])
-            deadline = time.monotonic() + PATIENCE
+            deadline = time.monotonic() + HANGS
             while not all(page.session.settled for page in server.pages):
                 assert time.monotonic() < deadline, "a page is owed a frame that it never gets"
                 await asyncio.sleep(0.01)
@@ -194,7 +194,7 @@ def test_it_survives_many_connections(server):
             return decode_header(await read(socket)).flags
 
     assert run(come_and_go()) == 1
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + HANGS
     while server.pages and time.monotonic() < deadline:
         time.sleep(0.01)
     assert not server.pages
@@ -222,7 +222,7 @@ def test_a_page_hears_a_sign_of_life(server):
     async def listen():
         async with connect(server) as socket:
             await read(socket)
-            return json.loads(await asyncio.wait_for(socket.read_message(), PATIENCE))
+            return json.loads(await asyncio.wait_for(socket.read_message(), HANGS))
 
     assert run(listen()) == {"type": "beat"}
 
@@ -254,7 +254,7 @@ def test_a_closed_server_is_gone_and_says_so():
         with pytest.raises(ModelError, match="the viewer is closed"):
             call()
     with pytest.raises(ConnectionRefusedError):
-        http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE).connect()
+        http.client.HTTPConnection("127.0.0.1", port, timeout=HANGS).connect()
 
 
 def test_a_page_is_told_good_bye(server):

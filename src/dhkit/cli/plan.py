@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -30,6 +29,7 @@ from dhkit.description import Array
 from dhkit.errors import DescriptionError, PlanningError
 from dhkit.planning import PlanReport, Progress, ToolSpeed
 from dhkit.planning.report import more_text, seconds_text
+from dhkit.planning.work import MAX_ITERATIONS
 from dhkit.trajectories import Limits, Trajectory, joint_path, tool_line
 from dhkit.trajectories.archives import ARCHIVES
 from dhkit.trajectories.files import TABLES
@@ -121,7 +121,12 @@ def plan(
     ] = False,
     line: Annotated[bool, typer.Option("--line", help="Move the tool along a straight line.")] = False,
     intervals: Annotated[int | None, typer.Option(min=6, max=2000, help="Number of mesh intervals.")] = None,
-    time_limit: Annotated[float, typer.Option(min=0.01, help="Longest search, s.")] = 30.0,
+    max_iterations: Annotated[
+        int, typer.Option(min=1, help="Limit of the search, iterations of the optimizer.")
+    ] = MAX_ITERATIONS,
+    time_limit: Annotated[
+        float | None, typer.Option(min=0.01, help="Limit of the search besides, s; the result then depends on it.")
+    ] = None,
     degrees: Degrees = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write the motion: .npz, .mat, .csv or .yaml.")
@@ -153,6 +158,7 @@ def plan(
         "duration": duration,
         "limits": limits,
         "payload": parse_payload(load),
+        "max_iterations": max_iterations,
         "time_limit": time_limit,
     }
     if intervals is not None:
@@ -163,11 +169,10 @@ def plan(
     files.check(SUFFIXES)
     try:
         with ProgressBar("making the program") as bar:
-            begin = time.monotonic()
 
             def report(now: Progress) -> None:
                 state = f"iteration {now.iteration}: {now.duration:.4f} s, limits missed by {now.infeasibility:.1e}"
-                bar.show(time.monotonic() - begin, time_limit, f"{state}, of {time_limit:g} s to search")
+                bar.show(now.spent, 1.0, f"{state}; {100 * now.spent:.0f} % of the search's limit")
 
             if line:
                 motion = _plan_along_line(arm, begin_q, goal, between, progress=report, **options)

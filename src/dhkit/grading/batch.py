@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from dhkit.errors import DhkitError
-from dhkit.grading.isolation import Limits, Worker, start_worker
+from dhkit.grading.isolation import Limits, Worker, is_late, start_worker
 from dhkit.grading.report import GradeReport
 from dhkit.grading.reports.json import report_of
 from dhkit.grading.sheets import Sheet
@@ -56,7 +56,7 @@ def grade_all(
     jobs
         Number of processes at once.
     seconds
-        Wall-clock time for each sheet, s.
+        Processor time for each sheet, s; on the clock a sheet may take four times as long.
     memory
         Address space for each sheet beyond what this process has, bytes (Linux; elsewhere address space in all).
     prepare
@@ -201,7 +201,7 @@ class _Pool:
             return report_of(bytes(received))
         except ValueError:
             fault = "the judge's answer cannot be read" if received else "the judge gave no answer"
-        if -status in (signal.SIGXCPU, signal.SIGALRM):
+        if is_late(status):
             fault = self.limits.late
         elif status:
             fault = f"the judge stopped: {_signal_name(-status) if status < 0 else f'status {status}'}"

@@ -26,8 +26,15 @@ PIPE_BYTES = 1 << 18
 """Bytes that are read from a pipe at once."""
 MAX_FILES = 65_536
 """Highest number of a file that is closed in a new process."""
+WAITING_FACTOR = 4.0
+"""Longest time on the clock, as a multiple of the limit of processor time.
+
+On a busy machine a process waits for its turns, which must not change what is found; one that sleeps ends all the same.
+"""
 GRACE = 5.0
 """Time that a process may outlive its limit, s: its parent has died then and does not end it."""
+TIME_SIGNALS = ("SIGXCPU", "SIGALRM", "SIGPROF")
+"""Signals that end a process which exceeds its time."""
 
 
 @dataclass(frozen=True)
@@ -37,13 +44,18 @@ class Limits:
     Attributes
     ----------
     seconds
-        Wall-clock time, s.
+        Processor time, s, and a quarter of the longest time on the clock.
     memory
         Address space beyond what the parent process has, bytes.
     """
 
     seconds: float
     memory: int
+
+    @property
+    def longest(self) -> float:
+        """Longest time on the clock, s."""
+        return WAITING_FACTOR * self.seconds
 
     @property
     def late(self) -> str:
@@ -120,7 +132,7 @@ def start_worker(work: Callable[[], bytes], limits: Limits) -> Worker:
     with contextlib.suppress(OSError):  # the child does the same: either may be first
         os.setpgid(pid, pid)
     now = time.monotonic()
-    return Worker(pid, pipe, now, now + limits.seconds)
+    return Worker(pid, pipe, now, now + limits.longest)
 
 
 def result_of(work: Callable[[], bytes], limits: Limits) -> bytes:
@@ -145,10 +157,17 @@ def result_of(work: Callable[[], bytes], limits: Limits) -> bytes:
                 raise TimeoutError(limits.late)
             is_complete = worker.read()
     finally:
-        worker.end()
+        status = worker.end()
+    if is_late(status):
+        raise TimeoutError(limits.late)
     if not worker.received:
         raise ChildProcessError("the process ended without a result")
     return bytes(worker.received)
+
+
+def is_late(status: int) -> bool:
+    """Return whether a process exceeded its time, given its status, -k for signal k."""
+    return -status in [getattr(signal, name) for name in TIME_SIGNALS]
 
 
 def _run(end: int, work: Callable[[], bytes], limits: Limits) -> NoReturn:
@@ -163,7 +182,8 @@ def _run(end: int, work: Callable[[], bytes], limits: Limits) -> NoReturn:
         _close_files(end)
         _set_limits(limits)
         text = memoryview(work())
-        signal.setitimer(signal.ITIMER_REAL, 0.0)  # the parent may be busy with other reports
+        for timer in (signal.ITIMER_REAL, signal.ITIMER_PROF):
+            signal.setitimer(timer, 0.0)  # the parent may be busy with other reports
         while text:
             text = text[os.write(end, text) :]
         status = 0
@@ -186,8 +206,12 @@ def _close_files(end: int) -> None:
 def _set_limits(limits: Limits) -> None:
     import resource
 
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    signal.setitimer(signal.ITIMER_REAL, limits.seconds + GRACE)
+    for number, timer, longest in (
+        (signal.SIGALRM, signal.ITIMER_REAL, limits.longest + GRACE),
+        (signal.SIGPROF, signal.ITIMER_PROF, limits.seconds),
+    ):
+        signal.signal(number, signal.SIG_DFL)
+        signal.setitimer(timer, longest)
     seconds = math.ceil(limits.seconds) + 1
     memory = limits.memory + _address_space()
     for kind, soft, hard in (

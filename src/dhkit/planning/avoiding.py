@@ -7,7 +7,6 @@ the planes turn, until the cost no longer falls.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
@@ -22,9 +21,10 @@ from dhkit.planning.collision_avoidance import Clearance
 from dhkit.planning.joint_limits import Limit
 from dhkit.planning.motion_program import MotionProgram
 from dhkit.planning.obstacles import Gaps, PathSampler, Separation
-from dhkit.planning.search import Excess, PlannedMotion, Search, TimeLimitError
+from dhkit.planning.search import Excess, PlannedMotion, Search
 from dhkit.planning.task import Margins, Task
 from dhkit.planning.variables import Knots
+from dhkit.planning.work import SearchLimitError
 from dhkit.trajectories import Trajectory
 
 POINTS = 9
@@ -139,8 +139,8 @@ class AvoidingSearch:
                     best = found if best is None or found.cost < best.cost else best
                 if best is not None:
                     break
-        except TimeLimitError:
-            when = " within the time limit"
+        except SearchLimitError:
+            when = f" within {search.work.limit_text}"
         else:
             when = ""
         best = best or self._slowed_path()
@@ -154,7 +154,7 @@ class AvoidingSearch:
         for path in paths:
             corners = np.vstack([path[0][:1], *(leg[1:] for leg in path)])
             task = replace(self.task, points=corners)
-            failure = self.search.failure or PlanningError("no motion found within the time limit")
+            failure = self.search.failure or PlanningError(f"no motion found within {self.search.work.limit_text}")
             slow = PlannedMotion.slowed_straight(task, self.program.mesh.intervals, failure)
             if slow is not None:
                 return slow
@@ -213,14 +213,12 @@ class AvoidingSearch:
             return free
 
         sampler = PathSampler(
-            is_free, lower, upper, self._speed / self._speed.mean(), seed, self.search.deadline, samples
+            is_free, lower, upper, self._speed / self._speed.mean(), seed, self.search.work, samples
         )
         path = []
         for start, goal in zip(task.points[:-1], task.points[1:], strict=True):
             leg = sampler.path(start, goal)
             if leg is None:
-                if time.perf_counter() > self.search.deadline:
-                    raise TimeLimitError
                 return None
             path.append(sampler.shortened(leg))
         return path

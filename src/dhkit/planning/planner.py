@@ -42,10 +42,11 @@ from dhkit.planning.request import (
     end_velocity,
     smoothed,
 )
-from dhkit.planning.search import RESOLUTION, PlannedMotion, Search, Work, coarser, report_of
+from dhkit.planning.search import RESOLUTION, PlannedMotion, Search, coarser, report_of
 from dhkit.planning.solver import ProgressCall, delayed_interrupts
 from dhkit.planning.states import prepare
 from dhkit.planning.task import Task
+from dhkit.planning.work import MAX_ITERATIONS, Work
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 from dhkit.trajectories.timing import check_duration
@@ -155,7 +156,8 @@ class Planner:
         clearance: float = 0.01,
         self_collision: bool = False,
         warm: Trajectory | None = None,
-        time_limit: float = 10.0,
+        max_iterations: int = MAX_ITERATIONS,
+        time_limit: float | None = None,
         progress: ProgressCall | None = None,
         compare: bool = False,
     ) -> Trajectory:
@@ -185,8 +187,12 @@ class Planner:
             Whether links keep the clearance from each other too.
         warm
             A similar motion, as the initial guess.
+        max_iterations
+            Limit of the search, iterations of the optimizer in all solutions for all branches. When it is reached, the
+            search raises, or returns the best motion found so far. 250 states that are tested for collisions while
+            paths are sampled count as one iteration.
         time_limit
-            Time limit, s, after which the search raises, or returns the best motion of the branches solved so far.
+            A limit of time, s, besides. With it the result depends on the speed and the load of the machine.
         progress
             Called once in each iteration; an exception in it ends the search.
         compare
@@ -199,9 +205,9 @@ class Planner:
         ValueError, TypeError
             Arguments of another shape or type.
         """
-        began = time.perf_counter()
+        work = Work.limited(max_iterations, time_limit)
         description = self.description
-        check_options(description, payload, warm, time_limit, progress)
+        check_options(description, payload, warm, progress)
         check_duration(duration)
         places = parse_places(description, start, via, goal)
         request = PlanRequest(
@@ -217,15 +223,14 @@ class Planner:
                 require_inside_limits(description, request.limits, place.q, place.name)
         routes = find_routes(description, request.limits, places)
         require_possible(description, self.objective, self.constraints, request, places, routes)
-        deadline = began + time_limit
         try:
-            task, best, branches, work = self._best(request, routes, warm, deadline, progress)
+            task, best, branches = self._best(request, routes, warm, work, progress)
         except PlanningError as error:
-            raise self._with_reason(error, request, routes, deadline) from None
-        report = replace(report_of(task, best, work, began), branches=branches)
+            raise self._with_reason(error, request, routes, work) from None
+        report = replace(report_of(task, best, work), branches=branches)
         is_choice = task.duration is None or not self.objective.only_time
         if compare and best.is_resolved and is_choice:
-            report = replace(report, classical=classical_motions(task), coarse=self._coarse(task, best, deadline))
+            report = replace(report, classical=classical_motions(task), coarse=self._coarse(task, best, work))
         return replace(best.trajectory, report=report, payload=payload, friction=self.friction)
 
     def solve_many(
@@ -341,16 +346,17 @@ class Planner:
         request: PlanRequest,
         routes: Sequence[Route],
         warm: Trajectory | None,
-        deadline: float,
+        work: Work,
         progress: ProgressCall | None,
-    ) -> tuple[Task, PlannedMotion, tuple[BranchReport, ...], Work]:
-        """Return the best motion of all routes with its task, the branches' reports, and the work for all of them."""
+    ) -> tuple[Task, PlannedMotion, tuple[BranchReport, ...]]:
+        """Return the best motion of all routes with its task, and the branches' reports; count the work."""
         best: tuple[Task, PlannedMotion] | None = None
         failure: PlanningError | None = None
-        reports, work, chosen = list[BranchReport](), Work(), -1
+        reports = list[BranchReport]()
+        chosen = -1
         for number, route in enumerate(routes):
             hopeless = best is not None and self.objective.only_time and route.bound >= best[1].trajectory.duration
-            if hopeless or (best is not None and time.perf_counter() > deadline):
+            if hopeless or (best is not None and work.is_over):
                 reports.append(BranchReport(route.label, route.bound, solved=False))
                 continue
             try:
@@ -359,7 +365,7 @@ class Planner:
                     for k, point in enumerate(route.points[1:], start=1):
                         require_place(self.description, request, point, "goal" if k == last else f"via {k}")
                 task = self._task(request, route.points)
-                task, found = self._route_motion(task, warm, deadline, progress, work)
+                task, found = self._route_motion(task, warm, work, progress)
             except PlanningError as error:
                 failure = failure or error
                 reports.append(BranchReport(route.label, float("inf"), solved=True, reason=str(error)))
@@ -374,10 +380,10 @@ class Planner:
         reports_of_branches = (
             tuple(replace(report, chosen=k == chosen) for k, report in enumerate(reports)) if len(routes) > 1 else ()
         )
-        return *best, reports_of_branches, work
+        return *best, reports_of_branches
 
     def _route_motion(
-        self, task: Task, warm: Trajectory | None, deadline: float, progress: ProgressCall | None, work: Work
+        self, task: Task, warm: Trajectory | None, work: Work, progress: ProgressCall | None
     ) -> tuple[Task, PlannedMotion]:
         """Return the best motion of a task, with the task whose clearance it keeps, and count the work."""
         if task.rests and task.span < RESOLUTION:
@@ -386,7 +392,7 @@ class Planner:
             program, seconds = self.program(task, attempt)
             work.build_seconds += seconds
             is_last = attempt == count - 1
-            search = Search(task.without_obstacles, program, deadline, work, progress, is_last)
+            search = Search(task.without_obstacles, program, work, progress, is_last)
             try:
                 found = replace(search(warm), attempt=attempt)
 
@@ -397,7 +403,7 @@ class Planner:
 
                 return motion_around(task, found, search, program, finer, warm)
             except PlanningError as error:
-                if is_last or time.perf_counter() > deadline:
+                if is_last or work.is_over:
                     slow = None
                     if task.checker.constraints:  # which may leave the optimizer a flat objective
                         slow = PlannedMotion.slowed_straight(task, program.intervals, error)
@@ -407,10 +413,10 @@ class Planner:
         raise AssertionError("no curve")
 
     def _with_reason(
-        self, error: PlanningError, request: PlanRequest, routes: Sequence[Route], deadline: float
+        self, error: PlanningError, request: PlanRequest, routes: Sequence[Route], work: Work
     ) -> PlanningError:
         """Return the error for a motion that was not found: a duration below that of the fastest motion, if so."""
-        if time.perf_counter() > deadline or request.duration is None or len(routes) > 1:
+        if work.is_over or request.duration is None or len(routes) > 1:
             return error
         quickest = Planner(
             self.description, "time", request.limits, self.constraints, MIN_DEFAULT_INTERVALS, self.friction or False
@@ -418,7 +424,7 @@ class Planner:
         try:
             task = quickest._task(replace(request, duration=None), routes[0].points)
             program, _ = quickest.program(quick := task.without_obstacles)
-            least = Search(quick, program, deadline, Work())().trajectory.duration
+            least = Search(quick, program, work)().trajectory.duration
         except PlanningError:
             return error
         if least <= request.duration * (1 + DURATION_TOLERANCE):
@@ -428,9 +434,9 @@ class Planner:
             f"{' without the obstacles' * bool(request.avoidance)} takes {least:.6g} s"
         )
 
-    def _coarse(self, task: Task, best: PlannedMotion, deadline: float) -> tuple[int, float] | None:
+    def _coarse(self, task: Task, best: PlannedMotion, work: Work) -> tuple[int, float] | None:
         # Among obstacles a coarser mesh may lead around them on another side.
         if task.avoidance or self.intervals_for(task) <= MIN_LEG_INTERVALS:
             return None
         program, _ = self.program(task, best.attempt, scale=0.5)
-        return coarser(Search(task.without_obstacles, program, deadline, Work()), best.trajectory)
+        return coarser(Search(task.without_obstacles, program, work), best.trajectory)

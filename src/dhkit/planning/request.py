@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,20 +37,16 @@ class PlanRequest:
         return not {"start": self.start_velocity, "goal": self.goal_velocity}.get(name, np.ones(1)).any()
 
 
-def check_options(
-    description: Description, payload: object, warm: object, time_limit: object, progress: object
-) -> None:
+def check_options(description: Description, payload: object, warm: object, progress: object) -> None:
     """Check the types of arguments of a search.
 
     Raises
     ------
-    ValueError, TypeError
+    TypeError
         Says which is not as expected.
     DescriptionError
         ``warm`` is a motion of another robot.
     """
-    if not isinstance(time_limit, Real) or not float(time_limit) > 0:
-        raise ValueError(f"time_limit is {time_limit!r}; expected a positive number, s")
     if payload is not None and not isinstance(payload, Payload):
         raise TypeError(f"payload is {payload!r}; expected Payload(mass, com, inertia)")
     if progress is not None and not callable(progress):

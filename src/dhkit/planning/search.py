@@ -16,9 +16,10 @@ from dhkit.planning.guess import leg_durations, straight_motion
 from dhkit.planning.joint_limits import Limit
 from dhkit.planning.program import Iterate, Program, Starts, row_bounds, worst_row
 from dhkit.planning.report import PlanReport
-from dhkit.planning.solver import ProgressCall, Solution, Stopped
+from dhkit.planning.solver import ProgressCall, Solution
 from dhkit.planning.states import States
 from dhkit.planning.task import Margins, Task
+from dhkit.planning.work import SearchLimitError, Work
 from dhkit.trajectories import Trajectory, quintic
 
 FEASIBILITY_TOLERANCE = 1e-5
@@ -106,26 +107,14 @@ class PlannedMotion:
         return cls(trajectory, certificate, cost, intervals, is_converged=False, failure=str(failure))
 
 
-@dataclass
-class Work:
-    """Work of all searches for one motion, of failed branches too."""
-
-    iterations: int = 0
-    solves: int = 0
-    build_seconds: float = 0.0
-    """Time for making programs, s."""
-
-
 @dataclass(eq=False)
 class Search(Generic[Iterate]):
     """The search for one motion."""
 
     task: Task
     program: Program[Iterate]
-    deadline: float
-    """Time at which the search ends, on the clock of ``time.perf_counter``, s."""
     work: Work
-    """Counts the solutions and iterations."""
+    """Counts the solutions and iterations, and says when the search ends."""
     progress: ProgressCall | None = None
     is_last: bool = True
     """Whether no other curve of accelerations is tried after this search."""
@@ -144,7 +133,7 @@ class Search(Generic[Iterate]):
         Raises
         ------
         PlanningError
-            No start converges, limits stay exceeded, or the time is over.
+            No start converges, limits stay exceeded, or the limit of the work is reached.
         """
         try:
             for guess, found, last in self._solutions(starts or self.program.starts(self.task, warm)):
@@ -153,15 +142,15 @@ class Search(Generic[Iterate]):
                     return self._certify(guess, found)
                 except PlanningError as error:
                     self.keep_first_failure(error)
-        except TimeLimitError:
+        except SearchLimitError as limit:
             count = f"{self.tried} start{'s' * (self.tried > 1)}"
             reason = f"; the first: {self.failure}" if self.failure else ""
-            raise PlanningError(f"no motion found within the time limit, in {count}{reason}") from None
+            raise PlanningError(f"{limit}, in {count}{reason}") from None
         raise self.failure or PlanningError("no motion found")
 
     def keep_first_failure(self, error: PlanningError) -> None:
-        """Remember the first failure of several starts; the end of the time is raised again."""
-        if isinstance(error, TimeLimitError):
+        """Remember the first failure of several starts; the limit of the search is raised again."""
+        if isinstance(error, SearchLimitError):
             raise error
         self.failure = self.failure or error
 
@@ -180,7 +169,7 @@ class Search(Generic[Iterate]):
             try:
                 found = self.solution(guess)
             except PlanningError as error:
-                if solved and isinstance(error, TimeLimitError):
+                if solved and isinstance(error, SearchLimitError):
                     break
                 self.keep_first_failure(error)
                 continue
@@ -213,7 +202,7 @@ class Search(Generic[Iterate]):
         """Return a solution with other margins from the last one and its multipliers; None if it did not converge."""
         try:
             return self.solution(guess, margins, warm=self._last)
-        except TimeLimitError:
+        except SearchLimitError:
             raise
         except PlanningError:
             return None
@@ -299,13 +288,9 @@ class Search(Generic[Iterate]):
         given, rows = program.arguments(task, guess, margins), row_bounds(task, program.blocks, margins)
         self.tried += 1
         self.work.solves += 1
-        try:
-            solution = program.solver(
-                given.x, given.parameters, given.bounds, rows, self.deadline, self.progress, given.scaling, warm
-            )
-        except Stopped:
-            raise TimeLimitError from None
-        self.work.iterations += solution.iterations
+        solution = program.solver(
+            given.x, given.parameters, given.bounds, rows, self.work, self.progress, given.scaling, warm
+        )
         # A feasible motion that is not optimal is better than none: friction and absolute powers have kinks.
         is_usable = solution.converged or (self.is_last and solution.infeasibility <= UNCONVERGED_TOLERANCE)
         if is_usable and solution.infeasibility <= FEASIBILITY_TOLERANCE:
@@ -331,12 +316,8 @@ class Excess:
     certificate: Certificate
 
 
-class TimeLimitError(PlanningError):
-    """The time limit was reached."""
-
-
-def report_of(task: Task, best: PlannedMotion, work: Work, began: float) -> PlanReport:
-    """Return the report of a task's motion; ``began`` is the time at which the search began, s."""
+def report_of(task: Task, best: PlannedMotion, work: Work) -> PlanReport:
+    """Return the report of a task's motion."""
     arm = task.arm
     return PlanReport(
         objective=str(task.objective),
@@ -351,7 +332,7 @@ def report_of(task: Task, best: PlannedMotion, work: Work, began: float) -> Plan
         iterations=work.iterations,
         solves=work.solves,
         build_seconds=work.build_seconds,
-        solve_seconds=time.perf_counter() - began - work.build_seconds,
+        solve_seconds=time.perf_counter() - work.began - work.build_seconds,
         slow_down=best.slow_down,
         tightened=best.tightened,
         unlimited=task.limits.unlimited,
@@ -363,8 +344,8 @@ def report_of(task: Task, best: PlannedMotion, work: Work, began: float) -> Plan
 
 
 def coarser(search: Search[Iterate], motion: Trajectory) -> tuple[int, float] | None:
-    """Return the number of intervals of a coarser program and the cost of its motion; None if time has run out."""
-    if time.perf_counter() > search.deadline:
+    """Return the number of intervals of a coarser program and the cost of its motion; None if the limit is reached."""
+    if search.work.is_over:
         return None
     try:
         found = search(motion)

@@ -1,4 +1,4 @@
-"""Ipopt with options chosen by measurement, and a callback for progress, time limits and interruption."""
+"""Ipopt with options chosen by measurement, and a callback for progress, limits and interruption."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.display import value_line
 from dhkit.planning.blocks import BlockProgram, Scaling
+from dhkit.planning.work import Work
 
 if TYPE_CHECKING:
     import casadi
@@ -66,16 +67,14 @@ class Progress:
     """Largest violation of a row's bounds."""
     seconds: float
     """Time since the solution began, s."""
+    spent: float
+    """Share of the search's limit that is spent, with earlier solutions, 0 to 1."""
 
     __repr__ = value_line
 
 
 ProgressCall: TypeAlias = Callable[[Progress], object]
 """Callback in each iteration; an exception in it ends the solution."""
-
-
-class Stopped(Exception):  # noqa: N818 (not an error of the caller)
-    """The deadline passed during a solution."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +124,7 @@ class Solver:
         parameters: Array,
         x_bounds: tuple[Array, Array],
         g_bounds: tuple[Array, Array],
-        deadline: float,
+        work: Work,
         progress: ProgressCall | None = None,
         scaling: Scaling | None = None,
         warm: Solution | None = None,
@@ -138,20 +137,20 @@ class Solver:
             A solution with other bounds in the same units, to start from in place of x0.
         scaling
             Units in which tolerances hold.
-        deadline
-            Time at which to stop, on the clock of ``time.perf_counter``, s.
+        work
+            Counts the iterations, and says when to stop.
 
         Raises
         ------
-        Stopped
-            The deadline has passed.
+        SearchLimitError
+            The limit of the work was reached.
         """
         units = scaling or self._unscaled
         lbx, ubx = (units.scaled(bound) for bound in x_bounds)
         lbg, ubg = (bound / units.row_unit for bound in g_bounds)
         p = np.concatenate([parameters, units.vector])
         with self._turn, delayed_interrupts() as interrupts:
-            self._watch.begin((lbg, ubg), units, deadline, progress, interrupts)
+            self._watch.begin((lbg, ubg), units, work, progress, interrupts)
             given = {"x0": units.scaled(x0), "p": p, "lbx": lbx, "ubx": ubx, "lbg": lbg, "ubg": ubg}
             function = self._cold
             if warm is not None:
@@ -227,12 +226,12 @@ def _watch(nx: int, ng: int, np_: int, legs: int) -> Any:
             self,
             bounds: tuple[Array, Array],
             units: Scaling,
-            deadline: float,
+            work: Work,
             progress: ProgressCall | None,
             interrupts: list[BaseException],
         ) -> None:
             self.bounds, self.units = bounds, units
-            self.deadline, self.progress, self.interrupts = deadline, progress, interrupts
+            self.work, self.progress, self.interrupts = work, progress, interrupts
             self.started, self.iteration, self.raised = time.perf_counter(), 0, None
 
         def end(self) -> BaseException | None:
@@ -251,17 +250,18 @@ def _watch(nx: int, ng: int, np_: int, legs: int) -> Any:
 
         def eval(self, arguments: Any) -> list[int]:
             self.iteration += 1
-            now = time.perf_counter()
+            # The first call is before the first iteration.
+            self.work.iterations += self.iteration > 1
             try:
-                if now > self.deadline:
-                    raise Stopped
+                self.work.require_left()
                 if self.interrupts:
                     return [1]
                 if self.progress is not None:
                     values = dict(zip(casadi.nlpsol_out(), arguments, strict=True))
                     duration = float(self.units.variables(np.array(values["x"]).ravel())[:legs].sum())
                     misses = _outside(np.array(values["g"]).ravel(), *self.bounds)
-                    self.progress(Progress(self.iteration - 1, duration, misses, now - self.started))
+                    seconds = time.perf_counter() - self.started
+                    self.progress(Progress(self.iteration - 1, duration, misses, seconds, self.work.spent))
             except BaseException as error:  # Ipopt would discard it, KeyboardInterrupt too
                 self.raised = error
                 return [1]

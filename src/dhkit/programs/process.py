@@ -35,6 +35,11 @@ EXIT_DELAY = 0.3
 """Longest time from the end of a program's answers to its own end, s."""
 WATCH_PERIOD = 0.05
 """Time between two looks at memory and processes, s."""
+WAITING_FACTOR = 4.0
+"""Longest time of a call on the clock, as a multiple of the limit of processor time.
+
+On a busy machine a program waits for its turns, which must not change its score; one that sleeps ends all the same.
+"""
 MAX_END_TIME = 5.0
 """Longest time that the supervisor may take to end the processes that a program started, s."""
 
@@ -82,13 +87,48 @@ class Limits:
     Attributes
     ----------
     seconds
-        Longest time of one call, s.
+        Processor time of one call, s; on the clock it may take four times as long.
     memory
         Largest memory of all its processes together, bytes.
     """
 
     seconds: float = 5.0
     memory: int = 1 << 30
+
+
+class CallTime:
+    """Time that a call has taken.
+
+    Parameters
+    ----------
+    process
+        The process that is called.
+    seconds
+        Limit of its processor time, s.
+    """
+
+    def __init__(self, process: Process, seconds: float) -> None:
+        self.seconds = seconds
+        self._process = process
+        self._begun, self._processor_begun = time.monotonic(), process.processor_time
+
+    @property
+    def on_the_clock(self) -> float:
+        """Time since the call began, s."""
+        return time.monotonic() - self._begun
+
+    def left(self) -> float:
+        """Return the shortest time after which the call may be late, s; 0 where it is late."""
+        on_the_clock = WAITING_FACTOR * self.seconds - self.on_the_clock
+        processor = self.seconds - (self._process.processor_time - self._processor_begun)
+        return max(0.0, min(on_the_clock, processor))
+
+    @property
+    def late(self) -> str:
+        """Message on a call that is late."""
+        if self.on_the_clock < WAITING_FACTOR * self.seconds:
+            return f"no answer within {self.seconds:g} s of processor time"
+        return f"no answer within {WAITING_FACTOR * self.seconds:g} s"
 
 
 class Process:
@@ -113,7 +153,10 @@ class Process:
         except BaseException:
             self._folder.cleanup()
             raise
+        self.processor_time = 0.0
+        """Processor time of all processes of the program, when the watch last looked, s."""
         self._descendants: dict[int, psutil.Process] = {}
+        self._processor_times: dict[int, float] = {}
         self._lines: queue.Queue[bytes | None] = queue.Queue(MAX_UNREAD_ANSWERS)
         self._output = bytearray()
         self._closed = threading.Event()
@@ -130,43 +173,51 @@ class Process:
         self._count += 1
         return self._count
 
-    def write(self, line: bytes, deadline: float, seconds: float) -> None:
+    def write(self, line: bytes, call: CallTime) -> None:
         """Send a request; to a process that has ended, nothing is sent.
 
         Raises
         ------
         ProgramError
-            The request is not read by the deadline, which is ``seconds`` after its beginning.
+            The request is not read in time.
         """
         with suppress(BrokenPipeError):
             while line:
-                left = deadline - time.monotonic()
-                if left <= 0 or not select.select([], [self._requests], [], left)[1]:
-                    raise self._error(Failure.LATE, seconds)
-                with suppress(BlockingIOError):
-                    line = line[os.write(self._requests, line) :]
+                left = call.left()
+                if left == 0:
+                    raise self._error(Failure.LATE, call)
+                if select.select([], [self._requests], [], left)[1]:
+                    with suppress(BlockingIOError):
+                        line = line[os.write(self._requests, line) :]
 
-    def read(self, deadline: float, seconds: float) -> dict[str, object]:
-        """Return the next answer, which must come by the deadline, ``seconds`` after the beginning of the wait.
+    def read(self, call: CallTime) -> dict[str, object]:
+        """Return the next answer to a call.
 
         Raises
         ------
         ProgramError
             The answer does not come in time or is no JSON object, or the process has ended.
         """
-        try:
-            line = self._lines.get(timeout=max(0.0, deadline - time.monotonic()))
-        except queue.Empty:
-            raise self._error(Failure.LATE, seconds) from None
+        line = self._next_line(call)
         if line is None:
-            raise self._error(Failure.ENDED, seconds)
+            raise self._error(Failure.ENDED, call)
         try:
             message = json.loads(line)
         except (ValueError, RecursionError):
             message = None
         if not isinstance(message, dict):
-            raise self._error(Failure.GARBAGE, seconds)
+            raise self._error(Failure.GARBAGE, call)
         return message
+
+    def _next_line(self, call: CallTime) -> bytes | None:
+        """Return the next line of the answers; None if no more come."""
+        while True:
+            left = call.left()
+            try:
+                return self._lines.get(timeout=left)
+            except queue.Empty:
+                if left == 0:
+                    raise self._error(Failure.LATE, call) from None
 
     def output(self) -> str:
         """Return the last part of the printed output."""
@@ -219,11 +270,11 @@ class Process:
             os.close(requests)
             os.close(answers)
 
-    def _error(self, failure: Failure, seconds: float) -> ProgramError:
+    def _error(self, failure: Failure, call: CallTime) -> ProgramError:
         """Note a failure, unless another was noted before, and return its error."""
         self.failure = self.failure or failure
         texts: dict[Failure, str] = {
-            Failure.LATE: f"no answer within {seconds:g} s",
+            Failure.LATE: call.late,
             Failure.MEMORY: f"needed more than {self._limits.memory / (1 << 30):.3g} GB of memory",
             Failure.PROCESSES: f"started more than {MAX_PROCESSES} processes",
             Failure.ENDED: f"the program ended{self._exit_status_text()}",
@@ -266,15 +317,18 @@ class Process:
                 del self._output[:-MAX_OUTPUT_BYTES]
 
     def _watch(self) -> None:
-        """Watch the memory and the number of processes, and end the process beyond its limits."""
+        """Watch processor time, memory and number of the processes, and end the process beyond its limits."""
         while not self._closed.wait(WATCH_PERIOD):
             self._find_descendants()
             memory = 0
             for process in list(self._descendants.values()):
                 try:
                     memory += process.memory_info().rss
+                    times = process.cpu_times()
+                    self._processor_times[process.pid] = times.user + times.system
                 except psutil.Error:
                     self._descendants.pop(process.pid, None)
+            self.processor_time = sum(self._processor_times.values())
             if (self._process.poll() or 0) < 0:  # the program has killed its supervisor
                 self.failure = self.failure or Failure.ENDED
                 self._kill_descendants()

@@ -8,7 +8,6 @@ import os
 import shutil
 import sys
 import threading
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +16,7 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.display import repr_line
-from dhkit.programs.process import HERE, Failure, Limits, Process, ProgramError, printable
+from dhkit.programs.process import HERE, CallTime, Failure, Limits, Process, ProgramError, printable
 
 if TYPE_CHECKING:
     from dhkit.control import Setpoint
@@ -28,7 +27,7 @@ MAX_SOURCE_BYTES = 1_000_000
 MAX_SOLUTIONS = 64
 """Most solutions of a pose: no arm of six joints has more than 16."""
 MAX_START_TIME = 30.0
-"""Longest time from the start to the first line, s: importing numpy on a busy machine takes some seconds."""
+"""Processor time from the start to the first line, s: importing numpy may take some seconds."""
 
 
 class Program:
@@ -191,23 +190,23 @@ class Program:
     def _answer_to(self, running: Process, request: dict[str, object]) -> dict[str, object]:
         number = running.next_number()
         # Octave reads one character beyond a line, here of the empty line behind it.
-        line, seconds = json.dumps({"id": number, **request}).encode() + b"\n\n", self.limits.seconds
+        line = json.dumps({"id": number, **request}).encode() + b"\n\n"
         try:
-            running.write(line, time.monotonic() + seconds, seconds)
+            running.write(line, CallTime(running, self.limits.seconds))
         except ProgramError:
             self._end(keep=True)
             raise
 
         # Late answers to earlier requests are passed over.
-        return self._read_until(running, seconds, lambda message: message.get("id") == number)
+        return self._read_until(running, self.limits.seconds, lambda message: message.get("id") == number)
 
     def _read_until(
         self, running: Process, seconds: float, is_answer: Callable[[dict[str, object]], bool]
     ) -> dict[str, object]:
-        deadline = time.monotonic() + seconds
+        call = CallTime(running, seconds)
         while True:
             try:
-                message = running.read(deadline, seconds)
+                message = running.read(call)
             except ProgramError:
                 self._end(keep=True)
                 raise

@@ -261,19 +261,19 @@ def test_reserved_names_and_wrong_types_are_said(file):
 
 @pytest.mark.parametrize("count", [33, 200, 498])
 def test_too_many_joints_are_refused_at_once(count, file):
-    path, begin = file(chain(count)), time.perf_counter()
+    path, begin = file(chain(count)), time.process_time()
     with pytest.raises(ModelError, match=f"{count} joints; expected 1 to 32"):
         extract_dh(path)
-    assert time.perf_counter() - begin < 5
+    assert time.process_time() - begin < 5
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
 @pytest.mark.parametrize("rpy", ["0 0 0", "0.3 0.2 0.1"])
 def test_long_chains_are_read_within_bounds(kind, rpy, file):
-    path, begin = file(chain(16, kind, rpy=rpy)), time.perf_counter()
+    path, begin = file(chain(16, kind, rpy=rpy)), time.process_time()
     assert extract_dh(path).residual.tool < 1e-9
-    assert time.perf_counter() - begin < 20
+    assert time.process_time() - begin < 20
 
 
 def test_notes_are_bounded(file):

@@ -358,7 +358,8 @@ LINGERS = JointPath(ARM, [0, 1], [[[0, 0], [0, 0], [3, 3], [-2, -2]]])
         (BEND, {"limits": Limits.of(ARM, jerk=9.0)}, "curvature jumps at s = 0.5, where joint .* infinite jerk"),
         (SHORT, {"limits": Limits.of(ARM, torque=np.inf)}, "nothing limits acceleration"),
         (SHORT, {"objective": "effort", "duration": 1e-2}, "0.01 s are too short: .* in "),
-        (SHORT, {"time_limit": 1e-9}, "time limit"),
+        (SHORT, {"max_iterations": 2}, "within 2 iterations, in 1 start"),
+        (SHORT, {"time_limit": 1e-9}, "within 2000 iterations and 1e-09 s"),
         (SHORT, {"constraints": [ToolOrientation(0.1)]}, "tool orientation is exceeded"),
     ],
 )

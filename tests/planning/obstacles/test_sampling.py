@@ -1,12 +1,12 @@
 """Sampled paths: free from end to end, short, and the same for the same seed."""
 
-import time
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from dhkit.planning.obstacles import PathSampler
+from dhkit.planning.work import STATES_PER_ITERATION, SearchLimitError, Work
 
 LOWER, UPPER = -np.ones(2), np.ones(2)
 
@@ -16,8 +16,8 @@ def wall(q):
     return ~((np.abs(q[:, 0]) < 0.1) & (q[:, 1] < 0.7))
 
 
-def sampler(seed=0, is_free=wall, **options):
-    return PathSampler(is_free, LOWER, UPPER, np.ones(2), seed, **options)
+def sampler(seed=0, is_free=wall, work=None, **options):
+    return PathSampler(is_free, LOWER, UPPER, np.ones(2), seed, work or Work(), **options)
 
 
 def dense(path):
@@ -49,8 +49,14 @@ def test_where_there_is_no_path_it_ends():
     assert closed.path(np.array([-0.8, 0.0]), np.array([0.8, 0.0])) is None
 
 
-def test_the_deadline_is_kept():
-    closed = sampler(is_free=lambda q: np.abs(q[:, 0]) > 0.1, deadline=time.perf_counter() + 0.05)
-    began = time.perf_counter()
-    assert closed.path(np.array([-0.8, 0.0]), np.array([0.8, 0.0])) is None
-    assert time.perf_counter() - began < 5
+def test_the_limit_of_work_is_kept():
+    work, tested = Work(max_iterations=10), []
+
+    def is_free(q):
+        tested.append(len(q))
+        return np.abs(q[:, 0]) > 0.1
+
+    with pytest.raises(SearchLimitError, match="^no motion found within 10 iterations$"):
+        sampler(is_free=is_free, work=work).path(np.array([-0.8, 0.0]), np.array([0.8, 0.0]))
+    assert work.states == sum(tested)
+    assert 0 <= work.states - 10 * STATES_PER_ITERATION < 2 * max(tested)

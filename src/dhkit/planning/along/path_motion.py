@@ -27,9 +27,10 @@ from dhkit.planning.objectives import Objective, ObjectiveLike
 from dhkit.planning.obstacles import Scene
 from dhkit.planning.program import Starts
 from dhkit.planning.request import check_options, checked_constraints, checked_limits, smoothed
-from dhkit.planning.search import TIME_SCALING_MARGIN, PlannedMotion, Search, Work, report_of
+from dhkit.planning.search import TIME_SCALING_MARGIN, PlannedMotion, Search, report_of
 from dhkit.planning.solver import ProgressCall
 from dhkit.planning.task import Task
+from dhkit.planning.work import MAX_ITERATIONS, Work
 from dhkit.symbolic import Friction
 from dhkit.trajectories import JointPath, Limits, Trajectory
 from dhkit.trajectories.timing import check_duration, default_limits
@@ -53,7 +54,8 @@ def along_path(
     limits: Limits | None = None,
     constraints: Constraint | Sequence[Constraint] = (),
     intervals: int = 200,
-    time_limit: float = 10.0,
+    max_iterations: int = MAX_ITERATIONS,
+    time_limit: float | None = None,
     progress: ProgressCall | None = None,
     payload: Payload | None = None,
     friction: bool | Friction = False,
@@ -84,8 +86,10 @@ def along_path(
         Further constraints, such as :class:`dhkit.planning.ToolSpeed`.
     intervals
         Initial number of intervals of s, which take about the same time each.
+    max_iterations
+        Limit of the search, iterations of the optimizer in all solutions together.
     time_limit
-        Time limit of all solutions together, s.
+        A limit of time, s, besides. With it the result depends on the speed and the load of the machine.
     progress
         Called once in each iteration.
     payload
@@ -124,11 +128,11 @@ def along_path(
     >>> bool(abs(slow.q(slow.duration) - [0.7, 0.2]).max() < 1e-9)
     True
     """
-    began = time.perf_counter()
+    work = Work.limited(max_iterations, time_limit)
     check_whole("intervals", intervals, MIN_INTERVALS)
     if intervals > MAX_INTERVALS:
         raise ValueError(f"intervals is {intervals!r}; expected a whole number from {MIN_INTERVALS} to {MAX_INTERVALS}")
-    check_options(description, payload, None, time_limit, progress)
+    check_options(description, payload, None, progress)
     if path.description.n != description.n:
         raise ValueError(
             f"the path has {path.description.n} joints; expected {description.n}, those of {description.name}"
@@ -147,15 +151,12 @@ def along_path(
     still = np.zeros(description.n)
     checker = Checker(arm, limits, constraints, parameters, chosen, avoidance, points=POINTS)
     task = Task(description, arm, wanted, path.q([0.0, 1.0]), still, still, duration, checker, path=path)
-    work, deadline = Work(), began + time_limit
-    found = _best_timing(task, intervals, work, deadline, progress)
-    report = report_of(task, found, work, began)
+    found = _best_timing(task, intervals, work, progress)
+    report = report_of(task, found, work)
     return replace(found.trajectory, description=description, report=report, payload=payload, friction=chosen)
 
 
-def _best_timing(
-    task: Task, intervals: int, work: Work, deadline: float, progress: ProgressCall | None
-) -> PlannedMotion:
+def _best_timing(task: Task, intervals: int, work: Work, progress: ProgressCall | None) -> PlannedMotion:
     """Return the best motion; objectives other than time start from the fastest one."""
     path, limits = cast("JointPath", task.path), task.limits
     rough = np.union1d(np.linspace(0.0, 1.0, intervals + 1), path.breaks)
@@ -163,7 +164,7 @@ def _best_timing(
     s = knots_of(path, intervals, rough, states.even_speeds(limits))
 
     def searched(task: Task, program: PathProgram[Profile], start: Profile | None) -> tuple[PlannedMotion, Profile]:
-        search = Search(task, program, deadline, work, progress)
+        search = Search(task, program, work, progress)
         starts = program.starts(task, None)
         if start is not None:
             starts = Starts([lambda: program.again(start, start), *starts.guesses])

@@ -5,13 +5,13 @@ Kuffner and LaValle 2000, RRT-Connect: An efficient approach to single-query pat
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
+from dhkit.planning.work import Work
 
 REACH = 1.0
 """Largest step towards a sample, as a share of the mean range of a joint."""
@@ -37,8 +37,8 @@ class PathSampler:
         Sizes of joint moves that count as equal, shape (n,), rad and m.
     seed
         Seed of the samples: other seeds find other paths.
-    deadline
-        Time at which to give up, on the clock of ``time.perf_counter``, s.
+    work
+        Counts the tested states, and says when to give up.
     samples
         Largest number of samples before the search gives up.
     """
@@ -50,21 +50,26 @@ class PathSampler:
         upper: Array,
         scale: Array,
         seed: int,
-        deadline: float = np.inf,
+        work: Work,
         samples: int = 4000,
     ) -> None:
         self.is_free, self.lower, self.upper, self.scale = is_free, lower, upper, scale
-        self.rng, self.deadline, self.samples = np.random.default_rng(seed), deadline, samples
+        self.rng, self.work, self.samples = np.random.default_rng(seed), work, samples
         self._step = REACH * float(np.mean((upper - lower) / scale))
 
     def path(self, start: Array, goal: Array) -> Array | None:
-        """Return configurations of a path, shape (k, n), or None if none was found in time."""
+        """Return configurations of a path, shape (k, n), or None if so many samples found none.
+
+        Raises
+        ------
+        SearchLimitError
+            The limit of the work was reached.
+        """
         if self.is_way_free(start, goal):
             return np.stack([start, goal])
         trees = _Tree(start, self.scale), _Tree(goal, self.scale)
         for turn in range(self.samples):
-            if time.perf_counter() > self.deadline:
-                return None
+            self.work.require_left()
             grown, other = trees[turn % 2], trees[1 - turn % 2]
             sample = self.rng.uniform(self.lower, self.upper)
             near = grown.nearest(sample)
@@ -83,7 +88,7 @@ class PathSampler:
     def shortened(self, path: Array) -> Array:
         """Return a path with detours cut off, by straight ways between random points of it."""
         for _ in range(SHORTCUTS):
-            if len(path) == 2 or time.perf_counter() > self.deadline:
+            if len(path) == 2 or self.work.is_over:
                 break
             lengths = np.linalg.norm(np.diff(path, axis=0) / self.scale, axis=1)
             along = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -100,12 +105,16 @@ class PathSampler:
 
     def is_way_free(self, start: Array, goal: Array) -> bool:
         """Return whether the straight way between two configurations is free."""
-        return bool(self.is_free(_way(start, goal)).all())
+        return bool(self._free(_way(start, goal)).all())
+
+    def _free(self, q: Array) -> NDArray[np.bool_]:
+        self.work.states += len(q)
+        return self.is_free(q)
 
     def _extend(self, tree: _Tree, near: int, target: Array) -> int | None:
         """Go straight to a target as far as the way is free; return the new node, or None if there is none."""
         way = _way(tree.nodes[near], target)
-        free = self.is_free(way)
+        free = self._free(way)
         count = len(way) if free.all() else int(np.argmin(free))
         return tree.add(way[count - 1] if count < len(way) else target, near) if count else None
 
