@@ -1,7 +1,6 @@
 """Jobs: the latest counts, and contacts of links are computed by one."""
 
 import threading
-import time
 
 import numpy as np
 import pytest

@@ -54,7 +54,9 @@ def grade(
     jobs: Annotated[
         int | None, typer.Option(min=1, max=1024, help="Number of processes; default: one for each core.")
     ] = None,
-    seconds: Annotated[float, typer.Option(min=0.1, help="Processor time for judging a sheet, s; four times as long on the clock.")] = 60.0,
+    seconds: Annotated[
+        float, typer.Option(min=0.1, help="Processor time for judging a sheet, s; four times as long on the clock.")
+    ] = 60.0,
     remark: Annotated[
         bool, typer.Option("--remark", help="Mark earlier reports (JSON) again, without judging.")
     ] = False,

@@ -80,7 +80,9 @@ def check(
     rubric: Annotated[Path | None, typer.Option(help="Rubric: points of the parts (.toml).")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of the random states, to repeat a report.")] = None,
     samples: Annotated[int, typer.Option(min=1, max=100_000, help="Number of random states.")] = 200,
-    seconds: Annotated[float, typer.Option(min=0.01, max=3600, help="Processor time of a call, s; four times as long on the clock.")] = 5.0,
+    seconds: Annotated[
+        float, typer.Option(min=0.01, max=3600, help="Processor time of a call, s; four times as long on the clock.")
+    ] = 5.0,
     sandbox: Annotated[
         str | None, typer.Option(help="bwrap: run the program in bubblewrap, for strangers' files.")
     ] = None,

@@ -212,9 +212,7 @@ class AvoidingSearch:
             free: NDArray[np.bool_] = np.all(self.separation.gaps(q[:, None], most).gap >= need, axis=1)
             return free
 
-        sampler = PathSampler(
-            is_free, lower, upper, self._speed / self._speed.mean(), seed, self.search.work, samples
-        )
+        sampler = PathSampler(is_free, lower, upper, self._speed / self._speed.mean(), seed, self.search.work, samples)
         path = []
         for start, goal in zip(task.points[:-1], task.points[1:], strict=True):
             leg = sampler.path(start, goal)

@@ -56,7 +56,7 @@ def test_the_limit_of_work_is_kept():
         tested.append(len(q))
         return np.abs(q[:, 0]) > 0.1
 
-    with pytest.raises(SearchLimitError, match="^no motion found within 10 iterations$"):
+    with pytest.raises(SearchLimitError, match=r"^no motion found within 10 iterations$"):
         sampler(is_free=is_free, work=work).path(np.array([-0.8, 0.0]), np.array([0.8, 0.0]))
     assert work.states == sum(tested)
     assert 0 <= work.states - 10 * STATES_PER_ITERATION < 2 * max(tested)
