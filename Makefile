@@ -9,6 +9,8 @@ ACCEPT_READY := $(VENV)/.ready-accept
 BENCH_READY := $(VENV)/.ready-bench
 PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile -q
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
+# Compiled modules are kept: without them each of the processes that tests start compiles all sources anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help demo test test-all coverage check accept bench assets lowest format clean
 

@@ -10,6 +10,7 @@ import json
 import math
 import os
 import platform
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
@@ -24,9 +25,18 @@ only_accepting = pytest.mark.skipif(not ACCEPTING, reason="in make accept")
 """For tests that take too long for every change."""
 
 
-def sample_size(full: int) -> int:
+def sample_size(full: int, least: int = LEAST) -> int:
     """Return how many samples this run takes of a law stated with ``full``."""
-    return full if ACCEPTING else max(min(full, LEAST), full // SHARE)
+    return full if ACCEPTING else max(min(full, least), full // SHARE)
+
+
+DIFFERENT_ROBOTS = ("planar2r", "puma560", "stanford", "cobra600", "panda", "manutec_r3", "ax12_arm")
+"""Robots that differ in kind: few joints, a PUMA, prismatic joints, seven joints, a coupling, tiny links."""
+
+
+def different_robots_first(names: Sequence[str]) -> list[object]:
+    """Return the cases of a law of every robot: robots of different kinds, and all the others in `make accept`."""
+    return [name if name in DIFFERENT_ROBOTS else pytest.param(name, marks=only_accepting) for name in names]
 
 
 def in_time(seconds: float, required: float) -> None:
@@ -42,8 +52,9 @@ class Law:
         self.size = 0
         self.worst: dict[str, tuple[float, float]] = {}
 
-    def samples(self, full: int) -> int:
-        self.size = sample_size(full)
+    def samples(self, full: int, least: int = LEAST) -> int:
+        """Return the number of samples of this run; ``least`` for samples that take seconds each."""
+        self.size = sample_size(full, least)
         return self.size
 
     def holds(self, quantity: str, seen: float, required: float, where: object = None) -> None:

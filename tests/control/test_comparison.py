@@ -19,8 +19,8 @@ LAST_DIGIT = 0.6
 QUICK = ("pid", "computed-torque")
 """Controllers whose rows are made again in `make test`, for two rods."""
 ARMS = ("puma560", "planar2r", "puma560_cao")
-IN_TURN = [pytest.param(name, marks=[only_accepting] * (name != "planar2r")) for name in ARMS]
-"""The tables of the larger arms take half a minute: they are made again in `make accept`."""
+ALL_ROWS = [pytest.param(name, marks=only_accepting) for name in ARMS]
+"""All rows take half a minute an arm: they are made again in `make accept`."""
 
 BOUNDS = {
     "puma560": {
@@ -96,7 +96,7 @@ def test_some_rows_of_the_page_are_made_again():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", IN_TURN)
+@pytest.mark.parametrize("name", ALL_ROWS)
 def test_the_tables_of_the_page_are_made_again(name):
     printed, errors = printed_rows(name), all_errors(name)
     assert list(printed) == list(errors)
@@ -105,7 +105,7 @@ def test_the_tables_of_the_page_are_made_again(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", IN_TURN)
+@pytest.mark.parametrize("name", ALL_ROWS)
 def test_errors_are_as_small_as_controllers_can_make_them(name, law):
     law.samples(1)
     errors = all_errors(name)
@@ -120,7 +120,7 @@ def test_errors_are_as_small_as_controllers_can_make_them(name, law):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", IN_TURN)
+@pytest.mark.parametrize("name", ALL_ROWS)
 def test_what_the_page_says_of_the_tables(name):
     errors = all_errors(name)
     for controller in MODEL_BASED:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from benchmarks.scenes import SceneKind, scenes as random_scenes
 
-from acceptance import only_accepting
+from acceptance import only_accepting, sample_size
 from dhkit.description import library_robot
 from dhkit.description.frames import world_to_frames, world_to_tool
 from dhkit.dynamics import gravity_torque
@@ -81,7 +81,7 @@ def coal_gap(motion, obstacle, rate=500.0):
 def test_scenes(law):
     planner = Planner(PUMA)
     seconds, solves, longer = [], [], []
-    for k, (start, goal, obstacle) in enumerate(scenes(law.samples(20))):
+    for k, (start, goal, obstacle) in enumerate(scenes(law.samples(20, least=3))):
         motion = planner.solve(start, goal, obstacles=[obstacle], clearance=CLEARANCE)
         law.holds("m short of the clearance, by coal", CLEARANCE - coal_gap(motion, obstacle), ROUNDING, k)
         for what, excess in worst_excess(PUMA, motion, planner.limits).items():
@@ -170,7 +170,7 @@ def test_links_that_move_together_near_each_other_cost_no_time(law):
     """A plane between two links that is fixed in the world would have to separate them while both move."""
     arm = library_robot("ur5")
     planner = Planner(arm)
-    for k, (start, goal, balls) in enumerate(beside_two_balls(arm, max(law.samples(10), 2), seed=1)):
+    for k, (start, goal, balls) in enumerate(beside_two_balls(arm, law.samples(10, least=2), seed=1)):
         free = planner.solve(start, goal, obstacles=balls, clearance=CLEARANCE)
         motion = planner.solve(start, goal, obstacles=balls, clearance=CLEARANCE, self_collision=True)
         assert motion.report.is_converged, k
@@ -201,14 +201,18 @@ def ball_near(q, gap):
     return ball
 
 
+@pytest.fixture(scope="module")
+def planner():
+    return Planner(PUMA)
+
+
 @pytest.mark.parametrize("backwards", [False, True])
 @pytest.mark.parametrize("gap", [1e-5, 5e-4, 1e-3, 4e-3, 9.9e-3])
-def test_at_an_end_within_the_clearance_it_is_reduced_and_the_report_says_so(backwards, gap):
+def test_at_an_end_within_the_clearance_it_is_reduced_and_the_report_says_so(planner, backwards, gap):
     """It keeps three quarters of the gap within a tenth of a metre of travel, then all of the clearance of 10 mm."""
     start, goal = np.array([0, 0.8, -1.0, 0, 0.5, 0]), np.array([1.2, 0.3, -0.8, 0.5, -0.6, 1.0])
     ball = ball_near(start, gap)
     ends = (goal, start) if backwards else (start, goal)
-    planner = Planner(PUMA)
     motion = planner.solve(*ends, obstacles=[ball], clearance=0.01)
     q = motion.q(np.linspace(0, motion.duration, 4000))[:: -1 if backwards else 1]
     gaps = distance(PUMA, q, [ball]).distance
@@ -227,7 +231,7 @@ def test_goals_just_above_a_box_take_hardly_longer_than_without_it():
     """Boxes 1 to 8 mm below the lowest link: the clearance is reduced there, and the motion is not slowed down."""
     rng, arm = np.random.default_rng(4), library_robot("ur5")
     planner, capsules, tried = Planner(arm), link_capsules(arm), 0
-    while tried < 4:
+    while tried < sample_size(4, least=2):
         start, goal = rng.uniform(-2.5, 2.5, (2, 6))
         axes, gap = world_axes(arm, goal[None])[0], rng.uniform(0.001, 0.008)
         low, i, end = min((axes[i, e, 2] - capsules[i].radius, i, e) for i in range(1, len(capsules)) for e in (0, 1))
@@ -259,7 +263,7 @@ def test_where_the_optimizer_finds_nothing_a_sampled_path_is_slowed_down():
 
 def test_many_obstacles_far_away_cost_little():
     planner, start = Planner(PUMA), np.array([0, 0.8, -1.0, 0, 0.5, 0])
-    far = [Obstacle.sphere(0.02, (0.1 * i, 0, 5)) for i in range(1500)]
+    far = [Obstacle.sphere(0.02, (0.1 * i, 0, 5)) for i in range(sample_size(1500, least=300))]
     motion = planner.solve(start, [1.2, 0.3, -0.8, 0.5, -0.6, 1.0], obstacles=far)
     assert motion.report.certificate.ok
 
@@ -268,7 +272,7 @@ def test_a_duration_that_is_too_short_among_obstacles_is_called_so():
     start, goal = np.array([0, 0.8, -1.0, 0, 0.5, 0]), np.array([1.2, 0.3, -0.8, 0.5, -0.6, 1.0])
     ball = Obstacle.sphere(0.06, world_to_tool(PUMA, (start + goal) / 2)[:3, 3])
     with pytest.raises(PlanningError, match=r"0\.88 s is too short: the fastest motion found without the obstacles"):
-        Planner(PUMA, "effort").solve(start, goal, duration=0.88, obstacles=[ball])
+        Planner(PUMA, "effort", intervals=16).solve(start, goal, duration=0.88, obstacles=[ball])
 
 
 def test_what_is_kept_clear_of_is_said():
