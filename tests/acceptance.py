@@ -121,7 +121,10 @@ class Recorder:
         )
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
-        if not ACCEPTING or not self.rows:
+        if not ACCEPTING:
+            terminalreporter.write_line(_left_out(terminalreporter.config))
+            return
+        if not self.rows:
             return
         worst: dict[str, tuple[float, float, int]] = {}
         for row in self.rows:
@@ -131,6 +134,14 @@ class Recorder:
         terminalreporter.section("laws: worst seen, required")
         for name, (seen, required, count) in worst.items():
             terminalreporter.write_line(f"{seen:10.2e} {required:10.1e}  {name} ({count})")
+
+
+def _left_out(config: pytest.Config) -> str:
+    """Return a line on what this run leaves out, and the command that runs it."""
+    laws = "laws at their full size and on every robot: make accept"
+    if config.option.markexpr == "not slow":
+        return f"Left out: tests that take seconds, and all with a browser: make test-all; {laws}"
+    return f"Left out: {laws}"
 
 
 def _is_whole(config: pytest.Config) -> bool:

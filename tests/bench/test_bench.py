@@ -26,7 +26,6 @@ from dhkit.bench import (
     Verdict,
     Workload,
     probes,
-    rounds,
     run,
 )
 from dhkit.bench.agreement import judge
@@ -47,11 +46,10 @@ QUICK = (*dhkit_arm.contenders(), *pinocchio.contenders())
 """Contenders that need nothing but dhkit's own dependencies."""
 
 
-@pytest.fixture(autouse=True)
-def short_rounds(monkeypatch):
-    """No figure is judged here: a millisecond tells as much as a second."""
-    monkeypatch.setattr(rounds, "MIN_TIMING", 1e-4)
-    monkeypatch.setattr(rounds, "BUDGET", dict.fromkeys(Mode, 1e-3))
+@pytest.fixture
+def uncompiled(monkeypatch):
+    """Small batches need no compiled kernels."""
+    monkeypatch.setattr(Arm, "compile", lambda self: None)
 
 
 @pytest.fixture
@@ -76,6 +74,7 @@ def failing(workload):
     raise RuntimeError("out of\ncheese")
 
 
+@pytest.mark.usefixtures("uncompiled")
 @pytest.mark.parametrize("name", ["planar2r", "puma560"])
 def test_a_report_is_complete(name):
     report = run(Arm.load(name), ("fk", "jacobian"), batch=50, repeats=3, probes=False, contenders=QUICK)
@@ -101,6 +100,7 @@ def test_a_report_is_complete(name):
     assert all(line.met is None for line in asked)  # asked at a larger batch
 
 
+@pytest.mark.usefixtures("uncompiled")
 def test_a_report_is_json_and_markdown():
     report = run(Arm.load("planar2r"), ("fk",), batch=20, repeats=1, probes=False, contenders=[*QUICK, liar("peer")])
     plain = report.json()
@@ -118,6 +118,7 @@ def liar(name):
     return Contender(name, "fk", Mode.SINGLE, lying)
 
 
+@pytest.mark.usefixtures("uncompiled")
 def test_a_contender_that_disagrees_is_reported_with_its_error_and_timed():
     honest = Contender("honest", "fk", Mode.SINGLE, agreeing)
     report = run(Arm.load("planar2r"), ["fk"], batch=20, repeats=1, probes=False, contenders=[honest, liar("liar")])
@@ -129,6 +130,7 @@ def test_a_contender_that_disagrees_is_reported_with_its_error_and_timed():
     assert told["liar"].times_batch is None  # dhkit took no part
 
 
+@pytest.mark.usefixtures("uncompiled")
 def test_a_contender_that_fails_is_missing_with_the_reason():
     broken = Contender("broken", "fk", Mode.BATCH, failing)
     report = run(Arm.load("planar2r"), ["fk"], batch=20, repeats=1, probes=False, contenders=[broken])
@@ -136,7 +138,7 @@ def test_a_contender_that_fails_is_missing_with_the_reason():
     assert not report.rows
 
 
-@pytest.mark.usefixtures("no_peers")
+@pytest.mark.usefixtures("no_peers", "uncompiled")
 def test_peers_that_are_not_installed_are_listed():
     report = run(Arm.load("puma560"), ("fk",), batch=20, repeats=1, probes=False)
     assert {row.contender for row in report.rows} == {c.name for c in QUICK if c.quantity == "fk"}
@@ -207,6 +209,7 @@ def test_dhkits_inverse_kinematics_is_asked_the_same_way(monkeypatch):
     assert dhkit_arm.new_output(arm.ik, [workload.T]).shape == (6, 2, arm.n)
 
 
+@pytest.mark.usefixtures("uncompiled")
 def test_an_interrupted_run_reports_what_it_measured():
     def stop(line):
         if line == "fk: round 2 of 9":
@@ -361,7 +364,7 @@ def test_times_are_in_the_unit_that_suits_them(seconds, text):
     assert duration(seconds) == text
 
 
-@pytest.mark.usefixtures("no_peers")
+@pytest.mark.usefixtures("no_peers", "uncompiled")
 def test_the_command_prints_json_and_writes_both_files(capsys, tmp_path):
     arguments = ["bench", "fk", "--robot", "planar2r", "--batch", "20", "--repeats", "1", "--no-probes", "--json"]
     with pytest.raises(SystemExit) as ended:

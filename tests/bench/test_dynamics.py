@@ -9,7 +9,7 @@ import pytest
 from benchmarks.targets import targets
 
 from dhkit import Arm
-from dhkit.bench import BenchReport, Derivation, Machine, Mode, derivations, rounds, run
+from dhkit.bench import BenchReport, Derivation, Machine, derivations, run
 from dhkit.bench.contenders import Workload
 from dhkit.bench.derivations import CASADI, INVERSE_DYNAMICS, PEER, operations
 from dhkit.bench.peers import dhkit_arm, pinocchio
@@ -20,13 +20,6 @@ pytestmark = pytest.mark.slow
 
 DYNAMICS = ("inverse_dynamics", "mass_matrix", "forward_dynamics")
 QUICK = (*dhkit_arm.contenders(), *pinocchio.contenders(), *dhkit_arm.casadi_contenders())
-
-
-@pytest.fixture(autouse=True)
-def short_rounds(monkeypatch):
-    """No figure is judged here: a millisecond tells as much as a second."""
-    monkeypatch.setattr(rounds, "MIN_TIMING", 1e-4)
-    monkeypatch.setattr(rounds, "BUDGET", dict.fromkeys(Mode, 1e-3))
 
 
 @pytest.mark.parametrize("name", ["cart_pendulum", "puma560"])

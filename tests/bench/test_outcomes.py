@@ -7,7 +7,7 @@ import json
 import pytest
 
 from dhkit import Arm
-from dhkit.bench import Contender, Ending, Missing, Mode, Row, Task, UnavailableError, Verdict, rounds, run, runner
+from dhkit.bench import Contender, Ending, Missing, Mode, Row, Task, UnavailableError, Verdict, run, runner
 from dhkit.bench.contenders import one_by_one
 from dhkit.bench.peers import dhkit_arm, pinocchio
 from dhkit.bench.runner import outcome_of
@@ -20,10 +20,8 @@ PEER_UNAVAILABLE = Missing("fk", "peer", "not installed")
 
 
 @pytest.fixture(autouse=True)
-def quick(monkeypatch):
-    """No figure is judged here, and small batches need no compiled kernels."""
-    monkeypatch.setattr(rounds, "MIN_TIMING", 1e-4)
-    monkeypatch.setattr(rounds, "BUDGET", dict.fromkeys(Mode, 1e-3))
+def uncompiled(monkeypatch):
+    """Small batches need no compiled kernels."""
     monkeypatch.setattr(Arm, "compile", lambda self: None)
 
 

@@ -9,7 +9,6 @@ from benchmarks.control import SimulationSizes, compare_simulations
 from benchmarks.peers.aba_loop import AbaLoop, default_swing
 
 from dhkit import Arm
-from dhkit.bench import rounds
 from dhkit.bench.contenders import UnavailableError
 from dhkit.control import PDGravity
 
@@ -18,12 +17,6 @@ SAME = 1e-12
 """Of last states and of accelerations over their largest: the same steps, added up in another order."""
 DEFAULT_ERROR = 1e-3
 """rad that SciPy's default tolerance of 1e-3 is off after 0.1 s, or much less."""
-
-
-@pytest.fixture(autouse=True)
-def short_rounds(monkeypatch):
-    """No figure is judged here: each call is timed once a round."""
-    monkeypatch.setattr(rounds, "MIN_TIMING", 1e-6)
 
 
 def without_toolbox(monkeypatch):

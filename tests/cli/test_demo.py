@@ -1,5 +1,7 @@
 """`dhkit demo`: what it writes, for any robot; the page shows the arm without a network."""
 
+import contextlib
+import io
 import json
 import re
 from xml.etree import ElementTree
@@ -8,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from acceptance import only_accepting
+from acceptance import different_robots_first, only_accepting
 from dhkit import Arm, Trajectory, robots
 from dhkit.cli import main
 from dhkit.cli.demo_motions import TOUR_RATE, moved_configurations, race, there_and_back, tour
@@ -32,10 +34,25 @@ def run(*arguments):
     return exit.value.code
 
 
-def test_the_demo_writes_a_urdf_a_figure_and_a_page(tmp_path, capsys):
-    folder = tmp_path / "out"
-    assert run("demo", "--quick", "--output", str(folder)) == 0
-    out = capsys.readouterr().out
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    """Return what runs `dhkit demo --quick` for a robot, once, and returns its folder and what it printed."""
+    run_already = {}
+
+    def once(name):
+        if name not in run_already:
+            folder, printed = tmp_path_factory.mktemp(name) / "out", io.StringIO()
+            robot = () if name == "puma560" else ("--robot", name)  # which it is without an option
+            with contextlib.redirect_stdout(printed):
+                assert run("demo", *robot, "--quick", "--output", str(folder)) == 0
+            run_already[name] = folder, printed.getvalue()
+        return run_already[name]
+
+    return once
+
+
+def test_the_demo_writes_a_urdf_a_figure_and_a_page(demo):
+    folder, out = demo("puma560")
     assert "agrees with Pinocchio" in out
     assert "2 shoulder" in out
     assert "8 branches of one pose close FK to" in out
@@ -68,10 +85,10 @@ def test_the_demo_writes_a_urdf_a_figure_and_a_page(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_the_page_of_the_demo_shows_the_arm_moves_it_and_asks_nobody(tmp_path, chromium):
-    assert run("demo", "--quick", "--output", str(tmp_path)) == 0
+def test_the_page_of_the_demo_shows_the_arm_moves_it_and_asks_nobody(demo, chromium):
+    folder, _ = demo("puma560")
     page = chromium.page()
-    page.open(f"file://{tmp_path}/index.html")
+    page.open(f"file://{folder}/index.html")
     page.press(" ")  # pause
     with_arm = page.screenshot()
     page.evaluate("dhkit.stage.nodes.forEach(node => { node.visible = false; }); dhkit.stage.viewer.set_dirty()")
@@ -127,11 +144,11 @@ def test_a_demo_into_a_file_is_refused(tmp_path, capsys):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["planar2r", *(pytest.param(x, marks=only_accepting) for x in ("puma560", "panda"))])
-def test_the_page_shows_the_other_branches_as_ghosts_that_can_be_hidden(name, tmp_path, capsys, chromium):
-    assert run("demo", "--robot", name, "--quick", "--output", str(tmp_path)) == 0
+def test_the_page_shows_the_other_branches_as_ghosts_that_can_be_hidden(name, demo, chromium):
+    folder, _ = demo(name)
     page = chromium.page()
     try:
-        page.open(f"file://{tmp_path}/index.html")
+        page.open(f"file://{folder}/index.html")
         page.press(" ")  # pause
         page.press("Home")
         with_ghosts = page.screenshot()
@@ -196,7 +213,7 @@ def test_without_a_line_the_tour_goes_through_the_configurations():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", different_robots_first(robots()))
 def test_the_race_keeps_the_limits_and_is_faster_than_the_quintic(name):
     arm = Arm.load(name)
     best, quintic = race(arm, 16)
@@ -219,13 +236,13 @@ def test_the_race_keeps_the_limits_and_is_faster_than_the_quintic(name):
 
 
 @pytest.mark.slow
-def test_the_page_of_the_plan_plays_without_a_jump(tmp_path, chromium):
-    assert run("demo", "--robot", "planar2r", "--quick", "--output", str(tmp_path)) == 0
+def test_the_page_of_the_plan_plays_without_a_jump(demo, chromium):
+    folder, _ = demo("planar2r")
     page = chromium.page()
     try:
-        page.open(f"file://{tmp_path}/plan.html")
+        page.open(f"file://{folder}/plan.html")
         arm = Arm.load("planar2r")
-        best = Trajectory.load(tmp_path / "plan.npz", arm.description)
+        best = Trajectory.load(folder / "plan.npz", arm.description)
         times, q = (np.array(page.evaluate(f"[...dhkit.motion.{what}]")) for what in ("times", "q"))
         assert np.abs(np.diff(q.reshape(-1, 2), axis=0)).max() < 0.1
         assert times[-1] > 2 * best.duration

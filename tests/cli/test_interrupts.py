@@ -7,6 +7,7 @@ import time
 
 import pytest
 
+from acceptance import ACCEPTING
 from dhkit.cli import _reliable_interrupts
 from dhkit.planning.solver import delayed_interrupts
 
@@ -36,10 +37,17 @@ main(sys.argv[2:])
 """
 
 
-@pytest.mark.parametrize(
-    "command", ["plan puma560 --to nominal --via zero --intervals 240", "simulate puma560 --duration 300"]
+PLAN, SIMULATE = "plan puma560 --to nominal --via zero --intervals 240", "simulate puma560 --duration 300"
+SECONDS = [0.005, 0.05, 0.25, 0.5, 0.8, 1.2]
+"""At first what both commands import, then their work."""
+TIMES = (
+    [(command, seconds) for command in (PLAN, SIMULATE) for seconds in SECONDS]
+    if ACCEPTING
+    else [*((PLAN, seconds) for seconds in SECONDS[::2]), *((SIMULATE, seconds) for seconds in SECONDS[1::2])]
 )
-@pytest.mark.parametrize("seconds", [0.005, 0.05, 0.25, 0.5, 0.8, 1.2])
+
+
+@pytest.mark.parametrize(("command", "seconds"), TIMES)
 def test_a_command_ends_in_one_line(command, seconds):
     done = subprocess.run(
         [sys.executable, "-c", COMMAND, str(seconds), *command.split()],
@@ -53,7 +61,7 @@ def test_a_command_ends_in_one_line(command, seconds):
     assert done.returncode in (130, -signal.SIGINT)
 
 
-@pytest.mark.parametrize("seconds", [0.0, 0.01, 0.05, 0.3, 0.6, 0.9])
+@pytest.mark.parametrize("seconds", [0.0, 0.01, 0.05, 0.3, 0.6, 0.9] if ACCEPTING else [0.0, 0.05, 0.3])
 def test_planning_is_interrupted_while_programs_are_made_and_solved(seconds):
     done = subprocess.run(
         [sys.executable, "-c", PLANNING, str(seconds)], capture_output=True, text=True, timeout=60, check=False

@@ -1,6 +1,7 @@
 """Where output goes: pipes that lack letters, named pipes and devices; and what help says."""
 
 import contextlib
+import io
 import json
 import os
 import re
@@ -15,7 +16,7 @@ import numpy as np
 import pytest
 
 from dhkit import Arm, Limits
-from dhkit.cli import app as app_module
+from dhkit.cli import app as app_module, main
 from dhkit.cli.app import load_command
 from dhkit.cli.streams import _plain
 from dhkit.description.files import write_atomically
@@ -33,16 +34,25 @@ COMMANDS = {name: load_command(name) for name in app_module.COMMANDS}
         ("info puma560 --json", '"name": "puma560"'),
     ],
 )
-def test_letters_that_a_pipe_lacks_are_replaced(encoding, command, words):
-    env = os.environ | {"PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}
-    done = subprocess.run(
-        [sys.executable, "-m", "dhkit", *command.split()], capture_output=True, env=env, check=False, timeout=60
-    )
-    assert (done.returncode, done.stderr) == (0, b"")
-    text = done.stdout.decode(encoding)
+def test_letters_that_a_pipe_lacks_are_replaced(encoding, command, words, monkeypatch):
+    out, err = (io.TextIOWrapper(io.BytesIO(), encoding=encoding, write_through=True) for _ in range(2))
+    monkeypatch.setattr(sys, "stdout", out)
+    monkeypatch.setattr(sys, "stderr", err)
+    with pytest.raises(SystemExit) as ended:
+        main(command.split())
+    assert (ended.value.code, err.buffer.getvalue()) == (0, b"")
+    text = out.buffer.getvalue().decode(encoding)
     assert words in text
     if "--json" in command:
         assert json.loads(text)["source"] == Arm.load("puma560").description.source
+
+
+def test_letters_that_a_pipe_of_a_process_lacks_are_replaced():
+    env = os.environ | {"PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
+    command = [sys.executable, "-m", "dhkit", "info", "puma560"]
+    done = subprocess.run(command, capture_output=True, env=env, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert "theta" in done.stdout.decode("ascii")
 
 
 def test_letters_become_plain_ones():
@@ -111,13 +121,15 @@ def test_options_of_one_meaning_have_one_name():
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        ("plan puma560 --to nominal --intervals 480", "of 30 s to search"),
-        ("simulate puma560 --duration 30", "simulating"),
+        ("plan puma560 --to nominal --intervals 48", "of the search's limit"),
+        ("simulate puma560 --duration 3", "simulating"),
     ],
 )
 def test_a_bar_shows_how_far_it_is(command, words):
+    """On a terminal of its own; the bar is there from the beginning, so that the work need not last."""
     ours, theirs = os.openpty()
-    program = [sys.executable, "-m", "dhkit", *command.split()]
+    at_once = "from dhkit.cli import main, progress; progress.DELAY = 0.0; main()"
+    program = [sys.executable, "-c", at_once, *command.split()]
     process = subprocess.Popen(program, stdout=subprocess.DEVNULL, stderr=theirs)
     os.close(theirs)
     shown = b""
@@ -131,17 +143,13 @@ def test_a_bar_shows_how_far_it_is(command, words):
     assert "━" in text
 
 
-def test_what_is_not_limited_is_said():
-    done = subprocess.run(
-        [sys.executable, "-m", "dhkit", *["plan", "planar2r", "--to", "1", "1", "--intervals", "24"]],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert "\nnot limited: acceleration, jerk\n" in done.stdout
+def test_what_is_not_limited_is_said(capsys):
+    with pytest.raises(SystemExit, match="0"):
+        main(["plan", "planar2r", "--to", "1", "1", "--intervals", "12"])
+    assert "\nnot limited: acceleration, jerk\n" in capsys.readouterr().out
     arm = Arm.load("planar2r")
     slow = Limits.of(arm.description, acceleration=[5, np.inf], jerk=100)
-    motion = arm.plan([0, 0], [1, 1], limits=slow, intervals=24)
+    motion = arm.plan([0, 0], [1, 1], limits=slow, intervals=12)
     assert motion.report.unlimited == ("acceleration of joint 2",)
     assert "not limited: acceleration of joint 2" in str(motion.report)
 

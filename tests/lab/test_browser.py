@@ -19,6 +19,7 @@ from acceptance import only_accepting
 from dhkit import Arm
 from dhkit.description import pose
 from dhkit.viewer.scene import first_configuration
+from lab.conftest import COMPLETE
 from lab.controls import button, labelled, panel, set_joints
 from waiting import wait_for
 
@@ -45,7 +46,7 @@ def visit(open_page):
 
 def enter(page, lab):
     page.open(lab.url)
-    page.until("globalThis.dhkit?.lab?.state.control && dhkit.lab.state.table && dhkit.lab.state.waypoints")
+    page.until(COMPLETE)
 
 
 def write(page, label, text):
@@ -65,8 +66,8 @@ def told(page, name):
 # Joints
 
 
-def test_a_slider_is_dragged_and_the_number_shown_is_the_number_sent(visit):
-    lab, page = visit("puma560")
+def test_a_slider_is_dragged_and_the_number_shown_is_the_number_sent(kept_page):
+    lab, page = kept_page("puma560")
     _, y = page.centre(labelled("shoulder"))
     share = (90 + 45) / 270  # the ready state: 90 of -45 to 225 degrees
     start = page.evaluate(
@@ -80,8 +81,8 @@ def test_a_slider_is_dragged_and_the_number_shown_is_the_number_sent(visit):
     assert np.abs(np.delete(lab.desk.q - first_configuration(lab.desk.arm.description), 1)).max() == 0
 
 
-def test_a_number_is_typed_and_a_wrong_one_is_refused(visit):
-    lab, page = visit("puma560")
+def test_a_number_is_typed_and_a_wrong_one_is_refused(kept_page):
+    lab, page = kept_page("puma560")
     write(page, "waist, value", "-33.125")
     wait_for(lambda: lab.desk.q[0] == -33.125 / (180 / math.pi))
     page.settle()
@@ -94,8 +95,8 @@ def test_a_number_is_typed_and_a_wrong_one_is_refused(visit):
     page.until("document.querySelector('.joint').classList.contains('outside')")
 
 
-def test_arrow_keys_move_by_one_ten_and_a_tenth_of_a_degree(visit):
-    lab, page = visit("puma560")
+def test_arrow_keys_move_by_one_ten_and_a_tenth_of_a_degree(kept_page):
+    lab, page = kept_page("puma560")
     q = lab.desk.q.copy()
     for label in ("elbow", "elbow, value"):
         page.evaluate(f"{labelled(label)}.focus()")
@@ -253,8 +254,8 @@ def test_a_dragged_target_is_followed_at_twenty_updates_a_second(visit, slack, t
     assert np.abs(np.array(xyz[:3]) - lab.desk.arm.fk(q)[:3, 3]).max() < PRINTED
 
 
-def test_eight_branches_are_counted_on_screen_and_one_is_chosen(visit):
-    lab, page = visit("puma560")
+def test_eight_branches_are_counted_on_screen_and_one_is_chosen(kept_page):
+    lab, page = kept_page("puma560")
     set_joints(lab, page, [0.2, 0.3, -0.3, 0.4, 0.7, 0.2])
     take_target(page, lab)
     rows = "[...document.querySelectorAll('.branches button')].filter(b => b.getBoundingClientRect().height > 0)"
@@ -271,8 +272,8 @@ def test_eight_branches_are_counted_on_screen_and_one_is_chosen(visit):
     page.until(f"dhkit.lab.state.target.chosen === {json.dumps(inside)}")
 
 
-def test_a_pose_is_typed_and_what_is_out_of_reach_is_said(visit):
-    lab, page = visit("puma560")
+def test_a_pose_is_typed_and_what_is_out_of_reach_is_said(kept_page):
+    lab, page = kept_page("puma560")
     set_joints(lab, page, [0.2, 0.3, -0.3, 0.4, 0.7, 0.2])
     panel(page, "tool")
     before = page.evaluate("[...document.querySelectorAll('.pose .number')].map(i => i.value)")
@@ -292,8 +293,8 @@ def test_a_pose_is_typed_and_what_is_out_of_reach_is_said(visit):
     page.until("!document.querySelector('.branches button')")
 
 
-def test_the_tool_is_jogged_in_the_axes_of_world_and_tool(visit):
-    lab, page = visit("puma560")
+def test_the_tool_is_jogged_in_the_axes_of_world_and_tool(kept_page):
+    lab, page = kept_page("puma560")
     set_joints(lab, page, [0.2, 0.3, -0.3, 0.4, 0.7, 0.2])
     panel(page, "tool")
     T = lab.desk.arm.fk(lab.desk.q)
@@ -318,8 +319,8 @@ def numbers(page):
     return np.reshape(told(page, "tool")["T"], (4, 4))
 
 
-def test_an_edit_shows_the_numbers_that_the_api_gives_and_is_undone(visit):
-    lab, page = visit("puma560")
+def test_an_edit_shows_the_numbers_that_the_api_gives_and_is_undone(kept_page):
+    lab, page = kept_page("puma560")
     first = lab.desk.arm
     set_joints(lab, page, [0.2, 0.3, -0.3, 0.4, 0.7, 0.2])
     panel(page, "table")
@@ -352,15 +353,15 @@ def test_an_edit_shows_the_numbers_that_the_api_gives_and_is_undone(visit):
     wait_for(lambda: lab.desk.arm.description.convention.value == "standard")
 
 
-def test_letters_in_a_field_are_no_shortcuts(visit):
-    _, page = visit("puma560")
+def test_letters_in_a_field_are_no_shortcuts(kept_page):
+    _, page = kept_page("puma560")
     panel(page, "table")
     write(page, "d of row 1", "sqrt(2)/2")
     page.until(f"{labelled('d of row 1')}.value === 'sqrt(2)/2'")
 
 
-def test_two_edits_in_a_row_are_both_made(visit):
-    lab, page = visit("puma560")
+def test_two_edits_in_a_row_are_both_made(kept_page):
+    lab, page = kept_page("puma560")
     panel(page, "table")
     page.click(labelled("a of row 2"))
     page.call("Input.dispatchKeyEvent", type="keyDown", key="a", modifiers=2, commands=["selectAll"])
@@ -402,8 +403,8 @@ def plots(page, name):
     )
 
 
-def test_a_motion_is_planned_played_scrubbed_and_taken_over(visit):
-    lab, page = visit("puma560")
+def test_a_motion_is_planned_played_scrubbed_and_taken_over(kept_page):
+    lab, page = kept_page("puma560")
     panel(page, "motion")
     start, goal = lab.desk.q.copy(), np.zeros(6)
     page.choose(labelled("Goal"), "named zero")
@@ -469,8 +470,8 @@ def test_a_least_time_motion_is_planned_in_the_background(visit):
     assert page.evaluate("dhkit.lab.state.job?.error ?? null") is None
 
 
-def test_a_file_is_chosen(visit, tmp_path):
-    lab, page = visit("puma560")
+def test_a_file_is_chosen(kept_page, tmp_path):
+    lab, page = kept_page("puma560")
     saved = lab.desk.arm.quintic(np.zeros(6), lab.desk.q, 2.0).save(tmp_path / "mine.csv")
     panel(page, "motion")
     root = page.call("DOM.getDocument")["root"]["nodeId"]
@@ -542,10 +543,13 @@ def test_two_tabs_show_the_same_and_a_reload_restores_it(visit, chromium):
     other = chromium.page(**SMALL)
     try:
         enter(other, lab)
+        page.call("Page.bringToFront")  # a page in the background draws nothing, and is slow to take what is typed
         write(page, "waist, value", "25")
         other.until(f"{labelled('waist, value')}.value === '25.00'")
+        other.call("Page.bringToFront")
         panel(other, "table")
         write(other, "d of row 1", "0.7")
+        page.call("Page.bringToFront")
         panel(page, "table")
         page.until(f"{labelled('d of row 1')}.value === '0.7'")
         lab.answer("tool.jog", {"axis": 2, "step": -0.05})
@@ -564,7 +568,6 @@ def test_two_tabs_show_the_same_and_a_reload_restores_it(visit, chromium):
 
 
 def enter_again(page, lab):
-    page.call("Page.bringToFront")  # a page in the background draws nothing
     page.open(lab.url)
     page.until("globalThis.dhkit?.lab?.state.control && dhkit.lab.state.waypoints")
     page.settle()

@@ -37,26 +37,93 @@ READY = 3.0
 HOSTILE = '<img src=x onerror="globalThis.hacked=1"></script><!--<script>'
 
 
+def open_page(chromium, file, width, height):
+    """Open an interactive page that has no network."""
+    page = chromium.page(width=width, height=height)
+    page.call("Network.emulateNetworkConditions", offline=True, latency=0, downloadThroughput=0, uploadThroughput=0)
+    page.open(f"file://{file}")
+    page.until("dhkit.lab?.state.tool && dhkit.lab.state.table")
+    return page
+
+
+def check_errors_and_requests(page):
+    """Check that a page has met no error and asked nobody; forget the errors."""
+    errors, page.errors = page.errors, []
+    assert errors == []
+    assert [url for url in page.requests if not url.startswith(("file:///", "data:", "blob:"))] == []
+
+
 @pytest.fixture
 def visit(chromium, tmp_path):
     """Return what saves a view's interactive page and opens it; at the end it must have met no error and asked nobody."""
     pages = []
 
     def make(view, width=1280, height=800, **about):
-        page = chromium.page(width=width, height=height)
-        pages.append(page)
-        page.call("Network.emulateNetworkConditions", offline=True, latency=0, downloadThroughput=0, uploadThroughput=0)
-        page.open(f"file://{view.save_html(tmp_path / 'page.html', interactive=True, **about)}")
-        page.until("dhkit.lab?.state.tool && dhkit.lab.state.table")
-        return page
+        file = view.save_html(tmp_path / f"page{len(pages)}.html", interactive=True, **about)
+        pages.append(open_page(chromium, file, width, height))
+        return pages[-1]
 
     yield make
     for page in pages:
-        hosts = [url for url in page.requests if not url.startswith(("file:///", "data:", "blob:"))]
-        errors = page.errors
         page.close()
-        assert errors == []
-        assert hosts == []
+    for page in pages:
+        check_errors_and_requests(page)
+
+
+@pytest.fixture(scope="module")
+def plain_page(chromium, tmp_path_factory):
+    """A page of a planar arm for tests of its functions, which change nothing on it."""
+    file = View(Arm.load("planar2r").description).save_html(
+        tmp_path_factory.mktemp("plain") / "page.html", interactive=True
+    )
+    page = open_page(chromium, file, 640, 480)
+    yield page
+    page.close()
+
+
+@pytest.fixture
+def plain(plain_page):
+    """That page; at the end it must have met no error and asked nobody."""
+    yield plain_page
+    check_errors_and_requests(plain_page)
+
+
+@pytest.fixture(scope="module")
+def kept_pages(chromium, tmp_path_factory):
+    """Return what opens an arm's interactive page, once, and its first joint values."""
+    opened = {}
+
+    def make(name):
+        if name not in opened:
+            file = View(Arm.load(name).description).save_html(
+                tmp_path_factory.mktemp("kept") / f"{name}.html", interactive=True
+            )
+            page = open_page(chromium, file, 1280, 800)
+            opened[name] = page, told(page, "joints.q")
+        return opened[name]
+
+    yield make
+    for page, _ in opened.values():
+        page.close()
+
+
+@pytest.fixture
+def kept_page(kept_pages):
+    """Return what resets an arm's page that other tests have used; it must have met no error and asked nobody."""
+    used = []
+
+    def make(name):
+        page, q = kept_pages(name)
+        used.append(page)
+        page.call("Page.bringToFront")  # one in the background draws nothing
+        page.evaluate("dhkit.lab.ask('table.reset', {})")
+        page.evaluate(f"dhkit.lab.ask('joints.set', {{ q: {json.dumps(q)} }})")
+        page.evaluate("dhkit.lab.openPanel('joints')")
+        return page
+
+    yield make
+    for page in used:
+        check_errors_and_requests(page)
 
 
 def table(arm):
@@ -103,36 +170,33 @@ def random_arm(rng):
     return arm.with_tool(pose(rng.uniform(-0.2, 0.2, 3), euler=rng.uniform(-1, 1, 3)))
 
 
-def test_its_kinematics_are_those_of_python_in_random_states_of_all_kinds_of_arms(visit):
-    page = visit(View(Arm.load("planar2r").description))
+def test_its_kinematics_are_those_of_python_in_random_states_of_all_kinds_of_arms(plain):
     rng = np.random.default_rng(12)
     arms = [Arm.load(name) for name in robots()] + [random_arm(rng) for _ in range(28)]
     each, worst = max(1, sample_size(1000) // len(arms)), 0.0
     for arm in arms:
         q = rng.uniform(-math.pi, math.pi, (each, arm.n))
         expected = np.concatenate([arm.frames(q), arm.fk(q)[:, None]], axis=1)
-        worst = max(worst, float(np.abs(in_page(page, arm, q) - expected).max()))
+        worst = max(worst, float(np.abs(in_page(plain, arm, q) - expected).max()))
     print(f"kinematics of the page: {worst:.1e} from Python's in {each * len(arms)} states of {len(arms)} arms")
     assert worst < CLOSE
 
 
-def test_its_kinematics_and_those_of_python_are_those_of_pinocchio(visit):
+def test_its_kinematics_and_those_of_python_are_those_of_pinocchio(plain):
     golden = json.loads(GOLDEN.read_text())
     assert sorted(golden) == sorted(robots())
-    page = visit(View(Arm.load("planar2r").description))
     for name, (states, poses) in golden.items():
         arm, q = Arm.load(name), np.array(states)
         assert np.abs(arm.fk(q) - poses).max() < CLOSE
-        assert np.abs(in_page(page, arm, q)[:, -1] - poses).max() < CLOSE
+        assert np.abs(in_page(plain, arm, q)[:, -1] - poses).max() < CLOSE
 
 
-def test_its_euler_angles_are_those_of_python(visit):
-    page = visit(View(Arm.load("planar2r").description))
+def test_its_euler_angles_are_those_of_python(plain):
     arm, rng = Arm.load("puma560"), np.random.default_rng(3)
     q = np.concatenate([rng.uniform(-3, 3, (30, 6)), np.zeros((1, 6)), np.full((1, 6), math.pi / 2)])
     T = arm.fk(q)
     for order in ORDERS:
-        found = page.evaluate(
+        found = plain.evaluate(
             f"""import("dhkit/offline/kinematics.js").then(({{ euler }}) =>
               {json.dumps(T.reshape(-1, 16).tolist())}.map(T => euler(T, {json.dumps(order)})))"""
         )
@@ -147,9 +211,8 @@ def test_its_euler_angles_are_those_of_python(visit):
         ["", "1 +", "(1", "1)", "2 3", "pi pi", "foo", "sin(1, 2)", "constructor", "__proto__", "x.y", "1/0", "()", "alert(1)", "tan(90*deg)", "1/cos(90*deg)", "pi/tan(90*deg)-2", "2^0.3", "2^65"],
     ],
 )  # fmt: skip
-def test_its_entries_mean_what_they_mean_in_python(visit, texts):
-    page = visit(View(Arm.load("planar2r").description))
-    found = page.evaluate(
+def test_its_entries_mean_what_they_mean_in_python(plain, texts):
+    found = plain.evaluate(
         f"""import("dhkit/offline/expressions.js").then(({{ value }}) => {json.dumps(texts)}.map(text => {{
           try {{ return value(text); }} catch (error) {{ return String(error.message); }}
         }}))"""
@@ -164,10 +227,9 @@ def test_its_entries_mean_what_they_mean_in_python(visit, texts):
         assert abs(value - expected) < 1e-15 * max(1.0, abs(expected)), text
 
 
-def test_deep_and_long_entries_are_refused_at_once(visit):
-    page = visit(View(Arm.load("planar2r").description))
+def test_deep_and_long_entries_are_refused_at_once(plain):
     for text in ("(" * 900 + "1" + ")" * 90, "-" * 999 + "1", "1+" * 100_000 + "1"):
-        said = page.evaluate(
+        said = plain.evaluate(
             f"""import("dhkit/offline/expressions.js").then(({{ value }}) => {{
               try {{ value({json.dumps(text)}); return "accepted"; }} catch (error) {{ return error.constructor.name + error.message; }}
             }})"""
@@ -211,9 +273,9 @@ def tool_is(page, arm):
 
 
 @pytest.mark.parametrize("name", ["puma560", "stanford", "panda", "cobra600"])
-def test_joints_tool_and_table_follow_every_control(visit, name):
+def test_joints_tool_and_table_follow_every_control(kept_page, name):
     arm = Arm.load(name)
-    page = visit(View(arm.description))
+    page = kept_page(name)
     tab(page, "joints")
     names = [joint.name for joint in arm.description.joints]
     for i, joint in enumerate(names):
@@ -272,11 +334,11 @@ def with_entry(arm, row, column, text):
 
 
 @pytest.mark.parametrize("name", ["stanford", "panda"])
-def test_the_steps_of_a_row_are_those_of_the_lab(visit, name):
+def test_the_steps_of_a_row_are_those_of_the_lab(kept_page, name):
     with Lab(Arm.load(name)) as lab:
         q = np.random.default_rng(1).uniform(-1, 1, lab.desk.arm.n)
         lab.answer("joints.set", {"q": q.tolist()})
-        page = visit(View(lab.desk.arm.description))
+        page = kept_page(name)
         page.evaluate(f"dhkit.lab.ask('joints.set', {{ q: {json.dumps(q.tolist())} }})")
         for row in range(lab.desk.arm.n):
             ours, theirs = (
@@ -289,9 +351,9 @@ def test_the_steps_of_a_row_are_those_of_the_lab(visit, name):
             assert np.abs(np.subtract(ours["A"], theirs["A"])).max() < CLOSE
 
 
-def test_an_edited_arm_has_the_labels_that_python_gives_it(visit):
+def test_an_edited_arm_has_the_labels_that_python_gives_it(kept_page):
     arm = Arm.load("puma560")
-    page = visit(View(arm.description))
+    page = kept_page("puma560")
     page.evaluate("dhkit.lab.ask('table.edit', { row: 5, column: 'd', text: '0.1' })")
     edited = with_entry(arm, 5, "d", "0.1")
     from dhkit.viewer.scene import frame_labels
@@ -363,32 +425,36 @@ def test_it_is_small_and_ready_soon(visit, tmp_path):
     assert page.evaluate("dhkit.lab.state.tool.xyz.length") == 3
 
 
-@pytest.mark.parametrize("size", [(390, 844), (768, 1024), (1280, 800)])
-@pytest.mark.parametrize("name", ["about", "joints", "tool", "table", "recorded"])
-def test_nothing_is_cut_off_and_all_is_named(visit, size, name):
+CUT = """(() => {
+  const panels = document.querySelector('#lab .panels').getBoundingClientRect();
+  return [...document.querySelectorAll('#lab button, #lab input, #lab select, #lab a, #tools button, #player button')]
+    .filter(e => e.offsetWidth && !e.closest('.tabs'))
+    .map(e => [e.ariaLabel || e.textContent.trim(), e.getBoundingClientRect()])
+    .filter(([, box]) => box.left < -0.5 || box.right > innerWidth + 0.5 || (box.left < panels.right && box.right > panels.right + 0.5 && box.bottom > panels.top && box.top < panels.bottom))
+    .map(([name]) => name);
+})()"""
+UNNAMED = (
+    "[...document.querySelectorAll('input, select, button, summary')]"
+    ".filter(e => e.offsetWidth && !(e.ariaLabel || e.textContent.trim() || e.labels?.length)).map(e => e.outerHTML)"
+)
+
+
+@pytest.mark.parametrize("sizes", [[(390, 844)], [(768, 1024), (1280, 800)]], ids=["small", "large"])
+def test_nothing_is_cut_off_and_all_is_named(visit, sizes):
+    """Whether the readout is open is decided once, by the size of the page that is loaded."""
     arm = Arm.load("puma560")
     q = np.array(arm.configurations["ready"])
-    page = visit(View(arm.description), *size, motions={"up": ([0, 1], [q, q + 0.3])}, caption="A caption.", links={"equations": "e.html"})  # fmt: skip
+    page = visit(View(arm.description), *sizes[0], motions={"up": ([0, 1], [q, q + 0.3])}, caption="A caption.", links={"equations": "e.html"})  # fmt: skip
     page.evaluate("dhkit.player.pause()")
-    page.evaluate(f"document.getElementById('tab-{name}').click()")
-    page.settle()
-    cut = page.evaluate(
-        """(() => {
-          const panels = document.querySelector('#lab .panels').getBoundingClientRect();
-          return [...document.querySelectorAll('#lab button, #lab input, #lab select, #lab a, #tools button, #player button')]
-            .filter(e => e.offsetWidth && !e.closest('.tabs'))
-            .map(e => [e.ariaLabel || e.textContent.trim(), e.getBoundingClientRect()])
-            .filter(([, box]) => box.left < -0.5 || box.right > innerWidth + 0.5 || (box.left < panels.right && box.right > panels.right + 0.5 && box.bottom > panels.top && box.top < panels.bottom))
-            .map(([name]) => name);
-        })()"""
-    )
-    assert cut == []
-    unnamed = page.evaluate(
-        "[...document.querySelectorAll('input, select, button, summary')]"
-        ".filter(e => e.offsetWidth && !(e.ariaLabel || e.textContent.trim() || e.labels?.length)).map(e => e.outerHTML)"
-    )
-    assert unnamed == []
-    assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+    for size in sizes:
+        page.resize(*size)
+        for name in ("about", "joints", "tool", "table", "recorded"):
+            page.evaluate(f"document.getElementById('tab-{name}').click()")
+            page.settle()
+            where = f"{name} at {size}"
+            assert page.evaluate(CUT) == [], where
+            assert page.evaluate(UNNAMED) == [], where
+            assert page.evaluate("document.documentElement.scrollWidth") <= size[0], where
 
 
 def test_it_works_in_a_sandboxed_frame_as_notebooks_have_it(chromium, signal_arm, tmp_path):

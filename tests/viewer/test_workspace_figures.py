@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import dhkit
+from acceptance import different_robots_first
 from dhkit.description import from_dh, library_robot, robots, world_to_tool
 from dhkit.kinematics.manipulability import Ellipsoid, velocity_ellipsoid
 from dhkit.kinematics.workspace import workspace
@@ -23,7 +24,7 @@ def drawn(figure):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", different_robots_first(robots()))
 def test_every_robot_has_a_figure_of_its_workspace(name):
     space = workspace(library_robot(name), 2_000)
     figure = drawn(dhkit.plot(space))
