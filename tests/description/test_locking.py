@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from acceptance import sample_size
+from acceptance import different_robots_first, sample_size
 from dhkit.description import (
     from_dh,
     from_toml,
@@ -76,7 +76,7 @@ def disagreement(arm, held, count=5):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", different_robots_first(robots()))
 def test_library_robots_with_some_joints_held(name, law):
     arm = library_robot(name)
     rng = np.random.default_rng(7)

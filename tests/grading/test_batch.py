@@ -13,6 +13,7 @@ import pytest
 
 from dhkit.errors import AnswerError
 from dhkit.grading.batch import GIGABYTE, grade_all
+from dhkit.grading.isolation import Limits
 from dhkit.grading.report import Entry, GradeReport, Verdict
 from dhkit.grading.sheets import Sheet, find_sheets
 from grading.judged import REPORT
@@ -247,11 +248,11 @@ def test_who_is_slow_to_read_makes_nobody_late():
     def judge(path):
         return replace(right(path), left_out=("x" * 1_000_000,))  # more than a pipe holds
 
-    reports = grade_all(sheets("a.toml", "b.toml", "c.toml"), judge, jobs=3, seconds=0.25)
-    errors = []
-    for report in reports:
-        errors.append(report.error)
-        time.sleep(1.2)
+    limit = Limits(seconds=0.15, memory=GIGABYTE)
+    reports = grade_all(sheets("a.toml", "b.toml", "c.toml"), judge, jobs=3, seconds=limit.seconds)
+    errors = [next(reports).error]
+    time.sleep(limit.longest + 0.1)  # the others have written a part and wait
+    errors += [report.error for report in reports]
     assert errors == ["", "", ""]
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import dhkit
+from acceptance import different_robots_first
 from dhkit.description import library_robot, robots, world_to_tool
 from dhkit.errors import DhkitError
 from dhkit.kernels import Kernel, kernel, machine_code
@@ -279,7 +280,7 @@ def test_text_that_is_no_kernel_is_refused():
         machine_code.CompiledFunction(machine_code.compile_module("define void @other() {\n  ret void\n}"))
 
 
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", different_robots_first(robots()))
 def test_no_kernel_calls_anything(name):
     """Machine code from the cache is linked with nothing: processors have an instruction for each operation."""
     from dhkit.dynamics import dynamic_kernels

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from acceptance import different_robots_first
 from dhkit.description import library_robot, robots
 from dhkit.symbolic import (
     InertialTable,
@@ -62,7 +63,7 @@ def evaluated(arm, expressions, states):
     }
 
 
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", different_robots_first(robots()))
 def test_library_robots(name, law):
     arm = library_robot(name)
     states = motions(arm, law.samples(1000))

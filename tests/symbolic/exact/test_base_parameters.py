@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 
 import dhkit
+from acceptance import different_robots_first
 from dhkit.description import from_dh, library_robot, with_uniform_links
 from dhkit.model import pinocchio_model
 from dhkit.symbolic.exact.base_parameters import base_parameters
@@ -35,7 +36,7 @@ NOISE = 1e-9
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", dhkit.robots())
+@pytest.mark.parametrize("name", different_robots_first(dhkit.robots()))
 def test_as_many_as_the_regressors_rank(name):
     description = library_robot(name)
     base = base_parameters(description)
@@ -48,7 +49,7 @@ def test_a_puma_has_36_of_60():
     assert numeric_rank(library_robot("puma560")) == 36
 
 
-@pytest.mark.parametrize("name", dhkit.robots())
+@pytest.mark.parametrize("name", different_robots_first(dhkit.robots()))
 def test_equations_in_base_parameters_are_the_full_ones(name):
     assert base_parameters(library_robot(name)).prove()
 
