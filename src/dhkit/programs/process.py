@@ -304,8 +304,10 @@ class Process:
                     self._terminate(Failure.GARBAGE)
                     break
         # The process has closed its answers: no more come, whether or not it goes on.
-        with suppress(queue.Full):
-            self._lines.put_nowait(None)
+        while not self._closed.is_set():
+            with suppress(queue.Full):
+                self._lines.put(None, timeout=WATCH_PERIOD)
+                break
 
     def _drain(self) -> None:
         """Read the printed output, and keep its end."""

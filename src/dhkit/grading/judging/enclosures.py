@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
 from dhkit.expressions.syntax import Tree
-from dhkit.grading.judging.numeric import Evaluation
+from dhkit.grading.judging.numeric import Evaluation, names_of
 
 if TYPE_CHECKING:
     from mpmath import mpf
@@ -77,16 +77,15 @@ def enclosed(
     """
     import mpmath
 
+    used = names_of(tree)
     for digits in PRECISIONS:
         if digits > PRECISIONS[0] and parts * digits > MAX_WORK:
             break
         iv, previous = mpmath.iv, mpmath.iv.dps
         iv.dps = digits
         try:
-            units = {name: _rational(unit.rational) for name, unit in CONSTANTS.items() if unit.rational is not None}
-            units |= {"pi": +iv.pi, "deg": iv.pi / 180}
-            numbers = {**units, **{name: iv.mpf(x) for name, x in values.items()}}
-            interval = Evaluation(numbers, _rational, _functions(), _power, _divide).of(tree)
+            numbers = {**_units(digits), **{name: iv.mpf(x) for name, x in values.items() if name in used}}
+            interval = Evaluation(numbers, partial(_rational, digits=digits), _functions(), _power, _divide).of(tree)
             with mpmath.workdps(digits):
                 middle, width = mpmath.mpf(interval.mid), mpmath.mpf(interval.delta.b)
             allowed = max(tolerance, abs(middle) * mpmath.mpf(10) ** -RELATIVE_DIGITS) if relative else tolerance
@@ -99,10 +98,21 @@ def enclosed(
     raise LostDigitsError("its digits cancel so far that they do not decide it")
 
 
-def _rational(value: Fraction) -> Interval:
+@lru_cache(maxsize=4096)
+def _rational(value: Fraction, digits: int) -> Interval:
+    """Return a rational number in the working precision, which is ``digits``."""
     from mpmath import iv
 
     return iv.mpf(value.numerator) / value.denominator
+
+
+@lru_cache(maxsize=len(PRECISIONS))
+def _units(digits: int) -> Mapping[str, Interval]:
+    """Return pi and the units in the working precision, which is ``digits``."""
+    from mpmath import iv
+
+    units = {name: _rational(unit.rational, digits) for name, unit in CONSTANTS.items() if unit.rational is not None}
+    return {**units, "pi": +iv.pi, "deg": iv.pi / 180}
 
 
 def _magnitudes(x: Interval) -> list[int]:
@@ -198,7 +208,7 @@ def _functions() -> Mapping[str, Callable[..., Interval]]:
         "tan": lambda x: _divide(iv.sin(x), iv.cos(x)),
         "asin": lambda x: arc_tangent(x, other_leg(x)),
         "acos": lambda x: arc_tangent(other_leg(x), x),
-        "atan": lambda x: arc_tangent(x, _rational(Fraction(1))),
+        "atan": lambda x: arc_tangent(x, iv.mpf(1)),
         "atan2": arc_tangent,
         "sqrt": square_root,
         "abs": abs,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -297,7 +297,7 @@ def _split_constants(tree: Tree, constants: set[str]) -> tuple[Tree, list[Tree]]
 
 
 def _first_difference(
-    tree: Tree, nodes: int, truth: Element, by: Comparison, reason: str, states: Sequence[sampling.Sample]
+    tree: Tree, nodes: int, truth: Element, by: Comparison, reason: str, states: Iterable[sampling.Sample]
 ) -> Finding | int:
     """Return the finding at the first state where answer and truth differ; if none does, the number of states tried."""
     used = names_of(tree) | names_in(truth)
@@ -311,6 +311,7 @@ def _first_difference(
 
     if by.up_to_constant:  # energies count from any zero, however large, if it is a number at all
         tree, constants = _split_constants(tree, {*by.arm.parameters, *CONSTANTS})
+    k = -1
     for k, state in enumerate(states):
         right = sampling.element_value(truth, state)
         try:
@@ -332,7 +333,7 @@ def _first_difference(
         work += nodes * digits
         if work > MAX_WORK and k + 1 >= MIN_STATES:
             return k + 1
-    return len(states)
+    return k + 1
 
 
 def _finite(value: Any) -> float | None:

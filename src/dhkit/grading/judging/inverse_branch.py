@@ -189,7 +189,8 @@ def joint_order(branch: Sequence[Tree], where: str = "ik") -> tuple[int, ...]:
     AnswerError
         Formulas that need each other.
     """
-    needed = [{k for k in range(len(branch)) if f"q{k + 1}" in names_of(tree)} for tree in branch]
+    names = [names_of(tree) for tree in branch]
+    needed = [{k for k in range(len(branch)) if f"q{k + 1}" in used} for used in names]
     order: list[int] = []
     while len(order) < len(branch):
         ready = [k for k in range(len(branch)) if k not in order and needed[k] <= set(order)]

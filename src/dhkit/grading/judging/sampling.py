@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -46,8 +46,8 @@ class Sample:
 
 def samples(
     arm: ExactArm, numbers: frozenset[str], seed: int, every: int = 1, count: int = MAX_SAMPLES
-) -> list[Sample]:
-    """Return random states: a third within one turn, the others at scales from 1e-3 to 1e3 rad, m and their rates.
+) -> Iterator[Sample]:
+    """Yield random states: a third within one turn, the others at scales from 1e-3 to 1e3 rad, m and their rates.
 
     Parameters
     ----------
@@ -67,7 +67,6 @@ def samples(
     import mpmath
 
     rng = np.random.default_rng(seed)
-    states = []
     sets = -(-count // every)
     factors = dict[str, Any]()
     for name in arm.parameters:
@@ -84,8 +83,7 @@ def samples(
             for kind, near in NEAR_SIZES.items():
                 size = (near, common, 10.0 ** rng.uniform(-3.0, 3.0))[k % 3]
                 names[f"{kind}{i + 1}"] = mpmath.mpf(rng.uniform(-size, size))
-        states.append(Sample(names, _generators(arm, names)))
-    return states
+        yield Sample(names, _generators(arm, names))
 
 
 def element_value(element: Element, sample: Sample) -> mpf:
