@@ -10,6 +10,7 @@ import shutil
 import socket
 import sys
 import tempfile
+import threading
 from contextlib import suppress
 from pathlib import Path
 
@@ -17,9 +18,10 @@ import psutil
 import pytest
 
 from acceptance import ACCEPTING
+from dhkit.programs import program as program_module
 from dhkit.programs.process import Failure, Limits, ProgramError
 from dhkit.programs.program import Program
-from waiting import wait_for
+from waiting import HANGS, wait_for
 
 NAMED = "DHKIT_TEST_PROCESS"
 LIMITS = Limits(seconds=1.0, memory=400 << 20)
@@ -152,6 +154,24 @@ def test_many_lines_are_read_and_their_end_is_kept(program):
     assert one.call("fk", q=[1.0]) == 1.0
     wait_for(lambda: one.output.endswith(f"{last - 1}\n"), "the end of the output")  # it has a pipe of its own
     assert len(one.output) < 100_000
+
+
+def test_a_program_that_is_closed_while_it_starts_is_not_waited_for(program, monkeypatch):
+    """Its process may be made after another thread has closed it."""
+    one = program("import time\ntime.sleep(1000)\n")
+    make = program_module.Process
+
+    def closed_meanwhile(*arguments):
+        closing.start()
+        wait_for(lambda: one._closed)
+        return make(*arguments)
+
+    closing = threading.Thread(target=one.close)
+    monkeypatch.setattr(program_module, "Process", closed_meanwhile)
+    with pytest.raises(ProgramError, match="was closed"):
+        one.start()
+    closing.join(HANGS)
+    assert not closing.is_alive()
 
 
 def test_values_are_told_as_they_are(program):

@@ -38,9 +38,9 @@ OPTIONS: dict[str, Any] = {
 """Options of Ipopt: for minimum time, twice as fast as its defaults and as reliable.
 
 Where the Hessian is not positive definite, Ipopt adds a multiple of 1 to it. Its first try, 1e-4, is large for
-variables of order one, and made some motions creep along curved paths in 60 to 70 iterations; so tries begin at 1e-8. They end at 1e4, beyond which a
-step is next to nothing: with Ipopt's 1e20 an iteration that diverges factorizes its matrix thirty times, and took 130 ms
-in place of 10.
+variables of order one, and made some motions creep along curved paths in 60 to 70 iterations; so tries begin at 1e-8.
+They end at 1e4, beyond which a step is next to nothing: with Ipopt's 1e20 an iteration that diverges factorizes its
+matrix thirty times, and took 130 ms in place of 10.
 """
 WARM_PUSH = 1e-6
 WARM_OPTIONS: dict[str, Any] = {

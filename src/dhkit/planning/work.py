@@ -13,9 +13,9 @@ from dhkit.errors import PlanningError
 MAX_ITERATIONS = 1000
 """Default limit of a search, iterations of the optimizer in all its solutions.
 
-It counts work, not time, so that the result does not depend on what else the machine does. An iteration takes 5 to 10 ms
-for two joints, 8 to 20 ms for six and 15 to 30 ms for seven, so that a search without a result ends after 5 to 30 s.
-Searches that find a motion take 10 to 40 iterations without obstacles, 30 to 600 with them or for least energy.
+It counts work, not time, so that the result does not depend on what else the machine does. An iteration takes 5 to
+10 ms for two joints, 8 to 20 ms for six and 15 to 30 ms for seven, so that a search without a result ends after 5 to
+30 s. Searches that find a motion take 10 to 40 iterations without obstacles, 30 to 600 with them or for least energy.
 """
 STATES_PER_ITERATION = 250
 """Number of states tested for collisions, for sampled paths, that count as one iteration: they take about as long."""

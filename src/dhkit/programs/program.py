@@ -176,6 +176,9 @@ class Program:
             return running
         self._end()
         running = self._process = Process(self._command, self.limits, self._sandbox)
+        if self._closed:  # meanwhile, by another thread, which has not seen this process
+            self._end()
+            raise ProgramError(f"{self.name} was closed", Failure.ENDED)
         first = self._read_until(running, MAX_START_TIME, lambda answer: "functions" in answer or "error" in answer)
         if "error" in first:
             self._end()
