@@ -304,10 +304,12 @@ class Process:
                     self._terminate(Failure.GARBAGE)
                     break
         # The process has closed its answers: no more come, whether or not it goes on.
-        while not self._closed.is_set():
+        while True:
             with suppress(queue.Full):
-                self._lines.put(None, timeout=WATCH_PERIOD)
-                break
+                self._lines.put_nowait(None)
+                return
+            with suppress(queue.Empty):
+                self._lines.get_nowait()  # of a flood, which nobody reads
 
     def _drain(self) -> None:
         """Read the printed output, and keep its end."""
