@@ -118,6 +118,11 @@ def test_a_table_may_have_limits_and_bodies():
         ({"bodies": [{"mass": 1, "moi": 2}, None]}, "body of link 1"),
         ({"bodies": [{"mass": 1, "com": (0, 0)}, None]}, "com has 2 numbers"),
         ({"bodies": [{"mass": 1, "inertia": ((1, 2, 0), (0, 1, 0), (0, 0, 1))}, None]}, "symmetric 3x3"),
+        (
+            {"bodies": [{"mass": 1, "inertia": {"x": 1}}, None]},
+            "found x; expected a symmetric 3x3 matrix",
+        ),
+        ({"bodies": [{"mass": 1, "inertia": [1, 2, 3, 4, 5, 6]}, None]}, "or entries xx, yy, zz"),
     ):
         with pytest.raises(dhkit.DhkitError, match=said):
             Arm.from_dh([(0, 0, 1, 0), (0, 0, 1, 0)], **wrong)
@@ -169,3 +174,10 @@ def test_the_public_names_are_there():
         assert getattr(dhkit, name) is not None
     with pytest.raises(AttributeError, match="attribute nothing"):
         dhkit.nothing  # noqa: B018
+
+
+def test_inertias_are_given_as_robot_files_give_them():
+    def arm(inertia):
+        return Arm.from_dh([(0, 0, 0.4, 0)], kinds="R", name="rod", bodies=[{"mass": 1, "inertia": inertia}])
+
+    assert arm({"xx": 0.01, "yy": 0.02, "xy": 0.001}) == arm([[0.01, 0.001, 0], [0.001, 0.02, 0], [0, 0, 0]])

@@ -189,8 +189,13 @@ class Arm:
         return Arm(describe.with_uniform_links(self._description, masses))
 
     def lock(self, joints: Mapping[int | str, Quantity]) -> Arm:
-        """Return this arm with joints locked, by index from 0 or by name; see :func:`dhkit.description.lock`."""
-        return Arm(describe.lock(self._description, joints))
+        """Return this arm with joints locked, by index from 0 or by name; see :func:`dhkit.description.lock`.
+
+        Links keep the shapes that they are drawn with.
+        """
+        from dhkit.model.shapes import with_drawn_shapes
+
+        return Arm(describe.lock(with_drawn_shapes(self._description), joints))
 
     # Properties
 
@@ -799,6 +804,7 @@ class Arm:
         intervals: int | None = None,
         friction: bool | Friction = False,
         via: Sequence[ArrayLike | str] = (),
+        coordinates: Sequence[str] | None = None,
         duration: float | None = None,
         start_velocity: ArrayLike | None = None,
         goal_velocity: ArrayLike | None = None,
@@ -836,6 +842,7 @@ class Arm:
             start,
             goal,
             via=via,
+            coordinates=coordinates,
             duration=duration,
             start_velocity=start_velocity,
             goal_velocity=goal_velocity,

@@ -73,6 +73,12 @@ def plan(
     via: Annotated[
         list[str] | None, typer.Option(metavar="Q ...", help="Joint values to pass on the way; may be given again.")
     ] = None,
+    coordinates: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,...", help="Coordinates of the pose that count, for arms that meet no more; see dhkit ik."
+        ),
+    ] = None,
     wanted: Annotated[
         str,
         typer.Option(
@@ -164,7 +170,8 @@ def plan(
     if intervals is not None:
         options["intervals"] = intervals
     scene = obstacles(box or (), sphere or (), floor)
-    between |= {"obstacles": scene, "clearance": clearance, "self_collision": self_collision}
+    counted = None if coordinates is None else tuple(name.strip() for name in coordinates.split(","))
+    between |= {"coordinates": counted, "obstacles": scene, "clearance": clearance, "self_collision": self_collision}
     files = MotionFiles(output, html, figure)
     files.check(SUFFIXES)
     try:
@@ -224,7 +231,7 @@ def _plan_along_line(arm: Arm, start: Array, goal: Array, between: Mapping[str, 
     """
     if between["via"]:
         raise DescriptionError("--line: found --via too; expected a motion straight from start to goal, without")
-    around = {name: value for name, value in between.items() if name != "via"}
+    around = {name: value for name, value in between.items() if name not in ("via", "coordinates")}
     T_goal = goal if goal.shape == (4, 4) else arm.fk(goal)
     path = joint_path(arm.description, tool_line(arm.fk(start), T_goal), start, options["limits"])
     return arm.plan_path(path, **around, **options)

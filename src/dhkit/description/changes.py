@@ -32,14 +32,14 @@ ASYMMETRY_TOLERANCE = 1e-12
 @takes_robot
 def with_tool(description: Description, T: ArrayLike) -> Description:
     """Return the arm with its tool's frame at T in DH frame n, shape (4, 4), m, in place of its own."""
-    return replace(description, tool=Tool(_placement(T, "tool"), description.tool.shapes))
+    return replace(description, tool=Tool(placement_of_pose(T, "tool"), description.tool.shapes))
 
 
 @takes_robot
 def with_base(description: Description, T: ArrayLike) -> Description:
     """Return the arm with frame 0 at T in the world, shape (4, 4), m, in place of its own base."""
     base = description.base
-    return replace(description, base=Base(_placement(T, "base"), base.shapes, base.body))
+    return replace(description, base=Base(placement_of_pose(T, "base"), base.shapes, base.body))
 
 
 @takes_robot
@@ -201,7 +201,14 @@ def _origin(T: ExactPose) -> Vector:
     return x, y, z
 
 
-def _placement(T: ArrayLike, name: str) -> Placement:
+def placement_of_pose(T: ArrayLike, name: str) -> Placement:
+    """Return a pose, shape (4, 4), m, as a placement of exact numbers; ``name`` is the argument's, for messages.
+
+    Raises
+    ------
+    ValueError
+        Another shape, or no pose.
+    """
     matrix = number_array(T, name, "(4, 4)")
     if matrix.shape != (4, 4) or not np.all(np.isfinite(matrix)):
         raise ValueError(f"{name}: found shape {matrix.shape}; expected a finite (4, 4) pose")

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from dhkit.description.bodies import INERTIA_PLACES, Body, Inertia
 from dhkit.description.named import Named
@@ -158,10 +158,20 @@ def _body(number: int, body: object, names: Mapping[str, object]) -> Body:
     com = tuple(quantity(f"{where}: com", value, names) for value in body.get("com", (0, 0, 0)))
     if len(com) != 3:
         raise DescriptionError(f"{where}: com has {len(com)} numbers; expected 3")
-    rows = [
-        [quantity(f"{where}: inertia", value, names) for value in row] for row in body.get("inertia", [[0] * 3] * 3)
-    ]
-    if [len(row) for row in rows] != [3, 3, 3] or any(rows[i][j] != rows[j][i] for i, j in ((0, 1), (0, 2), (1, 2))):
-        raise DescriptionError(f"{where}: inertia: expected a symmetric 3x3 matrix, kg m^2 about the centre of mass")
-    inertia = Inertia(**{key: rows[i][j] for key, (i, j) in INERTIA_PLACES.items()})
+    inertia = _body_inertia(f"{where}: inertia", body.get("inertia", {}), names)
     return Body(quantity(f"{where}: mass", body["mass"], names), (com[0], com[1], com[2]), inertia)
+
+
+def _body_inertia(where: str, given: Any, names: Mapping[str, object]) -> Inertia:
+    """Return an inertia given as a 3x3 matrix, or by its entries ``xx`` to ``yz`` as robot files have it, kg m^2."""
+    expected = "expected a symmetric 3x3 matrix, or entries xx, yy, zz, xy, yz, xz; kg m^2 about the centre of mass"
+    if isinstance(given, Mapping):
+        if unknown := set(given) - set(INERTIA_PLACES):
+            raise DescriptionError(f"{where}: found {sorted(map(str, unknown))[0]}; {expected}")
+        return Inertia(**{key: quantity(where, given.get(key, 0), names) for key in INERTIA_PLACES})
+    if not _has_length(given, 3) or not all(_has_length(row, 3) for row in given):
+        raise DescriptionError(f"{where}: found {str(given)[:80]}; {expected}")
+    rows = [[quantity(where, value, names) for value in row] for row in given]
+    if any(rows[i][j] != rows[j][i] for i, j in ((0, 1), (0, 2), (1, 2))):
+        raise DescriptionError(f"{where}: {expected}")
+    return Inertia(**{key: rows[i][j] for key, (i, j) in INERTIA_PLACES.items()})

@@ -8,7 +8,7 @@ longer hub. A prismatic joint is a square bar of the stroke's length in a block.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TypeAlias
@@ -17,6 +17,7 @@ import numpy as np
 
 from dhkit.description import Array, Box, Convention, Cylinder, Description, Geometry, Mesh, Shape, Sphere, takes_robot
 from dhkit.description.assets import inside
+from dhkit.description.changes import placement_of_pose
 from dhkit.description.mesh_files import is_mesh_file
 from dhkit.description.numbers import matrix
 from dhkit.description.parameters import resolved
@@ -96,21 +97,56 @@ def link_parts(description: Description) -> tuple[Part, ...]:
     >>> sorted({part.link for part in parts})
     [0, 1, 2]
     """
+    described, drawn = _parts(description)
+    parts = [own or others for own, others in zip(described, drawn, strict=True)]
+    return tuple(part for link in parts for part in link)
+
+
+def links_without_shapes(description: Description) -> tuple[int, ...]:
+    """Return the links without any shape, 1 to n: their meshes are missing, or they have none."""
+    shown = {part.link for part in link_parts(description)}
+    return tuple(link for link in range(1, description.n + 1) if link not in shown)
+
+
+def with_drawn_shapes(description: Description) -> Description:
+    """Return the same arm with the solids that are drawn from its table as shapes of its links.
+
+    A change of the table, such as a locked joint, moves them then, and does not draw others.
+    """
+    described, drawn = _parts(description)
+    explicit: list[tuple[Shape, ...]] = []
+    own = (description.base.shapes, *(joint.shapes for joint in description.joints), description.tool.shapes)
+    for given, here, others in zip(own, described, drawn, strict=True):
+        solids = tuple(
+            Shape(part.geometry, placement_of_pose(part.T_link_part, "shape"), part.color) for part in others
+        )
+        explicit.append(given if here else solids)
+    base, *links, at_tool = explicit
+    if not described[-1]:  # drawn in the frame of the last link
+        links[-1], at_tool = (*links[-1], *at_tool), ()
+    return replace(
+        description,
+        base=replace(description.base, shapes=base),
+        joints=tuple(replace(joint, shapes=shapes) for joint, shapes in zip(description.joints, links, strict=True)),
+        tool=replace(description.tool, shapes=at_tool),
+        drawn=False,
+    )
+
+
+def _parts(description: Description) -> tuple[list[list[Part]], list[list[Part]]]:
+    """Return the described and the drawn parts of the base, each link and the tool; drawn are those without shapes."""
     n, T_last_tool, arm = description.n, description.numbers.T_last_tool, _Drawing(description)
-    joints, base, tool = description.joints, description.base, description.tool
-    parts: list[Part] = []
-    all_described: list[Part] = []
-    for i, shapes in enumerate((base.shapes, *(joint.shapes for joint in joints))):
-        color = PALETTE[(i - 1) % len(PALETTE)] if i else BASE_COLOR
-        described = _described_parts(description, shapes, i, IDENTITY, color)
-        all_described += described
-        parts += described or _drawn_parts(i, arm.link(i), color)
-    at_tool = _described_parts(description, tool.shapes, n, T_last_tool, BASE_COLOR)
-    if all_described and not description.drawn:
-        return (*all_described, *at_tool)
-    if not at_tool and (not described or not np.array_equal(T_last_tool, IDENTITY)):
-        at_tool = [*_drawn_parts(n, arm.neck(), color), *_drawn_parts(n, arm.gripper(), BASE_COLOR)]
-    return (*parts, *at_tool)
+    colors = [BASE_COLOR, *(PALETTE[i % len(PALETTE)] for i in range(n))]
+    own = (description.base.shapes, *(joint.shapes for joint in description.joints))
+    described = [_described_parts(description, shapes, i, IDENTITY, colors[i]) for i, shapes in enumerate(own)]
+    at_tool = _described_parts(description, description.tool.shapes, n, T_last_tool, BASE_COLOR)
+    if any(described) and not description.drawn:
+        return [*described, at_tool], [[] for _ in range(n + 2)]
+    drawn = [[] if parts else _drawn_parts(i, arm.link(i), colors[i]) for i, parts in enumerate(described)]
+    gripper: list[Part] = []
+    if not at_tool and (not described[-1] or not np.array_equal(T_last_tool, IDENTITY)):
+        gripper = [*_drawn_parts(n, arm.neck(), colors[-1]), *_drawn_parts(n, arm.gripper(), BASE_COLOR)]
+    return [*described, at_tool], [*drawn, gripper]
 
 
 def _drawn_parts(link: int, solids: Iterable[Solid], color: str) -> list[Part]:

@@ -17,7 +17,6 @@ from dhkit.description import Array
 from dhkit.errors import PlanningError
 from dhkit.planning.assembly import knots_along
 from dhkit.planning.certificate import Certificate
-from dhkit.planning.collision_avoidance import Clearance
 from dhkit.planning.joint_limits import Limit
 from dhkit.planning.motion_program import MotionProgram
 from dhkit.planning.obstacles import Gaps, PathSampler, Separation
@@ -344,7 +343,7 @@ class AvoidingSearch:
 
     def _shortfall(self, certificate: Certificate) -> float:
         """Return how much the smallest gap is below the clearance on the certificate's grid and between, m."""
-        return max(0.0, certificate.excess_of(Limit.CLEARANCE)) * Clearance.unit(self.task.arm)
+        return max(0.0, certificate.excess_of(Limit.CLEARANCE))
 
     def _measured(self, motion: Trajectory, knots: Knots, near: float) -> tuple[Gaps, Array]:
         """Return the gaps in each interval of the mesh, those above ``near`` (m) perhaps infinite, and those required.

@@ -13,6 +13,7 @@ import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.errors import PlanningError
+from dhkit.model.shapes import links_without_shapes
 from dhkit.planning.between_states import smallest_between
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.joint_limits import joint_limits
@@ -22,6 +23,7 @@ from dhkit.planning.obstacles import (
     Pair,
     Scene,
     Separation,
+    arm_size,
     check_obstacles,
     distance,
     pair_distances,
@@ -31,8 +33,6 @@ from dhkit.planning.obstacles import (
 from dhkit.planning.states import States
 from dhkit.trajectories import Limits
 
-MIN_REACH = 1e-9
-"""Smallest reach (m) used as a scale of lengths, for arms without reach."""
 BETWEEN, MIN_BETWEEN = 0.1, 1e-3
 """Share of the clearance, at least in m, by which a distance may fall below it between two states of a certificate."""
 KEPT_SHARE = 0.75
@@ -102,7 +102,7 @@ class CollisionAvoidance:
         return ", ".join(name if count == 1 else f"{count} x {name}" for name, count in counted.items())
 
     def report(self, arm: Description, excess: float) -> dict[str, Any]:
-        """Return the fields of a :class:`dhkit.planning.PlanReport`; ``excess`` is the certificate's, of the reach."""
+        """Return the fields of a :class:`dhkit.planning.PlanReport`; ``excess`` is the certificate's, m."""
         if not self:
             return {}
         return {
@@ -110,9 +110,10 @@ class CollisionAvoidance:
             "clear_of": " and ".join(
                 ["from obstacles"] * bool(self.obstacles) + ["between links"] * self.self_collision
             ),
-            "spare_clearance": -excess * Clearance.unit(arm),
+            "spare_clearance": -excess,
             "reduced_clearances": tuple(str(reduced) for reduced in self.reduced),
             "is_clearance_reduced_throughout": self.is_reduced_throughout,
+            "without_shapes": tuple(f"link {link}" for link in links_without_shapes(arm)),
         }
 
     def between(self, description: Description, start: Array, goal: Array) -> CollisionAvoidance:
@@ -121,10 +122,10 @@ class CollisionAvoidance:
         Raises
         ------
         PlanningError
-            A clearance above the reach.
+            A clearance larger than the space in which the arm moves.
         """
-        if self.clearance > Clearance.unit(description):
-            raise PlanningError(f"clearance is {self.clearance:.4g} m, more than the arm's reach")
+        if self.clearance > (size := arm_size(description)):
+            raise PlanningError(f"clearance is {self.clearance:.4g} m; the arm itself reaches over {size:.4g} m")
         separation = Separation(description, self.obstacles, self.self_collision)
         ends = separation.gaps(np.stack([start, goal])[:, None]).gap
         reduced = []
@@ -234,15 +235,10 @@ class Clearance(Constraint):
         """Whether there are obstacles."""
         return bool(self.avoidance)
 
-    @staticmethod
-    def unit(description: Description) -> float:
-        """Return the length that counts as 1, m: the arm's reach."""
-        return max(description.reach, MIN_REACH)
-
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return 1 plus what is missing of the required distances in shares of the reach, shape (N, 1); at least 0."""
+        """Return 1 plus what is missing of the required distances in m, shape (N, 1); at least 0."""
         short = self.avoidance.shortfalls(states)
-        return 1 + np.maximum(short[:, None] / self.unit(states.description), -1.0)
+        return 1 + np.maximum(short[:, None], -1.0)
 
 
 def motion_constraints(

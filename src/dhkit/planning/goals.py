@@ -10,17 +10,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Description, check_pose, joint_array
+from dhkit.description import Array, Description, check_pose, joint_array, world_to_tool
 from dhkit.description.arrays import number_array
 from dhkit.description.joint_text import joint_text
 from dhkit.errors import DescriptionError, ModelError, PlanningError, UnreachableError
 from dhkit.kinematics import inverse_kinematics, solve_numerically
+from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.trajectories import Limits
 
 ITERATION_STARTS = 24
 """Number of starts of the iterative solution, for arms without a closed form."""
 SAME_SOLUTION = 1e-3
 """Largest difference of joint values (rad or m) between two solutions that count as the same."""
+MAX_POSITION_ERROR, MAX_ROTATION_ERROR = 1e-6, 1e-6
+"""Largest distance (m) and difference of a rotation's entries with which a pose counts as met."""
 MAX_ROUTES = 32
 """Largest number of routes through the branches of all places; the shortest are kept."""
 
@@ -106,22 +109,31 @@ def parse_place(description: Description, value: ArrayLike | str, name: str) -> 
     return Place(name, q)
 
 
-def find_routes(description: Description, limits: Limits, places: Sequence[Place]) -> list[Route]:
+def find_routes(
+    description: Description, limits: Limits, places: Sequence[Place], coordinates: Sequence[str] | None = None
+) -> list[Route]:
     """Return the routes through all places, sorted by their lower bounds of the duration.
+
+    Parameters
+    ----------
+    coordinates
+        Names of the coordinates of a pose that count, for arms that meet no more of them; all six unless given.
 
     Raises
     ------
     UnreachableError
         A pose that the arm cannot reach.
     PlanningError
-        A pose that it reaches only outside its limits.
+        A pose that it reaches only outside its limits, or of which it meets some coordinates alone.
+    ValueError
+        Coordinates that are not those that the arm meets.
     """
     routes: list[tuple[list[Array], list[str]]] = [([], [])]
     for place in places:
         longer = []
         for points, labels in routes:
             near = points[-1] if points else None
-            for q, label in _configurations(description, limits, place, near):
+            for q, label in _configurations(description, limits, place, near, coordinates):
                 longer.append(([*points, q], [*labels, label] if label else labels))
         longer.sort(key=lambda route: _length(limits, np.stack(route[0])))
         routes = longer[:MAX_ROUTES]
@@ -135,7 +147,7 @@ def find_routes(description: Description, limits: Limits, places: Sequence[Place
 
 
 def _configurations(
-    description: Description, limits: Limits, place: Place, near: Array | None
+    description: Description, limits: Limits, place: Place, near: Array | None, coordinates: Sequence[str] | None
 ) -> list[tuple[Array, str]]:
     if place.q is not None:
         return [(place.q, "")]
@@ -143,14 +155,19 @@ def _configurations(
     try:
         solutions = inverse_kinematics(description, T)
         every, labels = solutions.q, [str(label) for label in solutions.branches]
+        met = solutions.met
         angles = solutions.within_limits(near)
     except (DescriptionError, ModelError):
         every, labels = _iterative_solutions(description, T, near)
-        angles = every
+        angles, met = every, ALL_COORDINATES
+    if coordinates is not None and tuple(coordinates) not in (met, ALL_COORDINATES):
+        raise ValueError(f"coordinates is {coordinates!r}; {description.name} meets {met}")
     if not np.isfinite(every).all(axis=-1).any():
         raise UnreachableError(
             f"{place.name}: no joint values bring the tool to this pose; {_position_text(T)} is out of reach"
         )
+    if coordinates is None or tuple(coordinates) != met:
+        _require_met(description, place, every, met)
     inside = np.atleast_1d(
         ((angles >= limits.lower - SAME_SOLUTION**3) & (angles <= limits.upper + SAME_SOLUTION**3)).all(axis=-1)
     )
@@ -164,6 +181,29 @@ def _configurations(
         for q, label, good in zip(angles, labels, inside, strict=True)
         if good
     ]
+
+
+def _require_met(description: Description, place: Place, every: Array, met: tuple[str, ...]) -> None:
+    """Require that a solution has the tool at the pose of a place; arms of fewer freedoms meet some coordinates alone.
+
+    Raises
+    ------
+    PlanningError
+        Says how far the nearest solution is from the pose, and which coordinates the arm meets.
+    """
+    found = world_to_tool(description, every[np.isfinite(every).all(axis=-1)])
+    T = np.asarray(place.T)
+    away = np.linalg.norm(found[:, :3, 3] - T[:3, 3], axis=1)
+    turned = np.abs(found[:, :3, :3] - T[:3, :3]).max(axis=(1, 2))
+    if ((away <= MAX_POSITION_ERROR) & (turned <= MAX_ROTATION_ERROR)).any():
+        return
+    best = int(np.argmin(away / MAX_POSITION_ERROR + turned / MAX_ROTATION_ERROR))
+    R = found[best, :3, :3].T @ T[:3, :3]
+    angle = np.degrees(np.arctan2(np.linalg.norm(R - R.T) / np.sqrt(2), np.trace(R) - 1))
+    raise PlanningError(
+        f"{place.name}: {description.name} does not meet this pose: of its coordinates it meets {', '.join(met)}, and "
+        f"is {1000 * away[best]:.3g} mm and {angle:.3g} deg away; coordinates={met} says that these alone count"
+    )
 
 
 def _count(every: Array) -> str:

@@ -147,6 +147,7 @@ class Planner:
         goal: ArrayLike | str,
         *,
         via: Sequence[ArrayLike | str] = (),
+        coordinates: Sequence[str] | None = None,
         duration: float | None = None,
         start_velocity: ArrayLike | None = None,
         goal_velocity: ArrayLike | None = None,
@@ -171,6 +172,9 @@ class Planner:
             The same, or a pose (4, 4) of the tool in the world, of which all branches of inverse kinematics are tried.
         via
             Places to pass in order, likewise, at times that are optimized.
+        coordinates
+            Names of the coordinates of poses that count, ``arm.ik(T).met``, for arms that meet no more of them; all six
+            unless given.
         duration
             Duration, s. For objectives without time, by default twice that of cubics along the straight path.
         start_velocity, goal_velocity
@@ -221,13 +225,13 @@ class Planner:
         for place in places:
             if place.q is not None:
                 require_inside_limits(description, request.limits, place.q, place.name)
-        routes = find_routes(description, request.limits, places)
+        routes = find_routes(description, request.limits, places, coordinates)
         require_possible(description, self.objective, self.constraints, request, places, routes)
         try:
             task, best, branches = self._best(request, routes, warm, work, progress)
         except PlanningError as error:
             raise self._with_reason(error, request, routes, work) from None
-        report = replace(report_of(task, best, work), branches=branches)
+        report = replace(report_of(task, best, work), branches=branches, coordinates=tuple(coordinates or ()))
         is_choice = task.duration is None or not self.objective.only_time
         if compare and best.is_resolved and is_choice:
             report = replace(report, classical=classical_motions(task), coarse=self._coarse(task, best, work))

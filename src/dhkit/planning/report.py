@@ -95,6 +95,10 @@ class PlanReport:
     """Smallest distance beyond that, m."""
     reduced_clearances: tuple[str, ...] = ()
     """Distances at the start or the goal that are below the clearance, which is reduced to them there."""
+    coordinates: tuple[str, ...] = ()
+    """Coordinates of the places' poses that counted; empty if all did."""
+    without_shapes: tuple[str, ...] = ()
+    """Links that no distance was measured of: they have no shape, or their meshes are missing."""
     is_clearance_reduced_throughout: bool = False
     """Whether it is reduced to them during the whole motion: none was found that keeps the clearance farther away."""
 
@@ -107,6 +111,8 @@ class PlanReport:
     def notes(self) -> list[str]:
         """What a reader of the motion has to know besides, a sentence each."""
         notes = []
+        if self.coordinates:
+            notes.append(f"of the poses to go to, {', '.join(self.coordinates)} counted and no other coordinates")
         if self.clearance is not None:
             asked, spare = 1000 * self.clearance, 1000 * max(self.spare_clearance, 0.0)
             notes.append(f"clearance: {asked:.3g} mm kept {self.clear_of}, and at least {spare:.3g} mm more")
@@ -114,6 +120,8 @@ class PlanReport:
             less = ", ".join(self.reduced_clearances)
             where = "all the way" if self.is_clearance_reduced_throughout else "near the ends"
             notes[-1] += f", but less {where}: {less}"
+        if self.without_shapes:
+            notes.append(f"not checked for collisions, without a shape: {', '.join(self.without_shapes)}")
         if self.failure:
             path = "the straight path" if self.clearance is None else "a sampled path around the obstacles"
             notes.append(f"not optimal: {path}, slowed down; the optimizer found nothing ({self.failure})")

@@ -93,6 +93,13 @@ def _checked_pairs(description: Description, mesh_folder: Path | None) -> Checke
     )
 
 
+@lru_cache(maxsize=64)
+def arm_size(description: Description) -> float:
+    """Return the size of the space in which the links were seen in random configurations, m."""
+    axes = world_axes(description, _configurations(description))
+    return float(np.ptp(axes.reshape(-1, 3), axis=0).max()) if axes.size else 0.0
+
+
 def capsules_beside(description: Description, obstacle: Obstacle) -> tuple[int, ...]:
     """Return the indices of the capsules that are checked against an obstacle.
 

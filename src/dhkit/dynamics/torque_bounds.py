@@ -1,0 +1,112 @@
+"""Bounds of the second time derivative of joint torques, from bounds of the joints' motion.
+
+Between two samples a function differs from the straight line through them by at most h^2/8 times the largest magnitude
+of its second derivative. So a bound of that derivative turns sampled torques into bounds of the torques in between.
+
+Each vector v(t) of Newton and Euler's equations is represented by bounds of |v|, |v'|, |v''| ..., its jet. Sums add
+jets, and the product rule multiplies them, for a scalar times a vector, a dot and a cross product alike:
+
+    |(u v)^(m)| <= sum_j binomial(m, j) |u^(j)| |v^(m-j)|.
+
+A vector of length l that is fixed in a body of angular velocity w has v' = w x v, which gives its jet order by order.
+"""
+
+from __future__ import annotations
+
+from math import comb
+
+import numpy as np
+
+from dhkit.description import Array, Convention, Description
+
+ORDERS = 4
+"""Highest derivative of positions: the second derivative of a torque contains that of an acceleration."""
+
+
+def torque_curvature_bounds(description: Description, motion: Array) -> Array:
+    """Return bounds of the second time derivatives of joint torques without friction.
+
+    Parameters
+    ----------
+    description
+        The robot, with a body on every link.
+    motion
+        Bounds of |q| and of the magnitudes of its first four derivatives in K intervals, shape (5, K, n), SI units.
+
+    Returns
+    -------
+    Array
+        Shape (K, n), N m/s^2 and N/s^2: the second derivative of the torques of inverse dynamics, with drives.
+    """
+    numbers = description.numbers
+    n, K = description.n, motion.shape[1]
+    # Axis i is fixed in link i - 1. In the standard convention the vector from axis i to axis i + 1 is fixed in link i,
+    # in the modified one the vector from axis i - 1 to axis i is fixed in link i - 1.
+    is_standard = description.convention is Convention.STANDARD
+    spin = np.zeros((ORDERS, K))  # jet of the angular velocity of the link
+    fixed = _fixed_in(spin)
+    axes, spans, coms = [], [], []
+    velocities = np.zeros((ORDERS + 1, K))  # jet of the sum of vectors from the base to the link's frame
+    forces, moments = [], []
+    for i in range(n):
+        before = fixed
+        axes.append(before)
+        q = motion[:, :, i]
+        length = float(np.hypot(numbers.a[i], numbers.d[i]))
+        if numbers.prismatic[i]:
+            span = length * before + _product(before, q)
+        else:
+            spin = spin + _product(before[:ORDERS], q[1:])
+            fixed = _fixed_in(spin)
+            span = length * (fixed if is_standard else before)
+        spans.append(span)
+        velocities = velocities + span
+        com = float(np.linalg.norm(numbers.com[i])) * fixed
+        coms.append(com)
+        acceleration = (velocities + com)[2:]
+        acceleration[0] += np.linalg.norm(numbers.gravity)
+        forces.append(numbers.mass[i] * acceleration)
+        # The moment is the derivative of I w.
+        moments.append(_product(_rotating_inertia(numbers.inertia[i], spin), spin)[1:])
+    bounds = np.zeros((K, n))
+    for j in range(n):
+        if numbers.prismatic[j]:
+            load = np.sum(forces[j:], axis=0)
+        else:
+            load = np.zeros((3, K))
+            lever = np.zeros((ORDERS + 1, K))
+            for i in range(j, n):
+                if is_standard or i > j:
+                    lever = lever + spans[i]
+                load = load + moments[i] + _product((lever + coms[i])[:3], forces[i])
+        bounds[:, j] = _product(axes[j][:3], load)[2]
+    result: Array = bounds + motion[4] @ np.abs(numbers.drive_inertia)
+    return result
+
+
+def _product(u: Array, v: Array) -> Array:
+    """Return the jet of a product, shape (m, K), from two of them."""
+    orders = len(u)
+    return np.stack([sum(comb(m, j) * u[j] * v[m - j] for j in range(m + 1)) for m in range(orders)])
+
+
+def _fixed_in(spin: Array) -> Array:
+    """Return the jet of a unit vector fixed in a body, shape (ORDERS + 1, K), from that of the angular velocity."""
+    jet = [np.ones(spin.shape[1])]
+    for m in range(ORDERS):
+        jet.append(sum(comb(m, j) * spin[j] * jet[m - j] for j in range(m + 1)))
+    return np.stack(jet)
+
+
+def _rotating_inertia(inertia: Array, spin: Array) -> Array:
+    """Return the jet of a body's inertia in world axes, in the spectral norm, shape (ORDERS, K).
+
+    I = c 1 + D with c the mean of the extreme eigenvalues: c 1 does not change, and D' = [w] D - D [w].
+    """
+    low, *_, high = np.linalg.eigvalsh(inertia)
+    jet = [np.full(spin.shape[1], (high - low) / 2)]
+    for m in range(ORDERS - 1):
+        jet.append(2 * sum(comb(m, j) * spin[j] * jet[m - j] for j in range(m + 1)))
+    result = np.stack(jet)
+    result[0] = max(abs(low), abs(high))
+    return result

@@ -1,0 +1,84 @@
+"""What a certificate of clearance covers: lengths in metres, links with shapes, arms with locked joints.
+
+Modules: collision_avoidance, goals, report, work.
+"""
+
+import numpy as np
+import pytest
+
+import dhkit
+from dhkit.description import asset, pose
+from dhkit.errors import PlanningError
+from dhkit.model.shapes import link_parts
+from dhkit.planning import Obstacle
+
+START, GOAL = np.array([-0.8, -0.5, 0.5, 0, 0, 0.0]), np.array([0.8, -0.5, 0.5, 0, 0, 0])
+UR5 = asset("urdf/ur5.urdf").read_text()
+
+
+def planned(arm, ball, **options):
+    return arm.plan(START, GOAL, obstacles=[ball], intervals=24, compare=False, **options)
+
+
+def test_a_table_of_large_lengths_does_not_widen_the_clearance(tmp_path):
+    """Axes 1e-6 rad off parallel have a common normal hundreds of kilometres away."""
+    elbow = '<joint name="elbow" type="revolute">\n    <origin xyz="-0.425 0 0" rpy="0 0 0" />'
+    assert elbow in UR5
+    (tmp_path / "tilted.urdf").write_text(UR5.replace(elbow, elbow.replace('rpy="0 0 0"', 'rpy="0 1e-6 0"')))
+    arm = dhkit.Arm.load(tmp_path / "tilted.urdf")
+    assert arm.description.reach > 1e4
+    free = arm.plan(START, GOAL, intervals=24, compare=False)
+    ball = Obstacle.sphere(0.02, arm.fk(free.q(free.duration / 2))[:3, 3])
+    motion = planned(arm, ball, clearance=0.0)
+    assert arm.distance(motion.q(np.linspace(0, motion.duration, 2000)), [ball]).distance.min() > -1e-6
+
+
+def test_a_link_whose_mesh_is_missing_is_named(tmp_path):
+    begin = UR5.index('<link name="link3"')
+    end = UR5.index("</link>", begin)
+    link = UR5[begin:end]
+    for shape in ("cylinder", "sphere", "box"):
+        while (at := link.find(f"<{shape} ")) >= 0:
+            link = link[:at] + '<mesh filename="forearm.stl"/>' + link[link.index("/>", at) + 2 :]
+    (tmp_path / "bare.urdf").write_text(UR5[:begin] + link + UR5[end:])
+    arm = dhkit.Arm.load(tmp_path / "bare.urdf")
+    report = planned(arm, Obstacle.sphere(0.05, (2.0, 2.0, 2.0))).report
+    assert report.without_shapes == ("link 3",)
+    assert "not checked for collisions, without a shape: link 3" in str(report)
+    whole = planned(dhkit.Arm.load("ur5"), Obstacle.sphere(0.05, (2.0, 2.0, 2.0))).report
+    assert whole.without_shapes == ()
+
+
+@pytest.mark.parametrize(("name", "locked"), [("ur5", {2: 1.6}), ("ur5", {0: 0.4, 4: -1.0}), ("stanford", {2: 0.4})])
+def test_links_of_a_locked_arm_are_where_they_were(name, locked):
+    """Points of the solids are those of the whole arm with these joints held."""
+    whole = dhkit.Arm.load(name)
+    arm = whole.lock(locked)
+    free = [i for i in range(whole.n) if i not in locked]
+    q = np.full(whole.n, 0.3)
+    q[list(locked)] = list(locked.values())
+
+    def centres(robot, joints):
+        frames = robot.frames(joints)
+        parts = link_parts(robot.description)
+        found = [(frames[part.link] @ part.T_link_part)[:3, 3] for part in parts]
+        return np.array(sorted(map(tuple, np.round(found, 9))))
+
+    assert np.abs(centres(arm, q[free]) - centres(whole, q)).max() < 1e-8
+    assert not arm.description.drawn
+
+
+@pytest.mark.parametrize("name", ["al5d", "cobra600", "pan_tilt"])
+def test_a_pose_that_is_not_met_is_refused_unless_its_coordinates_are_named(name):
+    arm = dhkit.Arm.load(name)
+    q = np.array([0.3, 0.4, 0.2, 0.1])[: arm.n].clip(arm.limits.lower, arm.limits.upper)
+    start = np.full(arm.n, 0.05).clip(arm.limits.lower, arm.limits.upper)
+    T = arm.fk(q) @ pose((0, 0, 0), euler=(0.9, 0.7, 0.4))
+    with pytest.raises(PlanningError, match=rf"^goal: {name} does not meet this pose: of its coordinates it meets"):
+        arm.plan(start, T, intervals=12, compare=False)
+    met = arm.ik(T).met
+    motion = arm.plan(start, T, coordinates=met, intervals=12, compare=False)
+    assert "counted and no other coordinates" in str(motion.report)
+    with pytest.raises(ValueError, match=r"coordinates is \('x',\); .* meets"):
+        arm.plan(start, T, coordinates=("x",), intervals=12, compare=False)
+    assert arm.plan(start, arm.fk(q), intervals=12, compare=False).report.coordinates == ()
