@@ -7,7 +7,9 @@ TEST_READY := $(VENV)/.ready-test
 CHECK_READY := $(VENV)/.ready-check
 ACCEPT_READY := $(VENV)/.ready-accept
 BENCH_READY := $(VENV)/.ready-bench
-PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile -q
+# `make test ORDER=` runs the tests in random order.
+ORDER ?= -p no:randomly
+PYTEST = $(BIN)/python -m pytest -n 2 --dist loadfile -q $(ORDER)
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Compiled modules are kept: without them each of the processes that tests start compiles all sources anew.
 unexport PYTHONDONTWRITEBYTECODE

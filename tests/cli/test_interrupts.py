@@ -47,6 +47,7 @@ TIMES = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "seconds"), TIMES)
 def test_a_command_ends_in_one_line(command, seconds):
     done = subprocess.run(

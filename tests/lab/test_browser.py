@@ -95,8 +95,8 @@ def test_a_number_is_typed_and_a_wrong_one_is_refused(kept_page):
     page.until("document.querySelector('.joint').classList.contains('outside')")
 
 
-def test_arrow_keys_move_by_one_ten_and_a_tenth_of_a_degree(kept_page):
-    lab, page = kept_page("puma560")
+def test_arrow_keys_move_by_one_ten_and_a_tenth_of_a_degree(visit):
+    lab, page = visit("puma560")
     q = lab.desk.q.copy()
     for label in ("elbow", "elbow, value"):
         page.evaluate(f"{labelled(label)}.focus()")

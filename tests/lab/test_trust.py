@@ -294,6 +294,7 @@ def copied(lab, tmp_path, monkeypatch):
     return space
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["quintic", "trapezoidal", "line", "least-time", "spline", "through", "circle"])
 def test_copied_lines_make_the_same_motion(kind, open_lab, tmp_path, monkeypatch):
     lab = open_lab("planar2r")

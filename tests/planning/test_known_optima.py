@@ -132,6 +132,7 @@ def bang_coast_bang(distance, duration, acceleration):
     return v * v / 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.1, 2.0, 4.0, 10.0, 100.0])
 @pytest.mark.parametrize("intervals", [None, ODD])
 def test_least_energy_is_a_short_push_a_long_glide_and_a_short_brake(law, factor, intervals):
@@ -153,6 +154,7 @@ def test_least_energy_with_a_free_duration(law):
     law.holds("time and energy: bang, coast, bang", relative(motion.report.cost, least), 5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("intervals", [None, 28, 40, 56, 72])
 def test_the_manutec_r3s_least_energy(law, intervals):
     """The published optimal control problem of an arm with drives that two joints turn, on meshes of all sizes."""

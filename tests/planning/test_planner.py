@@ -180,6 +180,7 @@ def test_the_tools_speed():
     assert speed.max() > 0.499
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "speed"), [("puma560", 0.01), ("puma560", 1e-4), ("ur5", 0.01)])
 def test_a_tool_speed_far_below_the_joints_speeds_is_kept(name, speed):
     """From rest to rest the slowed motion is a solution."""
@@ -523,6 +524,7 @@ def test_a_move_too_small_to_be_optimized_is_certified_and_the_report_says_so():
     kept(arm, motion, Limits.of(arm))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("objective", ["effort", "energy", "jerk"])
 def test_smooth_objectives_in_little_more_than_the_least_time(objective):
     """Torques nearly jump there, which parabolas exceed between their points."""

@@ -28,7 +28,7 @@ LIMITS = Limits(seconds=1.0, memory=400 << 20)
 SLEEPERS = "stops itself", "ignores signals"
 VIOLENT = "allocates", "crashes", "is a fork bomb", "floods", "closes its answers", "stops itself", "ignores signals"
 """After these a program is started anew; after all of them another one runs on."""
-SHORT = Limits(seconds=0.1, memory=400 << 20)
+SHORT = Limits(seconds=0.5, memory=400 << 20)
 """For programs that only wait: they are late after four times as long on the clock."""
 
 HARMFUL = {
@@ -46,8 +46,8 @@ HARMFUL = {
     "writes an endless line": ("import os\ndef fk(q):\n    while True:\n        os.write(4, b'x' * 65536)\n", "garbage", "no answer"),
     "nests deeply": ("import os\ndef fk(q):\n    os.write(4, b'[' * 100000 + b'\\n')\n", "garbage", "no answer"),
     "closes its answers": ("import os, time\ndef fk(q):\n    os.close(4)\n    time.sleep(50)\n", "ended", "ended"),
-    "stops itself": ("import os, signal\ndef fk(q):\n    os.kill(os.getpid(), signal.SIGSTOP)\n", "late", "no answer within 0.4 s$"),
-    "ignores signals": ("import signal, time\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\ndef fk(q):\n    while True:\n        time.sleep(1)\n", "late", "no answer within 0.4 s$"),
+    "stops itself": ("import os, signal\ndef fk(q):\n    os.kill(os.getpid(), signal.SIGSTOP)\n", "late", "no answer within 2 s$"),
+    "ignores signals": ("import signal, time\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\ndef fk(q):\n    while True:\n        time.sleep(1)\n", "late", "no answer within 2 s$"),
     "returns text": ("def fk(q):\n    return 'abc'\n", "raised", "expected real numbers"),
     "returns complex numbers": ("def fk(q):\n    return 1j\n", "raised", "returned complex"),
     "is no Python": ("def fk(q)\n    return 1\n", "unreadable", "line 1: SyntaxError"),

@@ -37,6 +37,7 @@ def test_other_notations_and_other_right_answers(case):
     assert entry.verdict in (Verdict.CORRECT, Verdict.UNDECIDED), (entry.verdict, entry.statement)
 
 
+@pytest.mark.slow
 def test_labelled_mistakes_are_wrong_and_named():
     named = 0
     for robot, k, key, old, new, labels in MISTAKES:
