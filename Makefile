@@ -84,7 +84,7 @@ lowest:  ## the tests with the oldest versions that pyproject.toml allows
 	$(PYTHON) -m venv $(VENV)-lowest
 	$(VENV)-lowest/bin/python -m pip install --quiet uv
 	VIRTUAL_ENV=$(VENV)-lowest $(VENV)-lowest/bin/uv pip install --quiet --resolution lowest-direct --editable '.[test]'
-	$(VENV)-lowest/bin/python -m pytest -n 2 --dist loadfile -q -W ignore::DeprecationWarning tests
+	$(VENV)-lowest/bin/python -m pytest -n 2 --dist loadfile -q $(ORDER) -W ignore::DeprecationWarning tests
 
 format: $(CHECK_READY)  ## let ruff format the sources
 	$(BIN)/ruff format .

@@ -231,6 +231,8 @@ def _plan_along_line(arm: Arm, start: Array, goal: Array, between: Mapping[str, 
     """
     if between["via"]:
         raise DescriptionError("--line: found --via too; expected a motion straight from start to goal, without")
+    if between["coordinates"] is not None:
+        raise DescriptionError("--line: found --coordinates too; expected a line, on which all coordinates count")
     around = {name: value for name, value in between.items() if name not in ("via", "coordinates")}
     T_goal = goal if goal.shape == (4, 4) else arm.fk(goal)
     path = joint_path(arm.description, tool_line(arm.fk(start), T_goal), start, options["limits"])

@@ -23,8 +23,8 @@ from dhkit.planning.obstacles import (
     Pair,
     Scene,
     Separation,
-    arm_size,
     check_obstacles,
+    checked_pairs,
     distance,
     pair_distances,
     smallest_distances,
@@ -124,7 +124,7 @@ class CollisionAvoidance:
         PlanningError
             A clearance larger than the space in which the arm moves.
         """
-        if self.clearance > (size := arm_size(description)):
+        if self.clearance > (size := checked_pairs(description).size):
             raise PlanningError(f"clearance is {self.clearance:.4g} m; the arm itself reaches over {size:.4g} m")
         separation = Separation(description, self.obstacles, self.self_collision)
         ends = separation.gaps(np.stack([start, goal])[:, None]).gap

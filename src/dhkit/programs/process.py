@@ -22,6 +22,7 @@ from pathlib import Path
 import psutil
 
 from dhkit.errors import DhkitError
+from dhkit.grading.isolation import WAITING_FACTOR
 
 HERE = Path(__file__).parent
 MAX_LINE_BYTES = 1 << 22
@@ -35,11 +36,6 @@ EXIT_DELAY = 0.3
 """Longest time from the end of a program's answers to its own end, s."""
 WATCH_PERIOD = 0.05
 """Time between two looks at memory and processes, s."""
-WAITING_FACTOR = 4.0
-"""Longest time of a call on the clock, as a multiple of the limit of processor time.
-
-On a busy machine a program waits for its turns, which must not change its score; one that sleeps ends all the same.
-"""
 MAX_END_TIME = 5.0
 """Longest time that the supervisor may take to end the processes that a program started, s."""
 

@@ -2,7 +2,7 @@
 
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, world_axes
 from dhkit.planning.obstacles.clearance import Distances, distance, pair_distances, smallest_distances
-from dhkit.planning.obstacles.pairs import CheckedPairs, Pair, arm_size, checked_pairs
+from dhkit.planning.obstacles.pairs import CheckedPairs, Pair, checked_pairs
 from dhkit.planning.obstacles.sampling import PathSampler
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
 from dhkit.planning.obstacles.separation import Gaps, PlaneRow, Separation
@@ -19,7 +19,6 @@ __all__ = [
     "PlaneRow",
     "Scene",
     "Separation",
-    "arm_size",
     "check_obstacles",
     "checked_pairs",
     "distance",

@@ -54,6 +54,9 @@ class CheckedPairs:
     near: tuple[tuple[int, int], ...]
     """The pairs of ``itself`` that came nearer than 5 % of the reach, which an optimizer includes."""
 
+    size: float
+    """Largest edge of the box around all axes of capsules in these configurations, m."""
+
 
 class Pair(NamedTuple):
     """A capsule of the arm, by its index, and what it must stay away from."""
@@ -86,18 +89,12 @@ def _checked_pairs(description: Description, mesh_folder: Path | None) -> Checke
         pair for pair, gap in gaps.items() if np.ptp(gap) > CONSTANT_DISTANCE and np.mean(gap < 0) <= OVERLAP_SHARE
     ]
     return CheckedPairs(
+        size=float(np.ptp(axes.reshape(-1, 3), axis=0).max()) if axes.size else 0.0,
         moving=tuple(int(i) for i in np.flatnonzero(moves.any(axis=(1, 2)))),
         heights=tuple((i, end) for i, end in heights),
         itself=tuple(itself),
         near=tuple(pair for pair in itself if gaps[pair].min() < NEAR_SHARE * description.reach),
     )
-
-
-@lru_cache(maxsize=64)
-def arm_size(description: Description) -> float:
-    """Return the size of the space in which the links were seen in random configurations, m."""
-    axes = world_axes(description, _configurations(description))
-    return float(np.ptp(axes.reshape(-1, 3), axis=0).max()) if axes.size else 0.0
 
 
 def capsules_beside(description: Description, obstacle: Obstacle) -> tuple[int, ...]:
