@@ -9,6 +9,8 @@ ACCEPT_READY := $(VENV)/.ready-accept
 BENCH_READY := $(VENV)/.ready-bench
 # `make test ORDER=` runs the tests in random order.
 ORDER ?= -p no:randomly
+# `make test MARKS='not slow or browser'` runs the tests with a browser too, as .ci/run does.
+MARKS ?= not slow
 PYTEST = $(BIN)/python -m pytest -n 2 --dist loadfile -q $(ORDER)
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Compiled modules are kept: without them each of the processes that tests start compiles all sources anew.
@@ -39,7 +41,7 @@ demo: $(READY)  ## build a PUMA 560 from its table, verify it, write out/puma560
 	$(BIN)/dhkit demo
 
 test: $(TEST_READY)  ## the tests but those that take seconds, laws at a small sample size
-	$(PYTEST) -m 'not slow' $(ARGS)
+	$(PYTEST) -m '$(MARKS)' $(ARGS)
 
 test-all: $(TEST_READY)  ## all tests, laws at a small sample size
 	$(PYTEST) $(ARGS)

@@ -141,6 +141,8 @@ def _left_out(config: pytest.Config) -> str:
     laws = "laws at their full size and on every robot: make accept"
     if config.option.markexpr == "not slow":
         return f"Left out: tests that take seconds, and all with a browser: make test-all; {laws}"
+    if config.option.markexpr == "not slow or browser":
+        return f"Left out: tests that take seconds but for those with a browser: make test-all; {laws}"
     return f"Left out: {laws}"
 
 
@@ -151,8 +153,11 @@ def _is_whole(config: pytest.Config) -> bool:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what takes the fixture, and what runs nowhere else, so that -m law finds it."""
+    """Mark laws, and what runs nowhere else, so that -m law finds them; and tests with a browser, which take seconds."""
     for item in items:
+        if "chromium" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.browser)
+            item.add_marker(pytest.mark.slow)
         left = any(mark == only_accepting.mark for mark in item.iter_markers("skipif"))
         if left or "law" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.law)

@@ -103,6 +103,7 @@ def test_a_goal_may_be_given_in_several_ways(where, facts, tmp_path):
     assert len(said["branches"]) == (0 if where == "to" else 2)
 
 
+@pytest.mark.slow
 def test_files_are_written_and_read_back(plan, tmp_path):
     arm = Arm.load("planar2r")
     files = [tmp_path / name for name in ("run.npz", "run.html", "run.png")]

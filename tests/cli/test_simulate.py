@@ -132,6 +132,7 @@ def test_without_a_motion_every_joint_moves():
         assert motion.duration >= 2 and np.all(motion.q(0.0) != motion.q(motion.duration))
 
 
+@pytest.mark.slow
 def test_compare_prints_a_table_and_draws_it(dhkit, tmp_path):
     figure = tmp_path / "compared.png"
     status, out, _ = dhkit("compare", "planar2r", *ENDS, "--figure", figure)

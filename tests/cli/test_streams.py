@@ -125,6 +125,7 @@ def test_options_of_one_meaning_have_one_name():
         ("simulate puma560 --duration 3", "simulating"),
     ],
 )
+@pytest.mark.slow
 def test_a_bar_shows_how_far_it_is(command, words):
     """On a terminal of its own; the bar is there from the beginning, so that the work need not last."""
     ours, theirs = os.openpty()
@@ -167,6 +168,7 @@ SHELL = f"'{sys.executable}' -m dhkit"
         ("equations planar2r -o /dev/full", 2, ""),
     ],
 )
+@pytest.mark.slow
 def test_streams_that_take_nothing_lose_nothing_else(command, status, words):
     done = subprocess.run(
         ["/bin/sh", "-c", f"{SHELL} {command}"], capture_output=True, text=True, timeout=60, check=False
@@ -179,6 +181,7 @@ def test_streams_that_take_nothing_lose_nothing_else(command, status, words):
 
 
 @pytest.mark.parametrize("command", ["robots", "robots --json", "info puma560"])
+@pytest.mark.slow
 def test_a_reader_that_goes_away_is_no_answer_of_no(command):
     first = subprocess.Popen([sys.executable, "-m", "dhkit", *command.split()], stdout=subprocess.PIPE)
     first.stdout.close()

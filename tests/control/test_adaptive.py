@@ -59,6 +59,7 @@ def gap_of_the_regressor(description, samples):
 
 
 @pytest.mark.parametrize("name", robots())
+@pytest.mark.slow
 def test_the_regressor_gives_the_terms_of_the_equation_of_motion(name, law):
     law.holds(
         "Y theta against M qdd_r + C qd_r + g", gap_of_the_regressor(library_robot(name), law.samples(500)), ROUNDING
@@ -66,6 +67,7 @@ def test_the_regressor_gives_the_terms_of_the_equation_of_motion(name, law):
 
 
 @given(arms(least=1, most=6))
+@pytest.mark.slow
 def test_the_regressor_of_any_arm(law, description):
     law.holds("Y theta against M qdd_r + C qd_r + g", gap_of_the_regressor(description, law.samples(100)), ROUNDING)
 
@@ -128,6 +130,7 @@ def test_the_error_of_the_fourth_round_is_a_fifth_of_the_first(name, law):
 
 
 @pytest.mark.parametrize("name", ADAPTING)
+@pytest.mark.slow
 def test_the_lyapunov_function_never_rises(name, law):
     """dV/dt = -s^T K_D s under continuous adaptation, from half the true masses and inertias."""
     law.samples(1)

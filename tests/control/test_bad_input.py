@@ -133,6 +133,7 @@ def test_progress_can_end_a_run():
         run(duration=3.0, progress=stop)
 
 
+@pytest.mark.slow
 def test_a_relay_has_no_continuous_solution():
     def relay(t, q, qd, setpoint):
         return ARM.gravity_torque(q) + [20, 8] * np.sign(setpoint.q - q - 0.2 * qd)

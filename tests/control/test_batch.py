@@ -67,6 +67,7 @@ def same_as_alone(arm, law, controller, reference, q, qd, singles=None, friction
 
 
 @pytest.mark.parametrize("name", ["puma560", "panda", "stanford", "planar2r", "cart_pendulum"])
+@pytest.mark.slow
 def test_states_advance_as_each_alone(name, law):
     arm = Arm.load(name)
     law.samples(1)
@@ -194,6 +195,7 @@ def test_a_controller_of_ones_own_on_top_of_ours_keeps_its_say():
     assert np.allclose(lazy.q[1], alone.q[-1], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_blocks_tell_how_far_the_whole_is():
     told = []
     q, _ = states(ARM, 3 * BLOCK)

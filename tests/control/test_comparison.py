@@ -88,6 +88,7 @@ def check_row(printed, errors, where):
         assert abs(value - float(cell)) <= LAST_DIGIT * digit, f"{where}, {field}: {value:.3g}; the page has {cell}"
 
 
+@pytest.mark.slow
 def test_some_rows_of_the_page_are_made_again():
     """Run `make assets` when this or the next test fails."""
     printed, errors = printed_rows("planar2r"), errors_of(case_of("planar2r"), QUICK)

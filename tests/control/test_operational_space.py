@@ -87,6 +87,7 @@ def test_it_comes_to_rest_at_a_singularity(offset, law):
         ("panda", [0.0, -0.3, 0.0, -2.2, 0.0, 2.0, 0.8], [0.3, -0.6, 0.3, -1.9, -0.3, 2.3, 1.1], 2e-5),
     ],
 )
+@pytest.mark.slow
 def test_arms_of_other_joints_follow(name, first, last, required, law):
     """The bounds are at least twice what was seen; joints of less inertia are further off."""
     law.samples(1)

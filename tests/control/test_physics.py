@@ -61,6 +61,7 @@ def test_states_are_those_over_pinocchio(name, law):
 
 
 @pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.slow
 def test_accelerations_along_a_motion_are_pinocchios(name, law):
     arm = library_robot(name)
     model = pinocchio_model(arm)
@@ -83,6 +84,7 @@ def test_accelerations_along_a_motion_are_pinocchios(name, law):
 
 
 @pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.slow
 def test_runge_and_kutta_are_of_order_four(name, law):
     arm = library_robot(name)
     plant = Plant(arm, restitution=None)
@@ -210,6 +212,7 @@ def test_a_stop_leaves_the_share_of_the_rate_that_it_should(restitution, law):
 
 
 @pytest.mark.parametrize("rate", [1000.0, None])
+@pytest.mark.slow
 def test_at_rest_against_a_stop_an_arm_stays(rate):
     """Gravity lets the arm fall on its stops, where it stays, whatever it is pushed with against them."""
     push = Push([0.0, 0.0, -30.0], begin=1.2)

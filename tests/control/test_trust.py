@@ -77,6 +77,7 @@ def test_the_tool_is_measured_against_the_arm_that_the_reference_is_of(tmp_path)
 
 
 @pytest.mark.parametrize("length", [0.05, 0.01])
+@pytest.mark.slow
 def test_a_continuous_run_does_not_step_over_a_pulse(length):
     def pulse(t, q, qd, setpoint):
         return HOLD(t, q, qd, setpoint) + np.array([50.0 * (0.9 < t < 0.9 + length), 0, 0, 0, 0, 0])
@@ -181,6 +182,7 @@ def test_the_name_of_a_column_counts_before_its_capitals(tmp_path):
 @pytest.mark.parametrize(
     "controller", [ComputedTorque, *(pytest.param(law, marks=only_accepting) for law in (PDGravity, OperationalSpace))]
 )
+@pytest.mark.slow
 def test_continuous_runs_go_on_after_a_rest(controller):
     step = Step(START, START + 0.1, time=1.5)
     run = ARM.simulate(controller.tuned(ARM), step, duration=2.5, rate=None, restitution=None)

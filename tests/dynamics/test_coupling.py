@@ -127,6 +127,7 @@ def test_locking_keeps_the_couplings_of_joints_that_move(locked, left, law):
     law.holds("M of the locked arm", np.abs(Arm(arm).mass_matrix(q[moving]) - M).max() / np.abs(M).max(), 1e-13)
 
 
+@pytest.mark.slow
 def test_motions_and_controllers_know_it():
     """The certificate, computed torque and the adaptive law use M with the coupling."""
     arm = Arm(MANUTEC)

@@ -705,6 +705,7 @@ def test_digits_that_cancel_are_worked_out_again(large):
     assert verdict(V=f"({V} + m1*q1*10^-20 + {large}) - {large}") is Verdict.WRONG
 
 
+@pytest.mark.slow
 def test_a_state_that_sets_the_zero_is_as_exact_as_the_smallest_value_after_it():
     """With these seeds V is below 0.002 J where it is compared, and the digits of the first state are few."""
     for seed in (2, *range(20, 24)):

@@ -86,7 +86,6 @@ def kept_page(kept_pages):
     def make(name):
         lab, page, q = kept_pages(name)
         used.append((lab, page))
-        page.call("Page.bringToFront")  # one in the background draws nothing
         for request in ("motion.cancel", "motion.clear", "tool.clear", "waypoints.clear"):
             lab.answer(request, {})
         if states(lab)["table"]["changed"]:
@@ -96,7 +95,11 @@ def kept_page(kept_pages):
             "(({ joints, target, motion, table, waypoints }) => !target && !motion && !table.changed"
             f" && !waypoints.length && JSON.stringify(joints.q) === JSON.stringify({json.dumps(q)}))(dhkit.lab.state)"
         )
-        page.evaluate("dhkit.lab.openPanel('joints'), dhkit.lab.message.hidden = true")
+        page.resize(1280, 800)
+        page.evaluate(
+            "dhkit.lab.setUnits({ angle: 'deg', length: 'm' }), dhkit.lab.openPanel('joints'),"
+            " dhkit.lab.message.hidden = true"
+        )
         page.settle()
         return lab, page
 

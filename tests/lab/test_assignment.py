@@ -52,6 +52,7 @@ def test_the_examples_ship():
 
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
+@pytest.mark.slow
 def test_an_example_can_be_done(file, begin, tmp_path):
     assignment = Assignment.read(file)
     wants_program = any(isinstance(goal.condition, OwnScore) for goal in goals(assignment))

@@ -434,6 +434,7 @@ def fill(connection, message, url):
 
 @needs_proc
 @pytest.mark.usefixtures("imported")
+@pytest.mark.slow
 def test_a_page_that_takes_no_answers_is_not_read_from(lab):
     """A page asks for megabytes of answers and never reads."""
     lab._requests["table.download"] = lambda data: {"content": "x" * 50_000}
@@ -638,6 +639,7 @@ def test_a_pose_to_go_to_needs_no_preparation(lab, kind):
 
 
 @pytest.mark.parametrize("kind", ["least-time", "quintic"])
+@pytest.mark.slow
 def test_a_flood_of_plans_is_one_thread(lab, kind):
     before = threading.active_count()
     most = 0
@@ -661,6 +663,7 @@ def test_a_result_that_cannot_be_shown_is_an_error_of_its_job(lab):
 
 @needs_proc
 @pytest.mark.usefixtures("imported")
+@pytest.mark.slow
 def test_a_file_that_unpacks_to_gigabytes_is_refused(lab):
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("q.npy", "w") as entry:

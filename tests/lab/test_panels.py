@@ -352,6 +352,7 @@ def test_the_end_of_a_slide_is_a_boundary():
     assert boundary_distance(arm, [0.3, 1.5, middle, 0.0])[0] > 0.05
 
 
+@pytest.mark.slow
 def test_a_sheet_about_another_robot_is_refused_and_no_verdict_stays(open_lab):
     lab = open_lab("planar2r")
     judged(lab, "lines", RIGHT)

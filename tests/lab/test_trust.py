@@ -338,6 +338,7 @@ def test_copied_lines_follow_the_chosen_branch_or_iterate(puma, open_lab, tmp_pa
 
 @pytest.mark.parametrize("reference", ["hold", "sine", "motion"])
 @pytest.mark.parametrize("locked", [False, True])
+@pytest.mark.slow
 def test_copied_lines_simulate_what_runs(reference, locked, open_lab, tmp_path, monkeypatch):
     if reference == "motion" and locked:
         pytest.skip("said in a comment")
@@ -366,6 +367,7 @@ def test_copied_lines_simulate_what_runs(reference, locked, open_lab, tmp_path, 
 # The server
 
 
+@pytest.mark.slow
 def test_strangers_who_say_nothing_are_bounded(puma):
     port = int(puma.url.split(":")[2].split("/")[0])
     idle = [socket.create_connection(("127.0.0.1", port)) for _ in range(200)]

@@ -21,6 +21,7 @@ def planner(**options):
 
 
 @pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.slow
 def test_motions_and_errors_come_in_order(workers):
     calls = []
     made = planner(constraints=[ToolSpeed(5.0)])
@@ -41,6 +42,7 @@ def test_one_start_serves_all_goals_and_options_are_those_of_solve():
     assert len(planner().solve_many([0, 0.3], poses, workers=1)) == 2
 
 
+@pytest.mark.slow
 def test_each_pair_may_begin_from_a_similar_motion():
     made = planner()
     first = made.solve_many(STARTS, GOALS, workers=1)
@@ -100,6 +102,7 @@ def test_what_can_go_wrong_with_processes_is_said():
         planner().solve_many(STARTS, bad, workers=1)
 
 
+@pytest.mark.slow
 def test_an_exception_in_progress_ends_the_rest():
     calls = []
 

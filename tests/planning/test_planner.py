@@ -548,6 +548,7 @@ def test_least_energy_is_below_that_of_smooth_motions():
         assert energy.report.cost < cost_of(Objective.of("energy"), smooth, arm)
 
 
+@pytest.mark.slow
 def test_a_coarser_mesh_is_of_the_curve_that_led_to_the_motion_and_none_among_obstacles():
     """The effort of planar2r near its least time is found with constant accelerations, after parabolas fail."""
     arm = library_robot("planar2r")

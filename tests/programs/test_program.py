@@ -113,6 +113,7 @@ def neighbour(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", HARMFUL)
+@pytest.mark.slow
 def test_harm_is_said_and_other_programs_run(name, program, neighbour):
     text, failure, said = HARMFUL[name]
     limits = SHORT if name in SLEEPERS else LIMITS

@@ -58,6 +58,7 @@ def test_trapezoidal_is_the_textbooks(seed, T, blend):
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("name", ["planar2r", "puma560", "cobra600"])
+@pytest.mark.slow
 def test_no_other_blend_is_faster(name, seed):
     arm, rng = library_robot(name), np.random.default_rng(seed)
     lower, upper = np.maximum(arm.numbers.lower, -1), np.minimum(arm.numbers.upper, 1)

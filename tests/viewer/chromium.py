@@ -12,7 +12,6 @@ import signal
 import subprocess
 import tempfile
 import time
-import urllib.request
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -21,7 +20,7 @@ import pytest
 from PIL import Image
 from tornado.websocket import WebSocketClientConnection, websocket_connect
 
-from waiting import HANGS
+from waiting import HANGS, wait_for
 
 BINARY = next(
     (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
@@ -64,7 +63,7 @@ def require_chromium() -> None:
 
 
 class Chromium:
-    """A browser process with an empty profile; pages are opened one at a time by :meth:`page`."""
+    """A browser process with an empty profile; pages are opened by :meth:`page`."""
 
     def __init__(self) -> None:
         self.profile = tempfile.TemporaryDirectory(prefix="dhkit-chromium-", ignore_cleanup_errors=True)
@@ -75,22 +74,24 @@ class Chromium:
             start_new_session=True,
         )
         self.loop = asyncio.new_event_loop()
-        self.port = self._port()
+        port, path = self._announced()
+        self.address = f"ws://127.0.0.1:{port}"
+        self.browser = Connection(self.loop, f"{self.address}{path}")
 
-    def _port(self) -> int:
-        announced = Path(self.profile.name) / "DevToolsActivePort"
-        deadline = time.monotonic() + HANGS
-        while not (announced.exists() and announced.read_text().count("\n")):
-            assert self.process.poll() is None and time.monotonic() < deadline, "Chromium did not start"
-            time.sleep(0.05)
-        return int(announced.read_text().split()[0])
+    def _announced(self) -> list[str]:
+        """Return the port and the path of the browser's own socket, once Chromium has written them."""
+        file = Path(self.profile.name) / "DevToolsActivePort"
+
+        def lines() -> list[str]:
+            assert self.process.poll() is None, "Chromium did not start"
+            return file.read_text().split() if file.exists() else []
+
+        return wait_for(lambda: found if len(found := lines()) == 2 else None, "Chromium's port")
 
     def page(self, width: int = 900, height: int = 700, *, dark: bool = False, scale: float = 1.0) -> Page:
-        """Open an empty page of a size in CSS px."""
-        request = urllib.request.Request(f"http://127.0.0.1:{self.port}/json/new", method="PUT")
-        with urllib.request.urlopen(request, timeout=HANGS) as answer:
-            target = json.load(answer)
-        page = Page(self.loop, target["webSocketDebuggerUrl"])
+        """Open an empty page of a size in CSS px, in a window of its own: a hidden tab would draw nothing."""
+        target = self.browser.call("Target.createTarget", url="about:blank", newWindow=True)
+        page = Page(self.loop, f"{self.address}/devtools/page/{target['targetId']}")
         page.resize(width, height, scale)
         page.scheme("dark" if dark else "light")
         return page
@@ -107,17 +108,13 @@ class Chromium:
         self.profile.cleanup()
 
 
-class Page:
-    """One page, with every address that it has asked for and every error that it has logged."""
+class Connection:
+    """A socket of the DevTools protocol."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop, address: str) -> None:
         self.loop = loop
-        self.requests: list[str] = []
-        self.errors: list[str] = []
         self.count = 0
         self.socket = loop.run_until_complete(_connect(address))
-        for domain in ("Network", "Page", "Runtime", "Log"):
-            self.call(f"{domain}.enable")
 
     def call(self, method: str, **parameters: object) -> dict:
         """Return a DevTools command's result."""
@@ -134,6 +131,21 @@ class Page:
                 assert "error" not in message, message
                 return message["result"]
             self._note(message)
+
+    def _note(self, event: dict) -> None:
+        """Take notice of an event."""
+
+
+class Page(Connection):
+    """One page, with every address that it has asked for and every error that it has logged."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, address: str) -> None:
+        super().__init__(loop, address)
+        self.requests: list[str] = []
+        self.errors: list[str] = []
+        for domain in ("Network", "Page", "Runtime", "Log"):
+            self.call(f"{domain}.enable")
+        self.call("Emulation.setFocusEmulationEnabled", enabled=True)
 
     def _note(self, event: dict) -> None:
         parameters = event.get("params", {})

@@ -51,7 +51,6 @@ def live_page(chromium, signal_arm):
 def live(live_page):
     """That view and page, with the arm alone in its first pose; the page must have met no error."""
     view, opened = live_page
-    opened.call("Page.bringToFront")  # one in the background draws nothing
     for take_away in (view.points, view.ghosts, view.obstacles):
         take_away(None)
     view.show(MAX_PANEL_MESSAGES[0])

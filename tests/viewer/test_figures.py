@@ -23,6 +23,7 @@ def lines(axes):
 
 
 @pytest.mark.parametrize("name", robots())
+@pytest.mark.slow
 def test_every_robot_has_a_figure_whose_line_goes_through_its_frames(name):
     arm = library_robot(name)
     figure = plot(arm)
@@ -69,6 +70,7 @@ def test_wrong_arrays_are_named(call, complaint):
         call(library_robot("puma560"))
 
 
+@pytest.mark.slow
 def test_a_figure_needs_no_display():
     code = (
         "import sys; from dhkit.viewer import plot; from dhkit.description import library_robot;"

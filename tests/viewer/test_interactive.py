@@ -115,10 +115,9 @@ def kept_page(kept_pages):
     def make(name):
         page, q = kept_pages(name)
         used.append(page)
-        page.call("Page.bringToFront")  # one in the background draws nothing
         page.evaluate("dhkit.lab.ask('table.reset', {})")
         page.evaluate(f"dhkit.lab.ask('joints.set', {{ q: {json.dumps(q)} }})")
-        page.evaluate("dhkit.lab.openPanel('joints')")
+        page.evaluate("dhkit.lab.setUnits({ angle: 'deg', length: 'm' }), dhkit.lab.openPanel('joints')")
         return page
 
     yield make

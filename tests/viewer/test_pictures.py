@@ -189,6 +189,7 @@ def test_arms_of_every_size_are_drawn_and_fill_the_picture(length):
     assert np.ptp(np.flatnonzero(differs.any(axis=0))) > 40
 
 
+@pytest.mark.slow
 def test_many_large_triangles_behind_each_other_take_no_memory():
     import tracemalloc
 

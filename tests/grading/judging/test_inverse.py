@@ -270,6 +270,7 @@ def test_the_formulas_that_mistakes_are_made_in_are_right(name):
         ("puma3", 2, "acos(", "acos(-1*", "supplement"),
     ],
 )
+@pytest.mark.slow
 def test_a_local_change_of_a_formula_is_named(name, joint, old, new, mistake):
     """The formula that is wrong is named, and none that is right is blamed."""
     arm, formulas = RIGHT[name]

@@ -420,6 +420,7 @@ class SupplyPower(Constraint):
 
 @pytest.mark.parametrize("robot", ["puma560", "cobra600"])
 @pytest.mark.parametrize("objective", ["time", "effort"])
+@pytest.mark.slow
 def test_a_constraint_of_ones_own_holds_in_both_programs(robot, objective):
     arm, *_, path = line_of(robot)
     ends = path.q(0.0), path.q(1.0)
@@ -505,6 +506,7 @@ def test_under_a_limit_of_jerk_a_slide_is_a_double_s(d, v, a):
 
 @pytest.mark.parametrize("name", LINES)
 @pytest.mark.parametrize("objective", ["time", "effort"])
+@pytest.mark.slow
 def test_jerk_is_limited_along_a_line(name, objective):
     arm, *_, path = line_of(name)
     free, limits = along_path(arm, path), Limits.of(arm, jerk=300.0)

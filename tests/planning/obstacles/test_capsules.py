@@ -93,6 +93,7 @@ def test_axes_move_with_their_frames():
 
 
 @pytest.mark.parametrize("name", robots())
+@pytest.mark.slow
 def test_what_cannot_move_is_not_checked(name):
     arm = library_robot(name)
     capsules, pairs = link_capsules(arm), checked_pairs(arm)

@@ -106,6 +106,7 @@ def test_rows_hold_at_a_clear_state_by_their_gaps(ur5):
         assert {row.knot for row in rows} == {0, 1, 2}
 
 
+@pytest.mark.slow
 def test_nearest_points_of_segments_and_boxes():
     """Against a dense search along the segment; segments that cross the box, touch it, or are points."""
     rng = np.random.default_rng(1)
@@ -162,6 +163,7 @@ def test_the_smallest_distance_is_that_of_all_pairs(law, ur5, itself):
     law.holds("m between the smallest and the smallest of all", np.abs(ours - theirs).max(), 1e-8, 0)
 
 
+@pytest.mark.slow
 def test_the_planes_that_are_kept_separate_all_solids(ur5):
     rng = np.random.default_rng(2)
     scene = heap(rng)

@@ -72,6 +72,7 @@ def exported(derivation, language, folder):
 
 @pytest.mark.parametrize("language", ["c", "python"])
 @pytest.mark.parametrize("name", LIBRARY)
+@pytest.mark.slow
 def test_exported_code_gives_the_branches_of_the_kernels(name, language, tmp_path):
     arm = library_robot(name)
     solve = exported(inverse_derivation(arm), language, tmp_path)
