@@ -153,7 +153,7 @@ def _is_whole(config: pytest.Config) -> bool:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark laws, and what runs nowhere else, so that -m law finds them; and tests with a browser, which take seconds."""
+    """Mark laws, and what runs only in `make accept`, for -m law; and tests with a browser, which take seconds."""
     for item in items:
         if "chromium" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.browser)
