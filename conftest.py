@@ -7,7 +7,9 @@ from _pytest.doctest import DoctestItem
 
 
 @pytest.fixture(autouse=True)
-def _doctests_write_elsewhere(request, tmp_path, monkeypatch):
+def _doctests_write_elsewhere(request):
     if isinstance(request.node, DoctestItem):
+        # Asked for here: a folder for each of 9,000 tests takes a minute.
+        tmp_path = request.getfixturevalue("tmp_path")
         (tmp_path / "docs").symlink_to(Path(__file__).resolve().parent / "docs")
-        monkeypatch.chdir(tmp_path)
+        request.getfixturevalue("monkeypatch").chdir(tmp_path)

@@ -21,6 +21,7 @@ ASKED = {
 
 
 @pytest.mark.parametrize("command", ASKED)
+@pytest.mark.slow
 def test_folders_are_made(command, tmp_path, capsys):
     path = tmp_path / "new" / "folder" / "out"
     with pytest.raises(SystemExit) as ended:

@@ -177,6 +177,7 @@ def test_on_the_way_it_passes_where_it_is_told(plan, tmp_path):
     assert all(np.abs(passed - place).max(axis=1).min() < ENDS for place in via)
 
 
+@pytest.mark.slow
 def test_limits_are_in_the_units_that_are_asked_for(facts):
     where = ("planar2r", "--to", "zero", "--from", "0.6", "0.6")
     _, radians = facts(*where, "--velocity", "0.5", "--acceleration", "2", "4")

@@ -99,6 +99,7 @@ def test_degrees_are_honoured_in_errors_and_warnings(dhkit, arguments, words):
         "picture planar2r --at 90 0 -o arm.png",
     ],
 )
+@pytest.mark.slow
 def test_bare_degrees_are_noticed(dhkit, arguments, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     _, _, err = dhkit(*arguments.split())

@@ -78,6 +78,7 @@ def test_states_advance_as_each_alone(name, law):
     same_as_alone(arm, law, LQR(arm, np.zeros(arm.n)), np.zeros(arm.n), q, qd)
 
 
+@pytest.mark.slow
 def test_motions_friction_and_setpoints_of_their_own(law):
     arm = Arm.load("puma560")
     law.samples(1)
@@ -104,6 +105,7 @@ def test_gains_of_their_own(law):
 
 
 @pytest.mark.parametrize("friction", [False, Friction(0.05)])
+@pytest.mark.slow
 def test_arms_of_their_own(friction, law):
     arm = Arm.load("puma560")
     law.samples(1)

@@ -22,6 +22,7 @@ def tool_errors(run, arm):
     return np.linalg.norm(errors[:, :3], axis=1).max(), np.linalg.norm(errors[:, 3:], axis=1).max()
 
 
+@pytest.mark.slow
 def test_it_follows_a_line(law):
     """The bounds are twice what was seen: torques are held for 1 ms, in which the setpoint goes on."""
     law.samples(1)
@@ -98,6 +99,7 @@ def test_arms_of_other_joints_follow(name, first, last, required, law):
     assert not run.saturated.any()
 
 
+@pytest.mark.slow
 def test_a_redundant_arm_keeps_its_tool_while_its_posture_moves(law):
     """The panda's elbow goes to the setpoint's from 0.2 rad away along the null space; the tool stays."""
     law.samples(1)

@@ -147,6 +147,7 @@ def test_another_mode_is_refused(monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["puma560", "panda", "cart_pendulum"])
+@pytest.mark.slow
 def test_an_arm_compiles_all_it_has(name, monkeypatch):
     """Afterwards nothing is left to derive, whatever is asked for."""
     seen = []

@@ -290,6 +290,7 @@ for large, small in results:
 """
 
 
+@pytest.mark.slow
 def test_processes_and_threads_that_ask_for_the_same_new_kernel(tmp_path):
     environment = {**os.environ, "DHKIT_CACHE_DIR": str(tmp_path)}
     command = [sys.executable, "-c", THREADS]

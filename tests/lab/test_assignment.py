@@ -263,6 +263,7 @@ def test_a_controller_that_moves_the_arm_there_counts(begin, read):
     lab.answer("control.stop", {})
 
 
+@pytest.mark.slow
 def test_the_share_of_a_score(begin, read, tmp_path):
     program = tmp_path / "mine.py"
     program.write_text("def fk(q):\n    return [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n")

@@ -66,6 +66,7 @@ def test_it_is_compared_where_the_arm_is_and_scored(beside):
     lab.answer("own.ghosts", {"on": False})
 
 
+@pytest.mark.slow
 def test_it_is_loaded_anew_when_it_is_saved(beside):
     lab, file = beside("def fk(q)\n")
     assert own(lab)["error"] == "line 1: SyntaxError: expected ':'"

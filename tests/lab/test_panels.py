@@ -264,6 +264,7 @@ def judged(lab, kind, text):
 RIGHT = "M22 = m2*l2^2/3\ng2 = m2*g*l2*c12/2"
 
 
+@pytest.mark.slow
 def test_answers_are_read_judged_and_explained(open_lab):
     lab = open_lab("planar2r")
     right = judged(lab, "lines", RIGHT)
@@ -302,6 +303,7 @@ def test_an_answer_that_cannot_be_sent_is_refused_at_once(open_lab, kind, text, 
         open_lab("planar2r").answer("submit.grade", {"kind": kind, "text": text})
 
 
+@pytest.mark.slow
 def test_an_answer_that_cannot_be_read_is_said_in_a_line(open_lab):
     lab = open_lab("planar2r")
     for kind, text in (

@@ -247,6 +247,7 @@ def test_a_link_out_of_the_folder_is_refused_by_robots_and_by_imports(tmp_path):
         import_cad(inside, one_joint(tmp_path / "table"))
 
 
+@pytest.mark.slow
 def test_reading_all_of_them_takes_little_memory(tmp_path):
     for k, (name, content, _) in enumerate(BAD.values()):
         (tmp_path / str(k)).mkdir()

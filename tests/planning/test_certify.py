@@ -59,6 +59,7 @@ def test_a_motion_of_another_arm_is_refused():
         Arm.load("puma560").certify(Arm.load("planar2r").quintic([0, 0], [1, 1], 1.0))
 
 
+@pytest.mark.slow
 def test_a_motion_keeps_its_payload_and_friction(tmp_path):
     arm = Arm.load("puma560")
     load = dhkit.Payload(2.0, (0, 0, 0.05))

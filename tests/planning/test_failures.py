@@ -344,6 +344,7 @@ class OwnSpeed(PlainSpeed):
     most: float
 
 
+@pytest.mark.slow
 def test_constraints_that_are_no_values_are_refused():
     start, goal, arm = np.zeros(2), np.array([1.0, 0.5]), dhkit.Arm.load("planar2r")
     for planned in (

@@ -84,6 +84,7 @@ class Dies(ToolSpeed):
         return super().rows(point, parameters)
 
 
+@pytest.mark.slow
 def test_what_can_go_wrong_with_processes_is_said():
     found = planner(constraints=[Dies(5.0)]).solve_many(STARTS[:2], GOALS[:2], workers=2)
     assert all("its process ended: for want of memory perhaps" in str(error) for error in found) and len(found) == 2

@@ -539,6 +539,7 @@ def test_smooth_objectives_in_little_more_than_the_least_time(objective):
         kept(arm, motion, Limits.of(arm))
 
 
+@pytest.mark.slow
 def test_least_energy_is_below_that_of_smooth_motions():
     arm = library_robot("puma560")
     start, goal = np.zeros(6), np.array([0.5, -0.4, 0.6, 0.3, 0.5, -0.2])

@@ -20,6 +20,7 @@ def planned(arm, ball, **options):
     return arm.plan(START, GOAL, obstacles=[ball], intervals=24, compare=False, **options)
 
 
+@pytest.mark.slow
 def test_a_table_of_large_lengths_does_not_widen_the_clearance(tmp_path):
     """Axes 1e-6 rad off parallel have a common normal hundreds of kilometres away."""
     elbow = '<joint name="elbow" type="revolute">\n    <origin xyz="-0.425 0 0" rpy="0 0 0" />'

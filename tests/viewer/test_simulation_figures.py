@@ -91,6 +91,7 @@ def test_errors_are_in_units_that_are_read_easily(error, unit):
     assert f"joint error [{unit}]" in drawn(dhkit.plot(result))
 
 
+@pytest.mark.slow
 def test_a_run_without_error_and_one_of_a_single_state_have_figures():
     for result in (swinging(library_robot("stanford"), error=0.0), swinging(library_robot("planar2r"), states=1)):
         assert "joint error [rad]" in drawn(dhkit.plot(result))

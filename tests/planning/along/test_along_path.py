@@ -136,6 +136,7 @@ def test_time_and_effort_are_weighed():
 
 
 @pytest.mark.parametrize("speed", [1, 3])
+@pytest.mark.slow
 def test_it_is_as_quick_as_toppra(speed, law):
     toppra = pytest.importorskip("toppra")
     limits = Limits.of(PUMA).scaled(velocity=speed)
@@ -268,6 +269,7 @@ def test_other_constraints_are_kept_and_used(constraint, tool_motion):
     assert motion.report.certificate.worst.excess > -1e-3
 
 
+@pytest.mark.slow
 def test_a_given_duration_is_kept(tool_motion):
     arm, path, quickest = tool_motion
     for objective in ("effort", "time", Time() + Effort()):

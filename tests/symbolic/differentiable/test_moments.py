@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import casadi
 import numpy as np
+import pytest
 from hypothesis import given, settings, strategies as st
 
 from acceptance import sample_size
@@ -60,6 +61,7 @@ def test_moments_turn_and_move_like_bodies(seed, angle, p):
 
 @settings(max_examples=max(5, sample_size(400)))
 @given(tilted_arms(least=1))
+@pytest.mark.slow
 def test_regrouping_changes_no_equation(law, arm):
     law.samples(400)
     grouped = InertialTable.of(arm)
