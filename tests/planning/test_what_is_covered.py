@@ -44,10 +44,10 @@ def test_a_link_whose_mesh_is_missing_is_named(tmp_path):
     (tmp_path / "bare.urdf").write_text(UR5[:begin] + link + UR5[end:])
     arm = dhkit.Arm.load(tmp_path / "bare.urdf")
     report = planned(arm, Obstacle.sphere(0.05, (2.0, 2.0, 2.0))).report
-    assert report.without_shapes == ("link 3",)
-    assert "not checked for collisions, without a shape: link 3" in str(report)
+    assert report.not_checked == ("link 3 without a shape",)
+    assert "not checked for collisions: link 3 without a shape" in str(report)
     whole = planned(dhkit.Arm.load("ur5"), Obstacle.sphere(0.05, (2.0, 2.0, 2.0))).report
-    assert whole.without_shapes == ()
+    assert whole.not_checked == ()
 
 
 @pytest.mark.parametrize(("name", "locked"), [("ur5", {2: 1.6}), ("ur5", {0: 0.4, 4: -1.0}), ("stanford", {2: 0.4})])

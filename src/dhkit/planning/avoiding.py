@@ -209,6 +209,7 @@ class AvoidingSearch:
 
         def is_free(q: Array) -> NDArray[np.bool_]:
             free: NDArray[np.bool_] = np.all(self.separation.gaps(q[:, None], most).gap >= need, axis=1)
+            free[free] = task.avoidance.keeps_shapes_apart(task.arm, q[free])
             return free
 
         sampler = PathSampler(is_free, lower, upper, self._speed / self._speed.mean(), seed, self.search.work, samples)

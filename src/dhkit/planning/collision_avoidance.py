@@ -10,10 +10,10 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dhkit.description import Array, Description
 from dhkit.errors import PlanningError
-from dhkit.model.shapes import links_without_shapes
 from dhkit.planning.between_states import smallest_between
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.joint_limits import joint_limits
@@ -26,7 +26,11 @@ from dhkit.planning.obstacles import (
     check_obstacles,
     checked_pairs,
     distance,
+    link_name,
+    link_pairs,
+    not_checked,
     pair_distances,
+    shape_distances,
     smallest_distances,
     world_axes,
 )
@@ -35,6 +39,8 @@ from dhkit.trajectories import Limits
 
 BETWEEN, MIN_BETWEEN = 0.1, 1e-3
 """Share of the clearance, at least in m, by which a distance may fall below it between two states of a certificate."""
+MEASURED = 0.02
+"""Distance, m, beyond the required one up to which distances between shapes are measured, and not bounded."""
 KEPT_SHARE = 0.75
 """Share of a gap at an end of a motion to which the clearance is reduced there: a link may come a little nearer on its
 way out of a narrow place."""
@@ -58,6 +64,19 @@ class ReducedClearance:
         return f"{1000 * min(self.start, self.goal):.3g} mm between {self.names[0]} and {self.names[1]}"
 
 
+@dataclass(frozen=True)
+class LinkClearance:
+    """Two links that are measured by their shapes, and the distance that they keep during a whole motion."""
+
+    links: tuple[int, int]
+    kept: float
+    """Distance to keep, m: the clearance, or less where the links are nearer at the start or the goal."""
+
+    def __str__(self) -> str:
+        first, second = (link_name(link) for link in self.links)
+        return f"{1000 * self.kept:.3g} mm between {first} and {second}"
+
+
 @dataclass(frozen=True, eq=False)
 class CollisionAvoidance:
     """Obstacles of a motion, and the clearance from them and between links."""
@@ -67,6 +86,8 @@ class CollisionAvoidance:
     """Smallest distance, m."""
     self_collision: bool = False
     reduced: tuple[ReducedClearance, ...] = ()
+    by_shapes: tuple[LinkClearance, ...] = ()
+    """Links that are measured by their shapes."""
     ends: Array | None = None
     """Joint values at the start and the goal, shape (2, n), rad and m, where clearances are reduced."""
     is_reduced_throughout: bool = False
@@ -111,9 +132,12 @@ class CollisionAvoidance:
                 ["from obstacles"] * bool(self.obstacles) + ["between links"] * self.self_collision
             ),
             "spare_clearance": -excess,
-            "reduced_clearances": tuple(str(reduced) for reduced in self.reduced),
+            "reduced_clearances": tuple(
+                str(reduced)
+                for reduced in (*self.reduced, *(pair for pair in self.by_shapes if pair.kept < self.clearance))
+            ),
+            "not_checked": not_checked(arm, self.self_collision),
             "is_clearance_reduced_throughout": self.is_reduced_throughout,
-            "without_shapes": tuple(f"link {link}" for link in links_without_shapes(arm)),
         }
 
     def between(self, description: Description, start: Array, goal: Array) -> CollisionAvoidance:
@@ -134,7 +158,12 @@ class CollisionAvoidance:
             other = separation.capsules[pair.other].name if pair.other is not None else ""
             names = separation.capsules[pair.capsule].name, other or self.obstacles[pair.obstacle or 0].name
             reduced.append(ReducedClearance(pair, names, *(KEPT_SHARE * ends[:, p]).tolist()))
-        return replace(self, reduced=tuple(reduced), ends=np.stack([start, goal]))
+        at_ends = np.stack([start, goal])
+        by_shapes = []
+        for links in link_pairs(description).shapes if self.self_collision else ():
+            gap = float(shape_distances(description, at_ends, links).min())
+            by_shapes.append(LinkClearance(links, self.clearance if gap >= self.clearance else KEPT_SHARE * gap))
+        return replace(self, reduced=tuple(reduced), by_shapes=tuple(by_shapes), ends=at_ends)
 
     @property
     def reduced_throughout(self) -> CollisionAvoidance:
@@ -180,12 +209,46 @@ class CollisionAvoidance:
         def gaps(q: Array) -> Array:
             return np.stack([self._distances(description, q), nearest(self._reduced_distances(description, q))], axis=1)
 
-        slack = min(max(BETWEEN * self.clearance, MIN_BETWEEN), self.clearance)
-        least = np.array([self.clearance - slack, 0.0])
+        least = np.array([self.clearance - self._slack, 0.0])
         between = smallest_between(states, np.stack([usual, nearest(each)], axis=1), gaps, least)
         missing = np.where(between < least, [self.clearance, 0.0] - between, -np.inf)
-        result: Array = np.maximum(short, missing.max(axis=1))
+        result: Array = np.maximum(np.maximum(short, missing.max(axis=1)), self._shortfalls_of_shapes(states))
         return result
+
+    def _shortfalls_of_shapes(self, states: States) -> Array:
+        """Return how much is missing of the distances between links that are measured by their shapes, (N,), m."""
+        if not self.by_shapes:
+            return np.full(len(states.q), -np.inf)
+        kept = np.array([pair.kept for pair in self.by_shapes])
+        found = self._shape_gaps(states.description, states.q, MEASURED)
+        least = np.maximum(kept - self._slack, 0.0)
+
+        def gaps(q: Array) -> Array:
+            return self._shape_gaps(states.description, q, MEASURED)
+
+        between = smallest_between(states, found, gaps, least, of_shapes=True)
+        missing = np.where(between < least, kept - between, -np.inf)
+        shortfalls: Array = np.maximum(kept - found, missing).max(axis=1)
+        return shortfalls
+
+    @property
+    def _slack(self) -> float:
+        """Distance, m, by which the clearance may be missed between two states of a certificate."""
+        return min(max(BETWEEN * self.clearance, MIN_BETWEEN), self.clearance)
+
+    def _shape_gaps(self, description: Description, q: Array, more: float) -> Array:
+        """Return the distances of the links that are measured by their shapes, shape (N, E), m.
+
+        They are lower bounds where links are farther apart than they must be by ``more``, m.
+        """
+        gaps = [shape_distances(description, q, pair.links, pair.kept + more) for pair in self.by_shapes]
+        return np.stack(gaps, axis=1) if gaps else np.zeros((len(q), 0))
+
+    def keeps_shapes_apart(self, description: Description, q: Array) -> NDArray[np.bool_]:
+        """Return whether links that are measured by their shapes keep their distances at states q (N, n)."""
+        kept = np.array([pair.kept for pair in self.by_shapes])
+        apart: NDArray[np.bool_] = np.all(self._shape_gaps(description, q, 0.0) >= kept, axis=1)
+        return apart
 
     def _distances(self, description: Description, q: Array) -> Array:
         """Return the smallest distance of pairs whose clearance is not reduced, shape (N,), m."""

@@ -97,8 +97,8 @@ class PlanReport:
     """Distances at the start or the goal that are below the clearance, which is reduced to them there."""
     coordinates: tuple[str, ...] = ()
     """Coordinates of the places' poses that counted; empty if all did."""
-    without_shapes: tuple[str, ...] = ()
-    """Links that no distance was measured of: they have no shape, or their meshes are missing."""
+    not_checked: tuple[str, ...] = ()
+    """What no distance was measured of: links without a shape, and links that overlap in all configurations."""
     is_clearance_reduced_throughout: bool = False
     """Whether it is reduced to them during the whole motion: none was found that keeps the clearance farther away."""
 
@@ -120,8 +120,8 @@ class PlanReport:
             less = ", ".join(self.reduced_clearances)
             where = "all the way" if self.is_clearance_reduced_throughout else "near the ends"
             notes[-1] += f", but less {where}: {less}"
-        if self.without_shapes:
-            notes.append(f"not checked for collisions, without a shape: {', '.join(self.without_shapes)}")
+        if self.not_checked:
+            notes.append(f"not checked for collisions: {'; '.join(self.not_checked)}")
         if self.failure:
             path = "the straight path" if self.clearance is None else "a sampled path around the obstacles"
             notes.append(f"not optimal: {path}, slowed down; the optimizer found nothing ({self.failure})")

@@ -1,19 +1,21 @@
 """Capsules contain what a link looks like, and are few and small."""
 
 from collections import Counter
+from itertools import combinations
 
 import numpy as np
 import pytest
 import trimesh
 
 from dhkit.description import Box, Capsule, Cylinder, Sphere, library_robot, robots
+from dhkit.description.table_rows import from_dh
 from dhkit.model.shapes import link_parts
-from dhkit.planning.obstacles import checked_pairs, link_capsules, world_axes
+from dhkit.planning.obstacles import checked_pairs, link_capsules, link_pairs, world_axes
 from dhkit.planning.obstacles.enclosing import Balls, enclose, refine
+from dhkit.planning.obstacles.solids import capsule_distances
 
 OUTSIDE = 1e-9
 """m: rounding, and of a mesh's single precision."""
-PAIRS_OF_LINKS = {"puma560": 14, "ur5": 25}
 
 
 def surface(part):
@@ -93,15 +95,33 @@ def test_axes_move_with_their_frames():
 
 
 @pytest.mark.parametrize("name", robots())
-@pytest.mark.slow
 def test_what_cannot_move_is_not_checked(name):
     arm = library_robot(name)
     capsules, pairs = link_capsules(arm), checked_pairs(arm)
     assert all(capsules[i].link > 0 for i in pairs.moving)
     assert {i for i, _ in pairs.heights} <= set(pairs.moving)
-    assert all(capsules[j].link - capsules[i].link > 1 for i, j in pairs.itself)
-    assert set(pairs.near) <= set(pairs.itself)
-    assert len(pairs.itself) == PAIRS_OF_LINKS.get(name, len(pairs.itself))
+
+
+@pytest.mark.parametrize("name", robots())
+def test_every_two_links_that_no_joint_connects_are_checked_or_named(name):
+    """Or their capsules are apart in all configurations, by coal: no motion changes their distance by 1 mm."""
+    arm = library_robot(name)
+    capsules, pairs = link_capsules(arm), link_pairs(arm)
+    assert not set(pairs.shapes) & set(pairs.unchecked)
+    axes = world_axes(arm, np.random.default_rng(1).uniform(-np.pi, np.pi, (300, arm.n)))
+    for i, j in combinations(range(len(capsules)), 2):
+        links = capsules[i].link, capsules[j].link
+        if links[1] - links[0] <= 1 or links in {*pairs.shapes, *pairs.unchecked} or (i, j) in pairs.capsules:
+            continue
+        gaps = capsule_distances((capsules[i].radius, capsules[j].radius), axes[:, i], axes[:, j])
+        assert gaps.min() > 0 and np.ptp(gaps) < 1.1e-3
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_pairs_do_not_depend_on_the_size_of_an_arm(size):
+    arm = from_dh([(0, 0.1 * size, 0.4 * size, "pi/2"), (0, 0, 0.4 * size, 0), (0, 0, 0.3 * size, 0)])
+    same = link_pairs(from_dh([(0, 0.1, 0.4, "pi/2"), (0, 0, 0.4, 0), (0, 0, 0.3, 0)]))
+    assert link_pairs(arm) == same and same.capsules
 
 
 def test_a_planar_arm_does_not_care_for_the_floor():

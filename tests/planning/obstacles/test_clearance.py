@@ -15,6 +15,8 @@ from dhkit.planning.obstacles import (
     checked_pairs,
     distance,
     link_capsules,
+    link_pairs,
+    shape_distances,
     world_axes,
 )
 from dhkit.planning.obstacles.segments import axis_bounds, segment_distances
@@ -126,8 +128,10 @@ def test_nothing_near_is_skipped(name):
         every = [obstacle_distances(capsules[i].radius, axes[:, i], obstacle) for i in pairs.moving]
         assert np.abs(found.per_obstacle[:, k] - np.min(every, axis=0)).max() < COAL
     every = [
-        capsule_distances((capsules[i].radius, capsules[j].radius), axes[:, i], axes[:, j]) for i, j in pairs.itself
+        capsule_distances((capsules[i].radius, capsules[j].radius), axes[:, i], axes[:, j])
+        for i, j in link_pairs(arm).capsules
     ]
+    every += [shape_distances(arm, q, links) for links in link_pairs(arm).shapes]
     assert np.abs(found.itself - np.min(every, axis=0)).max() < COAL
     assert np.array_equal(found.distance, np.minimum(found.per_obstacle.min(axis=-1), found.itself))
 

@@ -1,8 +1,9 @@
 """Obstacles: scenes, capsules around links, exact distances, separating planes, and sampled paths."""
 
-from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, world_axes
-from dhkit.planning.obstacles.clearance import Distances, distance, pair_distances, smallest_distances
-from dhkit.planning.obstacles.pairs import CheckedPairs, Pair, checked_pairs
+from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, link_name, world_axes
+from dhkit.planning.obstacles.clearance import Distances, distance, not_checked, pair_distances, smallest_distances
+from dhkit.planning.obstacles.link_shapes import shape_distances
+from dhkit.planning.obstacles.pairs import CheckedPairs, LinkPairs, Pair, checked_pairs, link_pairs
 from dhkit.planning.obstacles.sampling import PathSampler
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
 from dhkit.planning.obstacles.separation import Gaps, PlaneRow, Separation
@@ -13,6 +14,7 @@ __all__ = [
     "Floor",
     "Gaps",
     "LinkCapsule",
+    "LinkPairs",
     "Obstacle",
     "Pair",
     "PathSampler",
@@ -23,7 +25,11 @@ __all__ = [
     "checked_pairs",
     "distance",
     "link_capsules",
+    "link_name",
+    "link_pairs",
+    "not_checked",
     "pair_distances",
+    "shape_distances",
     "smallest_distances",
     "world_axes",
 ]

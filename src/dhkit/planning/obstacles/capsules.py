@@ -8,7 +8,7 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Box, Capsule, Cylinder, Description, Sphere, world_to_frames
 from dhkit.model.mesh_reader import read_part
@@ -39,12 +39,17 @@ class LinkCapsule:
     @property
     def name(self) -> str:
         """Name of its link."""
-        return f"link {self.link}" if self.link else "the base"
+        return link_name(self.link)
 
     @property
     def length(self) -> float:
         """Length of the axis, m."""
         return float(np.linalg.norm(self.end - self.start))
+
+
+def link_name(link: int) -> str:
+    """Return the name of a link, 0 (the base) to n."""
+    return f"link {link}" if link else "the base"
 
 
 def link_capsules(description: Description) -> tuple[LinkCapsule, ...]:
@@ -142,7 +147,7 @@ def _balls(part: Part) -> Balls:
             corners = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3)).reshape(3, -1).T
             local, radii = corners * [float(edge) for edge in size], 0.0
         case _:
-            local, radii = _hull(part), 0.0
+            local, radii = convex_hull(part)[0], 0.0
     R, t = part.T_link_part[:3, :3], part.T_link_part[:3, 3]
     return Balls(local @ R.T + t, np.full(len(local), radii))
 
@@ -154,13 +159,21 @@ def _rims(radius: float, length: float) -> Array:
     return np.concatenate([np.stack([x, y, np.full(RIM_CORNERS, z)], axis=1) for z in (-length / 2, length / 2)])
 
 
-def _hull(part: Part) -> Array:
-    """Return the corners of a mesh's convex hull, m."""
+def convex_hull(part: Part) -> tuple[Array, NDArray[np.int_]]:
+    """Return the corners of a mesh's convex hull, shape (c, 3), m, and the triangles between them, shape (f, 3).
+
+    Raises
+    ------
+    ModelError
+        The mesh cannot be read.
+    """
     from scipy.spatial import ConvexHull, QhullError
 
     vertices = read_part(part).vertices
     try:
-        hull: Array = vertices[ConvexHull(vertices).vertices]
-    except QhullError:  # flat
-        return vertices
-    return hull
+        hull = ConvexHull(vertices)
+    except QhullError:  # flat: joggled by a billionth of its size
+        hull = ConvexHull(vertices, qhull_options="QJ")
+    place = np.full(len(vertices), -1)
+    place[hull.vertices] = np.arange(len(hull.vertices))
+    return vertices[hull.vertices], place[hull.simplices]

@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Box, Description, joint_array, takes_robot
 from dhkit.display import counted, repr_line
-from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, world_axes
-from dhkit.planning.obstacles.pairs import Pair, capsules_beside, checked_pairs, ends_above
+from dhkit.model.shapes import links_without_shapes
+from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, link_name, world_axes
+from dhkit.planning.obstacles.link_shapes import shape_distances
+from dhkit.planning.obstacles.pairs import Pair, capsules_beside, ends_above, link_pairs
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
 from dhkit.planning.obstacles.segments import Bounds, axis_bounds, segment_distances
 from dhkit.planning.obstacles.solid_arrays import Solids
@@ -36,12 +38,16 @@ class Distances:
     """Smallest distance from each obstacle, in the given order, shape (..., K), m."""
     itself: Array
     """Smallest distance between two links, shape (...), m; inf unless requested."""
+    not_checked: tuple[str, ...] = ()
+    """What the distances do not include: links without a shape, and links that overlap in all configurations."""
 
     def __repr__(self) -> str:
         if self.pair is None:
             what = "nothing to check" if np.isinf(self.distance).all() else "no finite state"
             return repr_line("Distances", counted(self.distance.size, "state"), what)
         least = f"least {np.nanmin(self.distance):.4g} m, {self.pair[0]} and {self.pair[1]}"
+        if self.not_checked:
+            least += f", not checked: {'; '.join(self.not_checked)}"
         return repr_line("Distances", counted(self.distance.size, "state"), least)
 
 
@@ -49,8 +55,8 @@ class Distances:
 def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self_collision: bool = False) -> Distances:
     """Return exact distances of an arm's capsules from obstacles, and from each other.
 
-    Pairs whose distance does not change in any motion are left out, see
-    :class:`dhkit.planning.obstacles.pairs.CheckedPairs`: the base, for example, and the foot of an arm on the floor.
+    What no motion changes is left out, see :class:`dhkit.planning.obstacles.pairs.CheckedPairs`: the base, for example,
+    and the foot of an arm on the floor. Links whose capsules are too wide are measured by their shapes.
 
     Parameters
     ----------
@@ -94,10 +100,14 @@ def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self
         names.append(_pair_names(description, capsules, obstacle))
     itself = np.full(len(axes), np.inf)
     if self_collision:
-        pairs = checked_pairs(description).itself
-        found.append(_from_itself(capsules, axes, pairs))
-        names.append([(capsules[i].name, capsules[j].name) for i, j in pairs])
-        itself = found[-1][0]
+        pairs = link_pairs(description)
+        found.append(_from_itself(capsules, axes, pairs.capsules))
+        names.append([(capsules[i].name, capsules[j].name) for i, j in pairs.capsules])
+        for a, b in pairs.shapes:
+            gaps = shape_distances(description, rows[finite], (a, b))
+            found.append((gaps, np.zeros(len(gaps), dtype=int)))
+            names.append([(link_name(a), link_name(b))])
+        itself = np.min([gaps for gaps, _ in found[len(obstacles) :]], axis=0)
     every = np.stack([gaps for gaps, _ in found], axis=-1) if found else np.full((len(axes), 1), np.inf)
 
     def whole(values: Array) -> Array:
@@ -110,7 +120,17 @@ def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self
         pair=_worst(every, found, names),
         per_obstacle=whole(every[:, : len(obstacles)] if found else every[:, :0]),
         itself=whole(itself),
+        not_checked=not_checked(description, self_collision) if found else (),
     )
+
+
+def not_checked(description: Description, self_collision: bool) -> tuple[str, ...]:
+    """Return what distances of an arm do not include, in words."""
+    bare = [link_name(link) for link in links_without_shapes(description)]
+    words = [f"{', '.join(bare)} without a shape"] if bare else []
+    if self_collision and (overlapping := link_pairs(description).unchecked_text):
+        words.append(f"{overlapping}, which overlap in all configurations")
+    return tuple(words)
 
 
 def smallest_distances(
@@ -132,7 +152,7 @@ def smallest_distances(
             heights = _heights(description, capsules, axes, item, {i for i, j, _ in left_out if j == k})
             least = np.minimum(least, heights.min(axis=1, initial=np.inf))
     if self_collision:
-        pairs = tuple((i, j) for i, j in checked_pairs(description).itself if (i, None, j) not in left_out)
+        pairs = tuple((i, j) for i, j in link_pairs(description).capsules if (i, None, j) not in left_out)
         least = np.minimum(least, _from_itself(capsules, axes, pairs)[0])
     solids = [(k, item) for k, item in enumerate(obstacles) if isinstance(item, Obstacle)]
     for is_box in (False, True):

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from dhkit.description import Array, Description
-from dhkit.planning.obstacles.capsules import link_capsules, world_axes
+from dhkit.planning.obstacles.capsules import link_capsules, link_name, world_axes
+from dhkit.planning.obstacles.link_shapes import shape_distances
 from dhkit.planning.obstacles.scene import Obstacle
 from dhkit.planning.obstacles.segments import segment_distances
 from dhkit.planning.obstacles.solids import obstacle_distances
@@ -19,43 +20,67 @@ from dhkit.planning.obstacles.solids import obstacle_distances
 SAMPLES = 4000
 """Number of random configurations from which the pairs are chosen."""
 SEED = 0
-CONSTANT_DISTANCE = 1e-3
-"""Largest change of a distance over all configurations (m) with which it counts as constant."""
 OVERLAP_SHARE = 0.4
-"""Share of configurations with an overlap from which two capsules are not checked: neighbours, or crude capsules."""
+"""Share of configurations with an overlap from which two capsules are too wide for the shapes in them."""
+SHAPE_SAMPLES = 200
+"""Number of configurations in which the shapes of two links are measured."""
+STEADY = 1e-3
+"""Change of a distance over all configurations, m, below which no motion matters to it: a proof is tried."""
+MOST_JOINTS = 2
+"""Number of joints between two links up to which their distance is computed on a grid."""
+GRID = 256
+"""Number of values of a joint on that grid."""
 STILL = 1e-9
-"""Largest travel, as a share of the reach, that is rounding."""
+"""Largest travel, as a share of the size of the space in which the links move, that is rounding."""
 STANDING_SAMPLES = 400
 """Number of configurations in which an arm that stands in an obstacle overlaps it."""
-NEAR_SHARE = 0.05
-"""Smallest distance over all configurations, as a share of the reach, beyond which an optimizer ignores a pair."""
 MAX_OBSTACLES = 65_536
 """Number of obstacles whose capsules are remembered; of more, every call would find them anew."""
 
 
 @dataclass(frozen=True)
 class CheckedPairs:
-    """Checked pairs, as indices of ``link_capsules(description)``, without those whose distance cannot change.
+    """What is checked of an arm against obstacles and the floor: indices of ``link_capsules(description)``.
 
-    Determined from 4,000 random configurations within the limits (unlimited joints: pi, or the reach, each way):
+    - Obstacles: capsules with an end that moves; so never the base's, nor a shoulder's that turns about its own axis.
+    - Floor: ends whose height changes.
 
-    - obstacles: capsules with an end that moves; so never the base's, nor a shoulder's that turns about its own axis;
-    - floor: ends whose height changes;
-    - itself: capsules of links that no joint connects, unless their distance does not change or they overlap in
-      more than 40 % of the configurations, as those of a spherical wrist do, or of a slider and its bar.
+    Determined from 4,000 random configurations within the limits (unlimited joints: pi, or the reach, each way).
     """
 
     moving: tuple[int, ...]
     """Indices of capsules that are checked against obstacles, see :func:`capsules_beside`."""
     heights: tuple[tuple[int, int], ...]
     """Capsules and their ends (0 or 1) that are checked against the floor, see :func:`ends_above`."""
-    itself: tuple[tuple[int, int], ...]
-    """Pairs of capsules that are checked against each other."""
-    near: tuple[tuple[int, int], ...]
-    """The pairs of ``itself`` that came nearer than 5 % of the reach, which an optimizer includes."""
-
     size: float
     """Largest edge of the box around all axes of capsules in these configurations, m."""
+
+
+@dataclass(frozen=True)
+class LinkPairs:
+    """Pairs of an arm's links that are checked against each other.
+
+    - Every two links that no joint connects are checked by their capsules, or by their shapes where the capsules are
+      too wide: where they overlap in more than 40 % of 4,000 random configurations.
+    - Left out are capsules whose distance changes by less than 1 mm and is proved to stay above 0, see
+      :func:`_always_apart`: those of a wrist's first and third link, for example.
+    - Links that a joint connects touch each other by construction. Where their shapes do not touch in all of 200 random
+      configurations, they are checked like the others.
+    - Other links whose shapes overlap in all of these 200 are not checked, such as those of a spherical wrist whose
+      drums are drawn about one point. Reports name them.
+    """
+
+    capsules: tuple[tuple[int, int], ...]
+    """Pairs of capsules that are checked against each other."""
+    shapes: tuple[tuple[int, int], ...]
+    """Pairs of links whose shapes are checked against each other."""
+    unchecked: tuple[tuple[int, int], ...]
+    """Pairs of links that overlap in all configurations."""
+
+    @property
+    def unchecked_text(self) -> str:
+        """The links that are not checked, as text; empty if all are."""
+        return ", ".join(f"{link_name(a)} and {link_name(b)}" for a, b in self.unchecked)
 
 
 class Pair(NamedTuple):
@@ -77,24 +102,91 @@ def checked_pairs(description: Description) -> CheckedPairs:
 
 @lru_cache(maxsize=64)
 def _checked_pairs(description: Description, mesh_folder: Path | None) -> CheckedPairs:
-    capsules = link_capsules(description)
     axes = world_axes(description, _configurations(description))
-    radii = np.array([capsule.radius for capsule in capsules])
+    if not axes.shape[1]:
+        return CheckedPairs((), (), 0.0)
+    size = float(np.ptp(axes.reshape(-1, 3), axis=0).max())
     travels = np.ptp(axes, axis=0)  # of each end of each capsule along x, y and z
-    moves = travels > STILL * max(description.reach, STILL)
-    heights = np.argwhere(moves[:, :, 2]).tolist()
-    apart = [(i, j) for i, j in combinations(range(len(capsules)), 2) if capsules[j].link - capsules[i].link > 1]
-    gaps = {(i, j): segment_distances(axes[:, i], axes[:, j]) - radii[i] - radii[j] for i, j in apart}
-    itself = [
-        pair for pair, gap in gaps.items() if np.ptp(gap) > CONSTANT_DISTANCE and np.mean(gap < 0) <= OVERLAP_SHARE
-    ]
+    moves = travels > STILL * size
     return CheckedPairs(
-        size=float(np.ptp(axes.reshape(-1, 3), axis=0).max()) if axes.size else 0.0,
         moving=tuple(int(i) for i in np.flatnonzero(moves.any(axis=(1, 2)))),
-        heights=tuple((i, end) for i, end in heights),
-        itself=tuple(itself),
-        near=tuple(pair for pair in itself if gaps[pair].min() < NEAR_SHARE * description.reach),
+        heights=tuple((i, end) for i, end in np.argwhere(moves[:, :, 2]).tolist()),
+        size=size,
     )
+
+
+def link_pairs(description: Description) -> LinkPairs:
+    """Return the pairs of links of an arm.
+
+    Raises
+    ------
+    ModelError
+        coal is not installed, or a mesh cannot be read.
+    """
+    return _link_pairs(description, description.mesh_folder)
+
+
+@lru_cache(maxsize=64)
+def _link_pairs(description: Description, mesh_folder: Path | None) -> LinkPairs:
+    capsules = link_capsules(description)
+    q = _configurations(description)
+    axes = world_axes(description, q)
+    of_link: dict[int, list[int]] = {}
+    for i, capsule in enumerate(capsules):
+        of_link.setdefault(capsule.link, []).append(i)
+
+    checked: list[tuple[int, int]] = []
+    shapes: list[tuple[int, int]] = []
+    unchecked: list[tuple[int, int]] = []
+    for a, b in combinations(sorted(of_link), 2):
+        narrow: list[tuple[int, int]] = []
+        has_wide = False
+        for i, j in product(of_link[a], of_link[b]):
+            gap = segment_distances(axes[:, i], axes[:, j]) - capsules[i].radius - capsules[j].radius
+            if np.mean(gap < 0) > OVERLAP_SHARE:
+                has_wide = True
+            elif np.ptp(gap) > STEADY or not _always_apart(description, i, j):
+                narrow.append((i, j))
+        overlaps = has_wide and bool((shape_distances(description, q[:SHAPE_SAMPLES], (a, b), enough=0.0) < 0).all())
+        touches_by_construction = overlaps and b - a == 1
+        if touches_by_construction:
+            continue
+        checked += narrow
+        if overlaps:
+            unchecked.append((a, b))
+        elif has_wide:
+            shapes.append((a, b))
+    return LinkPairs(tuple(checked), tuple(shapes), tuple(unchecked))
+
+
+def _always_apart(description: Description, i: int, j: int) -> bool:
+    """Return whether two capsules are proved to be apart in all configurations: at most two revolute joints between.
+
+    The distance depends on the joints between the links alone, and is computed on a grid of their whole turns. From the
+    axis of joint k, whose own offset d_k lies along it, a point of the outer link is at most
+
+        r_k = |a_k| + sum over the joints i after k of sqrt(a_i^2 + d_i^2) + |end|
+
+    away, so that within half a step h of each joint the distance changes by at most the sum of r_k h / 2.
+    """
+    capsules = link_capsules(description)
+    inner, outer = capsules[i].link, capsules[j].link
+    numbers = description.numbers
+    joints = range(inner, outer)
+    if len(joints) > MOST_JOINTS or numbers.prismatic[inner:outer].any():
+        return False
+    values = np.linspace(-np.pi, np.pi, GRID, endpoint=False)
+    q = np.zeros((GRID ** len(joints), description.n))
+    q[:, inner:outer] = np.stack(np.meshgrid(*[values] * len(joints)), axis=-1).reshape(-1, len(joints))
+    axes = world_axes(description, q)
+    gap = segment_distances(axes[:, i], axes[:, j]) - capsules[i].radius - capsules[j].radius
+
+    end = max(float(np.linalg.norm(capsules[j].start)), float(np.linalg.norm(capsules[j].end)))
+    lengths = np.hypot(numbers.a, numbers.d)
+    half_step = np.pi / GRID
+    levers = [abs(float(numbers.a[k])) + float(lengths[k + 1 : outer].sum()) + end for k in joints]
+    change = sum(levers) * half_step
+    return bool(gap.min() > change)
 
 
 def capsules_beside(description: Description, obstacle: Obstacle) -> tuple[int, ...]:

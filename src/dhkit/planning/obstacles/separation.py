@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array, Box, Description, world_to_frames
 from dhkit.planning.obstacles.capsules import link_capsules, world_axes
-from dhkit.planning.obstacles.pairs import Pair, capsules_beside, checked_pairs, ends_above
+from dhkit.planning.obstacles.pairs import Pair, capsules_beside, ends_above, link_pairs
 from dhkit.planning.obstacles.scene import Floor, Obstacle
 from dhkit.planning.obstacles.segments import nearest_on_box, nearest_points
 from dhkit.planning.obstacles.solid_arrays import Solids, needed_planes
@@ -81,7 +81,6 @@ class Separation:
         self.description, self.obstacles = description, tuple(obstacles)
         self.capsules = link_capsules(description)
         self.radii = np.array([capsule.radius for capsule in self.capsules])
-        checked = checked_pairs(description)
         self._half_lengths = np.array([capsule.length / 2 for capsule in self.capsules])
         self.pairs: list[Pair] = []
         self._groups: list[_Group] = []
@@ -95,7 +94,7 @@ class Separation:
                 ends = {i: tuple(end for j, end in above if j == i) for i, _ in above}
                 self._add([Pair(i, k, None, which) for i, which in ends.items()])
         if self_collision:
-            self._add([Pair(i, None, j) for i, j in checked.itself])
+            self._add([Pair(i, None, j) for i, j in link_pairs(description).capsules])
 
     def _add(self, pairs: list[Pair]) -> None:
         """Append pairs of one kind: with boxes, with other solids, with the floor, or between links."""

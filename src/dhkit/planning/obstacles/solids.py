@@ -15,6 +15,12 @@ if TYPE_CHECKING:
 
 POINT = 1e-9
 """Length of an axis (m) below which its capsule is a ball."""
+FAILED = -1e300
+"""Largest number that coal returns where it finds a penetration and not its depth: some symmetric places."""
+SHIFTS = (np.zeros(3), np.array([3e-8, 1e-8, 2e-8]), np.array([-2e-8, 3e-8, -1e-8]))
+"""Moves of a solid, m, with which it is asked again then."""
+UNKNOWN_DEPTH = -1e-6
+"""Distance, m, of solids that penetrate each other to a depth that is not found."""
 TOLERANCE = 1e-9
 """Tolerance of coal's iterations, m; its default is 1e-6."""
 
@@ -41,7 +47,7 @@ def obstacle_distances(radius: float, axes: Array, obstacle: Obstacle) -> Array:
     ModelError
         coal is not installed.
     """
-    coal = _coal()
+    coal = coal_module()
     match obstacle.geometry:
         case Box():
             solid = coal.Box(*(2 * obstacle.half_sizes).tolist())
@@ -52,8 +58,8 @@ def obstacle_distances(radius: float, axes: Array, obstacle: Obstacle) -> Array:
     T = obstacle.T_world_obstacle
     place = coal.Transform3s(np.array(T[:3, :3]), np.array(T[:3, 3]))
     capsule, places = _capsule(coal, radius, axes)
-    request, result = _request(coal), coal.DistanceResult()
-    return np.array([_distance(coal, capsule, own, solid, place, request, result) for own in places])
+    request, result = distance_request(), coal.DistanceResult()
+    return np.array([signed_distance(capsule, own, solid, place, request, result) for own in places])
 
 
 def capsule_distances(radii: tuple[float, float], first: Array, second: Array) -> Array:
@@ -64,17 +70,24 @@ def capsule_distances(radii: tuple[float, float], first: Array, second: Array) -
     ModelError
         coal is not installed.
     """
-    coal = _coal()
+    coal = coal_module()
     one, places = _capsule(coal, radii[0], first)
     other, other_places = _capsule(coal, radii[1], second)
-    request, result = _request(coal), coal.DistanceResult()
+    request, result = distance_request(), coal.DistanceResult()
     pairs = zip(places, other_places, strict=True)
-    return np.array([_distance(coal, one, own, other, place, request, result) for own, place in pairs])
+    return np.array([signed_distance(one, own, other, place, request, result) for own, place in pairs])
 
 
-def _distance(coal: CoalModule, first: Any, T1: Any, second: Any, T2: Any, request: Any, result: Any) -> float:
-    result.clear()  # coal keeps the smallest of a result's queries
-    return float(coal.distance(first, T1, second, T2, request, result))
+def signed_distance(first: Any, T1: Any, second: Any, T2: Any, request: Any, result: Any) -> float:
+    """Return the signed distance of two of coal's shapes at poses T1 and T2, m; ``result`` is a scratch value."""
+    coal = coal_module()
+    for shift in SHIFTS:
+        result.clear()  # coal keeps the smallest of a result's queries
+        moved = coal.Transform3s(T2.getRotation(), T2.getTranslation() + shift)
+        found = float(coal.distance(first, T1, second, moved, request, result))
+        if found > FAILED:
+            return found
+    return UNKNOWN_DEPTH
 
 
 def _capsule(coal: CoalModule, radius: float, axes: Array) -> tuple[Any, list[Any]]:
@@ -89,15 +102,23 @@ def _capsule(coal: CoalModule, radius: float, axes: Array) -> tuple[Any, list[An
     return coal.Capsule(radius, float(lengths[0])), places
 
 
-def _request(coal: CoalModule) -> Any:
-    request = coal.DistanceRequest()
+def distance_request() -> Any:
+    """Return coal's request of a signed distance."""
+    request = coal_module().DistanceRequest()
     request.enable_signed_distance = True
     request.gjk_tolerance = TOLERANCE
     request.epa_tolerance = TOLERANCE
     return request
 
 
-def _coal() -> CoalModule:
+def coal_module() -> CoalModule:
+    """Return the module coal.
+
+    Raises
+    ------
+    ModelError
+        It is not installed.
+    """
     try:
         import coal
     except ImportError as error:
