@@ -1,7 +1,8 @@
-"""Bounds of the second time derivative of joint torques, from bounds of the joints' motion.
+"""Bounds of a time derivative of joint torques, from bounds of the joints' motion.
 
-Between two samples a function differs from the straight line through them by at most h^2/8 times the largest magnitude
-of its second derivative. So a bound of that derivative turns sampled torques into bounds of the torques in between.
+Between samples a function differs from a polynomial of degree m - 1 through m of them by at most h^m times a constant
+times the largest magnitude of its m-th derivative. So a bound of that derivative turns sampled torques into bounds of
+the torques in between.
 
 Each vector v(t) of Newton and Euler's equations is represented by bounds of |v|, |v'|, |v''| ..., its jet. Sums add
 jets, and the product rule multiplies them, for a scalar times a vector, a dot and a cross product alike:
@@ -19,34 +20,35 @@ import numpy as np
 
 from dhkit.description import Array, Convention, Description
 
-ORDERS = 4
-"""Highest derivative of positions: the second derivative of a torque contains that of an acceleration."""
 
-
-def torque_curvature_bounds(description: Description, motion: Array) -> Array:
-    """Return bounds of the second time derivatives of joint torques without friction.
+def torque_derivative_bounds(description: Description, motion: Array) -> Array:
+    """Return bounds of the m-th time derivatives of joint torques without friction.
 
     Parameters
     ----------
     description
         The robot, with a body on every link.
     motion
-        Bounds of |q| and of the magnitudes of its first four derivatives in K intervals, shape (5, K, n), SI units.
+        Bounds of |q| and of the magnitudes of its first m + 2 derivatives in K intervals, shape (m + 3, K, n), SI
+        units: the m-th derivative of a torque contains that of an acceleration.
 
     Returns
     -------
     Array
-        Shape (K, n), N m/s^2 and N/s^2: the second derivative of the torques of inverse dynamics, with drives.
+        Shape (K, n), N m/s^m and N/s^m: the m-th derivative of the torques of inverse dynamics, with drives.
     """
     numbers = description.numbers
-    n, K = description.n, motion.shape[1]
+    n = description.n
+    orders = len(motion) - 1
+    K = motion.shape[1]
+    of_torques = orders - 1  # lengths of jets: of torques, accelerations and forces
     # Axis i is fixed in link i - 1. In the standard convention the vector from axis i to axis i + 1 is fixed in link i,
     # in the modified one the vector from axis i - 1 to axis i is fixed in link i - 1.
     is_standard = description.convention is Convention.STANDARD
-    spin = np.zeros((ORDERS, K))  # jet of the angular velocity of the link
+    spin = np.zeros((orders, K))  # jet of the angular velocity of the link
     fixed = _fixed_in(spin)
     axes, spans, coms = [], [], []
-    velocities = np.zeros((ORDERS + 1, K))  # jet of the sum of vectors from the base to the link's frame
+    positions = np.zeros((orders + 1, K))  # jet of the sum of vectors from the base to the link's frame
     forces, moments = [], []
     for i in range(n):
         before = fixed
@@ -56,14 +58,14 @@ def torque_curvature_bounds(description: Description, motion: Array) -> Array:
         if numbers.prismatic[i]:
             span = length * before + _product(before, q)
         else:
-            spin = spin + _product(before[:ORDERS], q[1:])
+            spin = spin + _product(before[:orders], q[1:])
             fixed = _fixed_in(spin)
             span = length * (fixed if is_standard else before)
         spans.append(span)
-        velocities = velocities + span
+        positions = positions + span
         com = float(np.linalg.norm(numbers.com[i])) * fixed
         coms.append(com)
-        acceleration = (velocities + com)[2:]
+        acceleration = (positions + com)[2:]
         acceleration[0] += np.linalg.norm(numbers.gravity)
         forces.append(numbers.mass[i] * acceleration)
         # The moment is the derivative of I w.
@@ -73,14 +75,14 @@ def torque_curvature_bounds(description: Description, motion: Array) -> Array:
         if numbers.prismatic[j]:
             load = np.sum(forces[j:], axis=0)
         else:
-            load = np.zeros((3, K))
-            lever = np.zeros((ORDERS + 1, K))
+            load = np.zeros((of_torques, K))
+            lever = np.zeros((orders + 1, K))
             for i in range(j, n):
                 if is_standard or i > j:
                     lever = lever + spans[i]
-                load = load + moments[i] + _product((lever + coms[i])[:3], forces[i])
-        bounds[:, j] = _product(axes[j][:3], load)[2]
-    result: Array = bounds + motion[4] @ np.abs(numbers.drive_inertia)
+                load = load + moments[i] + _product((lever + coms[i])[:of_torques], forces[i])
+        bounds[:, j] = _product(axes[j][:of_torques], load)[-1]
+    result: Array = bounds + motion[-1] @ np.abs(numbers.drive_inertia)
     return result
 
 
@@ -91,21 +93,21 @@ def _product(u: Array, v: Array) -> Array:
 
 
 def _fixed_in(spin: Array) -> Array:
-    """Return the jet of a unit vector fixed in a body, shape (ORDERS + 1, K), from that of the angular velocity."""
+    """Return the jet of a unit vector fixed in a body, one order longer, from that of the angular velocity."""
     jet = [np.ones(spin.shape[1])]
-    for m in range(ORDERS):
+    for m in range(len(spin)):
         jet.append(sum(comb(m, j) * spin[j] * jet[m - j] for j in range(m + 1)))
     return np.stack(jet)
 
 
 def _rotating_inertia(inertia: Array, spin: Array) -> Array:
-    """Return the jet of a body's inertia in world axes, in the spectral norm, shape (ORDERS, K).
+    """Return the jet of a body's inertia in world axes, in the spectral norm, as long as that of the angular velocity.
 
     I = c 1 + D with c the mean of the extreme eigenvalues: c 1 does not change, and D' = [w] D - D [w].
     """
     low, *_, high = np.linalg.eigvalsh(inertia)
     jet = [np.full(spin.shape[1], (high - low) / 2)]
-    for m in range(ORDERS - 1):
+    for m in range(len(spin) - 1):
         jet.append(2 * sum(comb(m, j) * spin[j] * jet[m - j] for j in range(m + 1)))
     result = np.stack(jet)
     result[0] = max(abs(low), abs(high))

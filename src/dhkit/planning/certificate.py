@@ -19,6 +19,7 @@ from dhkit.planning.states import States
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 from dhkit.trajectories.timing import default_limits
+from dhkit.trajectories.torque_peaks import cubic_peaks, torque_peaks
 
 POINTS = 24
 """Number of states in an interval, with both ends: dense, since users sample a motion at any times."""
@@ -77,6 +78,8 @@ class Certificate:
     active: tuple[ActiveLimit, ...]
     any_active: float
     """Share of time for which at least one joint is at a limit."""
+    sampled: tuple[str, ...] = ()
+    """Limits of which nothing is proved between the states."""
 
     @property
     def violation(self) -> float:
@@ -126,7 +129,8 @@ class Certificate:
         if self.worst is None:
             return f"nothing is limited, {self.states} states"
         kept = "all limits kept" if self.ok else f"{self.worst.what} exceeded by {100 * self.violation:.2g} %"
-        return f"{kept}, in {self.states} states by {self.reference}"
+        only = f"; not proved between them: {', '.join(self.sampled)}" if self.sampled else ""
+        return f"{kept}, in {self.states} states by {self.reference}{only}"
 
 
 @takes_robot
@@ -222,9 +226,9 @@ class Checker:
     def peaks(self, states: States) -> dict[int, Array]:
         """Return the use of each limit at the grid's states, shape (N, k), raised to its peak between states.
 
-        The peak is that of the parabola through three neighbouring states of an interval.
+        The peak is that of the cubic through four neighbouring states of an interval.
         """
-        return {k: use + _parabola_rises(use, self.points) for k, use in self.measured(states).items()}
+        return {k: _with_peaks_between(use, self.points) for k, use in self.measured(states).items()}
 
     def check(self, trajectory: Trajectory, states: States | None = None) -> Certificate:
         """Return the certificate of a motion; ``states`` are its states on the grid, if they are known."""
@@ -233,9 +237,16 @@ class Checker:
         share = _time_shares(trajectory, states)
         if (jump := _largest_jump(trajectory, self.limits)) is not None:
             checks.append(jump)
+        sampled: list[str] = []
         for k, use in self.peaks(states).items():
             constraint, _ = self.limiting[k]
-            checks.append(_check(constraint, k, use - 1, states.times))
+            check = _check(constraint, k, use - 1, states.times)
+            if k == Limit.TORQUE:
+                check, unproved = self._with_torques_between(trajectory, check)
+                sampled += unproved
+            elif k > Limit.CLEARANCE:
+                sampled.append(constraint.what)
+            checks.append(check)
             reached = use >= constraint.active_share
             if k == Limit.POSITION:
                 continue  # a joint may rest anywhere in its range
@@ -245,8 +256,23 @@ class Checker:
                 for i in np.flatnonzero(reached.any(axis=0)).tolist()
             ]
         return Certificate(
-            tuple(checks), len(states.times), states.reference, tuple(active), min(float(share @ anywhere), 1.0)
+            checks=tuple(checks),
+            states=len(states.times),
+            reference=states.reference,
+            active=tuple(active),
+            any_active=min(float(share @ anywhere), 1.0),
+            sampled=tuple(sampled),
         )
+
+    def _with_torques_between(self, trajectory: Trajectory, check: Check) -> tuple[Check, list[str]]:
+        """Return the check of torques with proved bounds of what lies between the states, and what is not proved."""
+        peaks = torque_peaks(self.description, trajectory, self.limits.torque, self.friction)
+        excess = np.where(peaks.is_proved, peaks.largest, peaks.seen) - 1
+        i = int(excess.argmax())
+        if excess[i] > max(check.excess, 0.0):
+            check = replace(check, excess=float(excess[i]), row=i, time=float(peaks.times[i]))
+        names = [self.description.joints[j].name for j in np.flatnonzero(~peaks.is_proved)]
+        return check, [f"torque of {name}" for name in names]
 
     def slow_down(self, states: States) -> float:
         """Return the smallest factor c >= 1 of the duration with which limits that depend on velocity are kept.
@@ -258,7 +284,7 @@ class Checker:
         def over(c: float) -> float:
             slower = states.slowed(c)
             uses = (constraint.use(slower, given) for constraint, given in moving)
-            return max((float(np.max(use + _parabola_rises(use, self.points))) - 1 for use in uses), default=-1.0)
+            return max((float(np.max(_with_peaks_between(use, self.points))) - 1 for use in uses), default=-1.0)
 
         low, over_low = 1.0, over(1.0)
         if over_low <= 0:
@@ -282,13 +308,13 @@ class Checker:
         return high
 
 
-def _parabola_rises(use: Array, points: int) -> Array:
-    """Return the height of the parabola's vertex over each value, shape (N, k), through it and its neighbours."""
+def _with_peaks_between(use: Array, points: int) -> Array:
+    """Return values at states, shape (N, k), raised to the peak before the next one of cubics through four states."""
     values = use.reshape(-1, points, use.shape[1])
-    slope, bend = (values[:, 2:] - values[:, :-2]) / 2, np.diff(values, 2, axis=1)
-    inside = (bend < 0) & (np.abs(slope) < np.abs(bend))
-    rises = np.divide(slope**2, -2 * bend, out=np.zeros_like(bend), where=inside)
-    return np.pad(rises, ((0, 0), (1, 1), (0, 0))).reshape(use.shape)
+    peaks, _ = cubic_peaks(values)
+    raised = values.copy()
+    raised[:, 1:-2] = np.maximum(raised[:, 1:-2], peaks)
+    return raised.reshape(use.shape)
 
 
 def _check(constraint: Constraint, limit: int, excess: Array, times: Array) -> Check:

@@ -224,6 +224,8 @@ class PlanReport:
             ],
             "active": [{"limit": name, "share": share} for name, share in self.active_limits()],
             "any_active": certificate.any_active,
+            "sampled": list(certificate.sampled),
+            "not_checked": list(self.not_checked),
             "unlimited": list(self.unlimited),
             "clearance_m": self.clearance,
             "spare_clearance_m": None if self.clearance is None else self.spare_clearance,
@@ -266,6 +268,8 @@ class PlanReport:
                 f"{kept}: largest excess {max(certificate.violation, 0.0):.1e}; nearest to its limit: {worst.what} "
                 f"({max(-100 * worst.excess, 0.0):.2g} % left) at {worst.time:.3f} s"
             )
+        if certificate.sampled:
+            lines.append(f"checked at these states, and not proved between them: {', '.join(certificate.sampled)}")
         if self.slow_down > 1:
             lines.append(f"slowed down by {100 * (self.slow_down - 1):.3g} % to keep its limits between knots")
         if self.tightened:

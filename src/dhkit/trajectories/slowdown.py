@@ -15,6 +15,7 @@ from dhkit.description.joint_text import degrees_hint, joint_text
 from dhkit.dynamics import gravity_torque, inverse_dynamics
 from dhkit.errors import PlanningError
 from dhkit.trajectories.limits import Limits
+from dhkit.trajectories.torque_peaks import torque_peaks
 from dhkit.trajectories.trajectory import Trajectory
 
 Torques: TypeAlias = Callable[[Array, Array, Array], Array]
@@ -28,6 +29,10 @@ LIMIT_SLACK = 1e-9
 """Distance by which rounding may exceed joint limits, rad and m."""
 REFINEMENTS, TIGHTEST_SAMPLES = 2, 3
 """How often the neighbourhoods of each joint's tightest samples are sampled more finely, and number of such samples."""
+ACCEPTED_TORQUE = 1e-7
+"""Share by which a torque may exceed its limit."""
+MAX_ROUNDS = 20
+"""Number of times that a motion is slowed down for a torque between samples."""
 ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
 
 
@@ -75,7 +80,40 @@ def least_slowdown(trajectory: Trajectory, limits: Limits, torques: Torques | No
     >>> round(least_slowdown(motion, Limits.of(arm, velocity=0.5, torque=np.inf)), 12)
     3.0
     """
-    return float(least_slowdowns([trajectory], limits, torques, points)[0])
+    c = float(least_slowdowns([trajectory], limits, torques, points)[0])
+    if torques is not None or c == 0 or np.isinf(limits.torque).all():
+        return c
+    return _with_torques_between(trajectory, limits, c)
+
+
+def _with_torques_between(trajectory: Trajectory, limits: Limits, c: float) -> float:
+    """Return the slowdown with which torques between the samples keep their limits too, from one that may be too small.
+
+    Where a torque tau of the motion, slowed down c times, exceeds its limit, with g that holds the arm there, it keeps
+    the limit with c^2 (tau - g) / (limit - g) in place of c^2, for positive tau. The worst place is mended until none
+    is left.
+    """
+    description = trajectory.description
+    for _ in range(MAX_ROUNDS):
+        slower = trajectory.slowed(c)
+        peaks = torque_peaks(description, slower, limits.torque)
+        over = np.where(peaks.is_proved, peaks.largest, peaks.seen)
+        i = int(over.argmax())
+        if over[i] <= 1 + ACCEPTED_TORQUE:
+            return c
+        t = peaks.times[i]
+        g = float(gravity_torque(description, slower.q(t))[i])
+        tau = float(inverse_dynamics(description, slower.q(t), slower.qd(t), slower.qdd(t))[i])
+        side = np.sign(tau)
+        limit = float(limits.torque[i])
+        if side * g >= limit:
+            _refuse_holding(description, i, g, limit, float(t))
+        beyond = max(side * tau, over[i] * limit)
+        c *= float(np.sqrt((beyond - side * g) / (limit - side * g))) * (1 + ACCEPTED_TORQUE / 4)
+    raise PlanningError(
+        f"torque of {description.joints[i].name} is above its limit at {t:.4g} s after {MAX_ROUNDS} slow-downs; give a"
+        " duration"
+    )
 
 
 def least_slowdowns(

@@ -96,7 +96,8 @@ def _separation(first: _Solid, T1: Array, second: _Solid, T2: Array) -> Array:
 
     # n in the frame of each solid, the second seen from outside.
     gaps: Array = np.abs(along) - first.extent(n @ R1) - second.extent(-n @ R2)
-    return gaps.max(axis=1)
+    largest: Array = gaps.max(axis=1)
+    return largest
 
 
 def _place(T: Array) -> Any:
