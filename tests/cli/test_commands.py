@@ -8,6 +8,7 @@ import pytest
 import typer
 
 from dhkit import Arm
+from dhkit.cli import main
 from dhkit.cli.app import COMMANDS, app, load_command
 from dhkit.cli.bench import write
 from dhkit.cli.exit_status import ExitStatus
@@ -71,3 +72,31 @@ def test_a_benchmark_is_written_as_markdown_and_json_whatever_the_suffix(tmp_pat
     written = write(Report(), tmp_path / "times.txt")
     assert written == (tmp_path / "times.md", tmp_path / "times.json")
     assert written[0].read_text() == "# Times\n" and json.loads(written[1].read_text("utf-8")) == {"unit": "µs"}
+
+
+MESH_THAT_IS_TEXT = """format = 1
+name = "r"
+convention = "standard"
+
+[[joint]]
+name = "turn"
+type = "revolute"
+a = 0.3
+alpha = 0
+d = 0
+theta = 0
+shape = { mesh = "x.stl" }
+"""
+
+
+@pytest.mark.parametrize(
+    "words", [["build", "r.toml", "-o", "r.urdf"], ["verify", "r.toml"], ["demo", "--robot", "r.toml"]]
+)
+def test_commands_print_the_warnings_of_a_robot_file(words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.toml").write_text(MESH_THAT_IS_TEXT)
+    (tmp_path / "x.stl").write_text("no mesh")
+    with pytest.raises(SystemExit):
+        main(words)
+    written = capsys.readouterr().err
+    assert "dhkit: warning: link of turn: shape.mesh: 'x.stl' is no mesh that can be read" in written

@@ -5,6 +5,7 @@ Modules: collision_avoidance, goals, report, work.
 
 import numpy as np
 import pytest
+import trimesh
 
 import dhkit
 from dhkit.description import asset, pose
@@ -83,3 +84,31 @@ def test_a_pose_that_is_not_met_is_refused_unless_its_coordinates_are_named(name
     with pytest.raises(ValueError, match=r"coordinates is \('x',\); .* meets"):
         arm.plan(start, T, coordinates=("x",), intervals=12, compare=False)
     assert arm.plan(start, arm.fk(q), intervals=12, compare=False).report.coordinates == ()
+
+
+BOX = """format = 1
+name = "box"
+convention = "standard"
+
+[[joint]]
+name = "turn"
+type = "revolute"
+a = 0.5
+alpha = 0
+d = 0
+theta = 0
+shape = { mesh = "box.stl" }
+"""
+
+
+def test_a_mesh_that_is_replaced_is_read_again(tmp_path):
+    """In one process, and for an arm that was loaded before."""
+    (tmp_path / "box.toml").write_text(BOX)
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "box.stl")
+    arm = dhkit.Arm.load(tmp_path / "box.toml")
+    ball = Obstacle.sphere(0.1, (1.0, 0.0, 0.0))
+    small = arm.distance([0.0], [ball]).distance
+    trimesh.creation.box((0.4, 0.1, 0.1)).export(tmp_path / "box.stl")
+    large = arm.distance([0.0], [ball]).distance
+    assert small - large > 0.1
+    assert dhkit.Arm.load(tmp_path / "box.toml").distance([0.0], [ball]).distance == large

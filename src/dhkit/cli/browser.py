@@ -11,9 +11,8 @@ from typing import Annotated
 
 import typer
 
-from dhkit.arm import Arm
 from dhkit.cli.exit_status import ExitStatus
-from dhkit.cli.options import Robot
+from dhkit.cli.options import Robot, load_arm
 from dhkit.cli.output import PAGES, check_outputs, say
 from dhkit.errors import DescriptionError
 from dhkit.lab import Assignment, serve
@@ -64,7 +63,7 @@ def lab(
         raise DescriptionError(f"{arguments[0]!r} behind the robot; expected --run PROGRAM for arguments")
     own = mine if run is None else [run, *(arguments or [])]
     assignment = Assignment.read(robot) if is_assignment(robot) else None
-    arm = Arm.load(robot) if assignment is None else assignment.arm
+    arm = load_arm(robot) if assignment is None else assignment.arm
     what = f"the lab of {arm.name}" if assignment is None else f"{assignment.title}: the lab"
     if own is not None:
         protect_from_children()
@@ -88,7 +87,7 @@ def view(
     html: Annotated[Path | None, typer.Option(help="Write a page in place of opening the browser.")] = None,
 ) -> ExitStatus:
     """Show an arm in the browser, to look at; Ctrl-C ends it."""
-    arm = Arm.load(robot)
+    arm = load_arm(robot)
     check_outputs(((html, PAGES),))
     with arm.view() as shown:
         if html is not None:

@@ -17,7 +17,7 @@ from dhkit.arm import Arm
 from dhkit.cli.demo_motions import race, there_and_back, tour
 from dhkit.cli.equations_page import equations_page
 from dhkit.cli.exit_status import ExitStatus
-from dhkit.cli.options import Json
+from dhkit.cli.options import Json, load_arm
 from dhkit.cli.output import output_folder, print_json, say, write_figure
 from dhkit.cli.simulation_settings import chosen_motion
 from dhkit.cli.straight import Branches, Line, branches, straight_line
@@ -65,7 +65,7 @@ def demo(
     json: Json = False,
 ) -> ExitStatus:
     """Build a robot from its table, verify it, and write its URDF, a figure and an animated page."""
-    arm = Arm.load(robot)
+    arm = load_arm(robot)
     folder = output_folder(output, arm.name)
     folder.mkdir(parents=True, exist_ok=True)
     stages: list[dict[str, Any]] = []

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Annotated, Any
 
 import typer
 
 from dhkit.arm import Arm
+from dhkit.description import robots as library_names
 from dhkit.description.joint_text import DEGREES
 
 Robot = Annotated[
@@ -43,7 +45,14 @@ Seed = Annotated[int, typer.Option(min=0, help="Seed of the random states.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
-def load_arm(robot: str, uniform: bool) -> Arm:
-    """Return a robot by name or file; ``uniform`` replaces its bodies by uniform rods."""
+def load_arm(robot: str, uniform: bool = False) -> Arm:
+    """Return a robot by name or file; ``uniform`` replaces its bodies by uniform rods.
+
+    Warnings about a file are printed on stderr: a mesh that is missing is not free space. Those about robots of the
+    library concern published data, and `dhkit info` prints them.
+    """
     arm = Arm.load(robot)
+    if robot not in library_names():
+        for warning in arm.description.warnings:
+            sys.stderr.write(f"dhkit: warning: {warning}\n")
     return arm.with_uniform_links() if uniform else arm

@@ -10,7 +10,7 @@ import typer
 from numpy.typing import NDArray
 
 from dhkit.arm import Arm
-from dhkit.cli.options import Json, Robot, Seed
+from dhkit.cli.options import Json, Robot, Seed, load_arm
 from dhkit.cli.output import output_folder, print_json, print_table, say, say_written, write_figure
 from dhkit.cli.progress import ProgressBar
 from dhkit.cli.units import joint_entry
@@ -37,7 +37,7 @@ def workspace(
     """Show where a robot's tool can be and how well it moves there, in numbers, a figure and a page."""
     from dhkit.viewer import plot
 
-    arm = Arm.load(robot)
+    arm = load_arm(robot)
     folder = output_folder(output, arm.name)
     with ProgressBar("sampling") as bar:
         space = sample(arm.description, samples, seed, progress=bar.show)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import TypeAlias
@@ -100,6 +101,37 @@ def link_parts(description: Description) -> tuple[Part, ...]:
     described, drawn = _parts(description)
     parts = [own or others for own, others in zip(described, drawn, strict=True)]
     return tuple(part for link in parts for part in link)
+
+
+MeshVersions: TypeAlias = tuple[Path | None, tuple[tuple[int, int, int] | None, ...]]
+"""Folder of a robot's meshes, and of each file its size, time of change and inode, None if it is missing."""
+
+
+def mesh_versions(description: Description) -> MeshVersions:
+    """Return what a cache of a robot's shapes depends on beside the description: the files of its meshes.
+
+    A file that is replaced has another version, and what was computed from it is computed again.
+    """
+    folder = description.mesh_folder
+    if folder is None:
+        return None, ()
+    return folder, tuple(_version(folder / path) for path in _mesh_paths(description))
+
+
+@lru_cache(maxsize=256)
+def _mesh_paths(description: Description) -> tuple[str, ...]:
+    """Return the paths of a robot's meshes, as its shapes name them."""
+    own = (description.base.shapes, *(joint.shapes for joint in description.joints), description.tool.shapes)
+    meshes = [shape.geometry for shapes in own for shape in shapes if isinstance(shape.geometry, Mesh)]
+    return tuple(dict.fromkeys(mesh.path.replace("\\", "/") for mesh in meshes))
+
+
+def _version(file: Path) -> tuple[int, int, int] | None:
+    try:
+        status = file.stat()
+    except (OSError, ValueError):
+        return None
+    return status.st_size, status.st_mtime_ns, status.st_ino
 
 
 def links_without_shapes(description: Description) -> tuple[int, ...]:

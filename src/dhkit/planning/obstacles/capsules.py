@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Box, Capsule, Cylinder, Description, Sphere, world_to_frames
 from dhkit.model.mesh_reader import read_part
-from dhkit.model.shapes import Part, link_parts
+from dhkit.model.shapes import MeshVersions, Part, link_parts, mesh_versions
 from dhkit.planning.obstacles.enclosing import Balls, enclose, refine
 
 MAX_CAPSULES = 2
@@ -70,7 +69,7 @@ def link_capsules(description: Description) -> tuple[LinkCapsule, ...]:
     [0, 1, 1, 2, 2]
     """
     # Equal descriptions may have their meshes in different folders.
-    return _link_capsules(description, description.mesh_folder)
+    return _link_capsules(description, mesh_versions(description))
 
 
 def world_axes(description: Description, q: ArrayLike) -> Array:
@@ -94,7 +93,7 @@ def world_axes(description: Description, q: ArrayLike) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _link_capsules(description: Description, mesh_folder: Path | None) -> tuple[LinkCapsule, ...]:
+def _link_capsules(description: Description, meshes: MeshVersions) -> tuple[LinkCapsule, ...]:
     parts: dict[int, list[Balls]] = {}
     for part in link_parts(description):
         parts.setdefault(part.link, []).append(_balls(part))

@@ -6,14 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array, Box, Capsule, Cylinder, Description, Sphere, world_to_frames
-from dhkit.model.shapes import Part, link_parts
+from dhkit.model.shapes import MeshVersions, Part, link_parts, mesh_versions
 from dhkit.planning.obstacles.capsules import convex_hull
 from dhkit.planning.obstacles.solids import coal_module, distance_request, signed_distance
 
@@ -53,7 +52,7 @@ def shape_distances(description: Description, q: Array, links: tuple[int, int], 
     ModelError
         coal is not installed, or a mesh cannot be read.
     """
-    solids = _solids(description, description.mesh_folder)
+    solids = _solids(description, mesh_versions(description))
     frames = world_to_frames(description, q)
     least = np.full(len(q), np.inf)
     request, result = distance_request(), coal_module().DistanceResult()
@@ -105,7 +104,7 @@ def _place(T: Array) -> Any:
 
 
 @lru_cache(maxsize=64)
-def _solids(description: Description, mesh_folder: Path | None) -> dict[int, tuple[_Solid, ...]]:
+def _solids(description: Description, meshes: MeshVersions) -> dict[int, tuple[_Solid, ...]]:
     """Return the solids of each link that has any."""
     found: dict[int, tuple[_Solid, ...]] = {}
     for part in link_parts(description):

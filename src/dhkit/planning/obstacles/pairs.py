@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations, product
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from dhkit.description import Array, Description
+from dhkit.model.shapes import MeshVersions, mesh_versions
 from dhkit.planning.obstacles.capsules import link_capsules, link_name, world_axes
 from dhkit.planning.obstacles.link_shapes import shape_distances
 from dhkit.planning.obstacles.scene import Obstacle
@@ -97,11 +97,11 @@ class Pair(NamedTuple):
 
 def checked_pairs(description: Description) -> CheckedPairs:
     """Return the checked pairs of an arm."""
-    return _checked_pairs(description, description.mesh_folder)
+    return _checked_pairs(description, mesh_versions(description))
 
 
 @lru_cache(maxsize=64)
-def _checked_pairs(description: Description, mesh_folder: Path | None) -> CheckedPairs:
+def _checked_pairs(description: Description, meshes: MeshVersions) -> CheckedPairs:
     axes = world_axes(description, _configurations(description))
     if not axes.shape[1]:
         return CheckedPairs((), (), 0.0)
@@ -123,11 +123,11 @@ def link_pairs(description: Description) -> LinkPairs:
     ModelError
         coal is not installed, or a mesh cannot be read.
     """
-    return _link_pairs(description, description.mesh_folder)
+    return _link_pairs(description, mesh_versions(description))
 
 
 @lru_cache(maxsize=64)
-def _link_pairs(description: Description, mesh_folder: Path | None) -> LinkPairs:
+def _link_pairs(description: Description, meshes: MeshVersions) -> LinkPairs:
     capsules = link_capsules(description)
     q = _configurations(description)
     axes = world_axes(description, q)
@@ -195,11 +195,11 @@ def capsules_beside(description: Description, obstacle: Obstacle) -> tuple[int, 
     They are those that move, without those that travel by no more than their radius and overlap the obstacle in all
     configurations: a foot in the box or table that the arm stands on, which no motion changes.
     """
-    return _capsules_beside(description, description.mesh_folder, obstacle)
+    return _capsules_beside(description, mesh_versions(description), obstacle)
 
 
 @lru_cache(maxsize=MAX_OBSTACLES)
-def _capsules_beside(description: Description, mesh_folder: Path | None, obstacle: Obstacle) -> tuple[int, ...]:
+def _capsules_beside(description: Description, meshes: MeshVersions, obstacle: Obstacle) -> tuple[int, ...]:
     capsules = link_capsules(description)
     axes = world_axes(description, _configurations(description)[:STANDING_SAMPLES])
 
@@ -221,11 +221,11 @@ def ends_above(description: Description, height: float) -> tuple[tuple[int, int]
     They are those whose height changes, without those that change it by no more than their radius and are below the
     floor in all configurations: an arm may stand in it.
     """
-    return _ends_above(description, description.mesh_folder, height)
+    return _ends_above(description, mesh_versions(description), height)
 
 
 @lru_cache(maxsize=256)
-def _ends_above(description: Description, mesh_folder: Path | None, height: float) -> tuple[tuple[int, int], ...]:
+def _ends_above(description: Description, meshes: MeshVersions, height: float) -> tuple[tuple[int, int], ...]:
     capsules = link_capsules(description)
     axes = world_axes(description, _configurations(description)[:STANDING_SAMPLES])
 
