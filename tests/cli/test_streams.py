@@ -18,6 +18,7 @@ import pytest
 from dhkit import Arm, Limits
 from dhkit.cli import app as app_module, main
 from dhkit.cli.app import load_command
+from dhkit.cli.output import print_json
 from dhkit.cli.streams import _plain
 from dhkit.description.files import write_atomically
 
@@ -57,6 +58,29 @@ def test_letters_that_a_pipe_of_a_process_lacks_are_replaced():
 
 def test_letters_become_plain_ones():
     assert "".join(map(_plain, "θ α Θ → ² ½ é ─│ 90° 関")) == "theta alpha Theta -> 2 12 e -| 90 deg ?"
+
+
+HOSTILE = "\x1b]0;title\x07\x1b[2J\x9b1m\u202egnp."
+"""A title, a cleared screen, bold by a C1 character, and text that runs from right to left."""
+
+
+@pytest.mark.parametrize("words", [["check", "planar2r", "{}.py"], ["info", "{}.toml"], ["info", "{}.urdf"]])
+def test_names_of_files_reach_a_terminal_without_control_characters(words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    names = [word.format(HOSTILE) for word in words]
+    Path(names[-1]).write_text("nonsense")
+    with pytest.raises(SystemExit):
+        main(names)
+    written = "".join(capsys.readouterr())
+    assert r"\x1b]0;title" in written
+    assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]", written)
+
+
+def test_json_has_control_characters_as_escapes(capsys):
+    print_json({"name": HOSTILE})
+    written = capsys.readouterr().out
+    assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]", written)
+    assert json.loads(written) == {"name": HOSTILE}
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")

@@ -17,7 +17,7 @@ from typer.core import TyperCommand, TyperGroup
 from dhkit import __version__
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.output import ReaderGone, say
-from dhkit.cli.streams import replace_unknown_letters
+from dhkit.cli.streams import clean_streams
 from dhkit.description.joint_text import DEGREES
 from dhkit.errors import DhkitError
 
@@ -111,7 +111,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     KeyboardInterrupt
         Somebody pressed Ctrl-C.
     """
-    replace_unknown_letters()
+    clean_streams()
     logging.basicConfig(format="dhkit: %(message)s", level=logging.WARNING)
     logging.getLogger("dhkit").setLevel(logging.INFO)  # messages about work that takes seconds, such as compiling
     degrees = DEGREES.set(False)

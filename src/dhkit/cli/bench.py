@@ -15,6 +15,7 @@ from dhkit.bench import QUANTITIES, BenchReport, Ending, Requirement, run as run
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.options import Json, Seed
 from dhkit.cli.output import print_json, say
+from dhkit.cli.streams import styled, visible
 from dhkit.description import write_atomically
 from dhkit.description.files import check_place
 
@@ -115,10 +116,11 @@ class _Progress:
 
     def show(self, line: str) -> None:
         """Show the present step."""
-        sys.stderr.write(f"\r\x1b[K{line}" if self.terminal else f"{line}\n")
+        line = visible(line)
+        styled(sys.stderr).write(f"\r\x1b[K{line}" if self.terminal else f"{line}\n")
         sys.stderr.flush()
 
     def clear(self) -> None:
         """Clear the terminal's line."""
         if self.terminal:
-            sys.stderr.write("\r\x1b[K")
+            styled(sys.stderr).write("\r\x1b[K")

@@ -16,6 +16,7 @@ from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.grade_output import FORMS, Graded, check_output, deliver
 from dhkit.cli.options import Json
 from dhkit.cli.output import say
+from dhkit.cli.streams import styled
 from dhkit.description import write_atomically
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading import LIBRARY, grade as judge_sheet
@@ -305,7 +306,7 @@ def _progress(total: int) -> Iterator[Callable[[int, int], None] | None]:
     bar = Progress(
         *Progress.get_default_columns(),
         MofNCompleteColumn(),
-        console=Console(stderr=True),
+        console=Console(file=styled(sys.stderr)),
         transient=True,
         auto_refresh=False,
         redirect_stdout=False,

@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from dhkit.cli.streams import UNSAFE, styled, visible
 from dhkit.description import write_atomically
 from dhkit.description.files import check_place
 from dhkit.errors import DescriptionError
@@ -59,12 +60,12 @@ def _reader_gone() -> ReaderGone:
 def console() -> Console:
     """Return a console on the present stdout, as wide as the terminal."""
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else PIPE_WIDTH
-    return _Output(width=width, highlight=False, soft_wrap=True)
+    return _Output(file=styled(sys.stdout), width=width, highlight=False, soft_wrap=True)
 
 
 def say(text: str, style: str = "") -> None:
     """Print a line of plain text, in which brackets are no markup."""
-    console().print(Text(text, style=style))
+    console().print(Text(visible(text), style=style))
 
 
 def say_written(files: Iterable[object]) -> None:
@@ -84,7 +85,9 @@ def print_json(value: object, indent: int | None = None) -> None:
     """Print a value as one JSON document, in which NaN and infinity are null."""
     plain = "utf" not in (sys.stdout.encoding or "").lower()  # a letter that is replaced would be another text
     try:
-        sys.stdout.write(json.dumps(finite(value), ensure_ascii=plain, allow_nan=False, indent=indent) + "\n")
+        text = json.dumps(finite(value), ensure_ascii=plain, allow_nan=False, indent=indent)
+        # Unsafe characters stand in strings alone, where JSON has escapes for them.
+        sys.stdout.write(UNSAFE.sub(lambda match: f"\\u{ord(match[0]):04x}", text) + "\n")
         sys.stdout.flush()
     except BrokenPipeError:
         raise _reader_gone() from None
@@ -92,13 +95,19 @@ def print_json(value: object, indent: int | None = None) -> None:
 
 def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], title: str | None = None) -> None:
     """Print a table, with columns of numbers aligned to the right."""
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table = Table(
+        title=None if title is None else visible(title),
+        title_justify="left",
+        box=None,
+        pad_edge=False,
+        padding=(0, 2, 0, 0),
+    )
     cells = [list(row) for row in rows]
     for k, heading in enumerate(headings):
         numeric = bool(cells) and all(_is_number(row[k]) for row in cells)
-        table.add_column(Text(heading), justify="right" if numeric else "left", overflow="fold")
+        table.add_column(Text(visible(heading)), justify="right" if numeric else "left", overflow="fold")
     for row in cells:
-        table.add_row(*(Text(cell) for cell in row))
+        table.add_row(*(Text(visible(cell)) for cell in row))
     console().print(table)
 
 

@@ -6,6 +6,8 @@ import sys
 import threading
 from typing import Any
 
+from dhkit.cli.streams import styled
+
 DELAY = 1.0
 """Time before the bar appears, s."""
 
@@ -49,7 +51,7 @@ class ProgressBar:
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
         columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
-        bar = Progress(*columns, console=Console(stderr=True), transient=True)
+        bar = Progress(*columns, console=Console(file=styled(sys.stderr)), transient=True)
         self._task = bar.add_task(self._text, total=self._total or None)
         bar.update(self._task, completed=self._done)
         bar.start()
