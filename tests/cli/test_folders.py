@@ -49,7 +49,7 @@ def test_an_open_view_waits_for_ctrl_c(monkeypatch):
         if len(waited) == 3:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(view.webbrowser, "open", opened.append)
+    monkeypatch.setattr("webbrowser.open", opened.append)
     monkeypatch.setattr(view.time, "sleep", sleep)
     with View(Arm.load("planar2r")) as shown:
         assert shown.open() == shown.url and not waited

@@ -3,6 +3,8 @@
 import subprocess
 import sys
 import time
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 import numpy as np
 import pytest
@@ -246,7 +248,13 @@ def test_opening_shows_the_page_in_the_browser(monkeypatch):
     monkeypatch.setattr("webbrowser.open", opened.append)
     with View(library_robot("planar2r")) as view:
         assert opened == []
-        assert [view.open()] == opened == [view.url]
+        url = view.open()
+        assert url == view.url
+    # The address has a token, and others can read a browser's arguments: it stands in a file that they cannot read.
+    file = Path(unquote(urlsplit(opened[0]).path))
+    assert urlsplit(opened[0]).scheme == "file" and len(opened) == 1
+    assert f'content="0; url={url}"' in file.read_text()
+    assert file.stat().st_mode & 0o077 == 0 and file.parent.stat().st_mode & 0o077 == 0
 
 
 def test_a_view_needs_neither_matplotlib_nor_a_server_to_be_imported():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import signal
 import threading
 import time
-import webbrowser
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +17,7 @@ from dhkit.errors import DescriptionError
 from dhkit.lab import Assignment, serve
 from dhkit.lab.assignment import is_assignment
 from dhkit.programs import protect_from_children
+from dhkit.viewer.opening import open_in_browser
 
 app = typer.Typer(rich_markup_mode=None)
 
@@ -29,7 +29,7 @@ def until_interrupted(url: str, what: str, *, open_browser: bool) -> ExitStatus:
     try:
         say(f"{what} at {url}; Ctrl-C ends it")
         if open_browser:
-            webbrowser.open(url)
+            open_in_browser(url)
         while True:
             time.sleep(3600)
     except KeyboardInterrupt:

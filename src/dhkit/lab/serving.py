@@ -6,7 +6,6 @@ import os
 import secrets
 import stat
 import time
-import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from dhkit.description import Robot, write_atomically
 from dhkit.errors import ModelError
 from dhkit.lab.assignment import Assignment
 from dhkit.lab.lab import Lab
+from dhkit.viewer.opening import open_in_browser
 
 TOKEN_LENGTH = 22
 """Smallest length of a token, characters: 16 random bytes in base64."""
@@ -81,7 +81,7 @@ def serve(
     lab = Lab(arm, port or 0, None if port is None else kept_token(port), own, sandbox, solid, assignment)
     try:
         if open_browser:
-            webbrowser.open(lab.url)
+            open_in_browser(lab.url)
         while block:
             time.sleep(3600)
     except KeyboardInterrupt:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-import webbrowser
 from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
@@ -20,6 +19,7 @@ from dhkit.viewer import protocol
 from dhkit.viewer.exports import Exportable, Snapshot
 from dhkit.viewer.motion import Motion, played_motion
 from dhkit.viewer.notebook import framed_page, notebook_widget
+from dhkit.viewer.opening import open_in_browser
 from dhkit.viewer.overlays import ball_transforms, color_bytes, ghost_tints, rounded_boxes
 from dhkit.viewer.pictures import Ghost
 from dhkit.viewer.scene import build_scene, first_configuration, node_transforms, scene_size
@@ -114,7 +114,7 @@ class View(Exportable):
         With ``block`` it returns when Ctrl-C is pressed: a script that ends takes its view along.
         """
         url = self.url
-        webbrowser.open(url)
+        open_in_browser(url)
         with suppress(KeyboardInterrupt):
             while block:
                 time.sleep(0.2)
