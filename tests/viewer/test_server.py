@@ -3,9 +3,10 @@
 import asyncio
 import http.client
 import json
+import socket
 import threading
 import time
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, contextmanager
 
 import pytest
 from tornado.httpclient import HTTPClientError, HTTPRequest
@@ -198,6 +199,44 @@ def test_it_survives_many_connections(server):
     while server.pages and time.monotonic() < deadline:
         time.sleep(0.01)
     assert not server.pages
+
+
+@contextmanager
+def strangers(server, count, text=b"GET /x"):
+    """Connections that begin a request, without the token."""
+    opened = []
+    try:
+        for _ in range(count):
+            opened.append(socket.create_connection(("127.0.0.1", server.port), timeout=HANGS))
+            opened[-1].sendall(text)
+        yield opened
+    finally:
+        for one in opened:
+            one.close()
+
+
+@pytest.mark.parametrize("text", [b"", b"GET /x", b"GET /wrong/ HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"])
+def test_strangers_do_not_keep_the_owner_out(server, text):
+    """The oldest of them makes room, and a page that is open stays."""
+
+    async def owner():
+        async with connect(server) as page:
+            decode_header(await page.read_message())
+            with strangers(server, MAX_CONNECTIONS + 20, text) as opened:
+                for _ in range(3):
+                    assert (await asyncio.to_thread(get, server, f"/{server.token}/"))[0] == 200
+                while opened[0].recv(10_000):  # refused or closed
+                    pass
+            page.close()
+
+    run(owner())
+
+
+def test_a_stranger_who_says_nothing_is_sent_away(server, monkeypatch):
+    monkeypatch.setattr("dhkit.viewer.server.FIRST_REQUEST_TIMEOUT", 0.01)
+    with strangers(server, 1) as (one,):
+        assert one.recv(1) == b""
+    assert get(server, f"/{server.token}/")[0] == 200
 
 
 def test_nonsense_from_a_page_gets_an_error_and_the_page_lives(server):

@@ -11,8 +11,9 @@ import hmac
 import json
 from collections.abc import Collection, Mapping
 from contextlib import suppress
-from typing import Protocol
+from typing import Any, Protocol
 
+from tornado.iostream import IOStream
 from tornado.web import HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
@@ -47,6 +48,9 @@ class PageServer(Protocol):
     def ask(self, page: Page, request: Request) -> None:
         """Queue a page's request, to be answered after those before it."""
 
+    def trust(self, stream: IOStream) -> None:
+        """Note that a connection has shown the token."""
+
     def forget(self, page: Page) -> None:
         """Drop a page that is closed, and its requests."""
 
@@ -67,6 +71,8 @@ class Guarded(RequestHandler):
             raise HTTPError(403, reason="Foreign Origin")
         if not hmac.compare_digest((self.path_args or [""])[0].encode(), self.server.token.encode()):
             raise HTTPError(403, reason="Missing token")
+        connection: Any = self.request.connection
+        self.server.trust(connection.stream)
 
     def set_default_headers(self) -> None:
         """Send headers that tell little about the server, and keep the content from other sites and from caches."""

@@ -48,7 +48,9 @@ MAX_BODY = 1_000
 MAX_BUFFER = 2 * MAX_MESSAGE
 """Largest number of bytes that are read ahead of a connection."""
 IDLE_TIMEOUT = 60.0
-"""Longest time that a connection may take to send its request, s."""
+"""Longest time that a connection may take to send a further request, s."""
+FIRST_REQUEST_TIMEOUT = 10.0
+"""Longest time that a connection may take until it has shown the token, s."""
 MAX_CONNECTIONS = 150
 """Largest number of connections at a time, those of pages included."""
 POLL_PERIOD = 0.005
@@ -56,25 +58,47 @@ POLL_PERIOD = 0.005
 
 
 class BoundedServer(HTTPServer):
-    """A server that closes connections beyond MAX_CONNECTIONS: each needs a descriptor, of which a process has few."""
+    """A server of at most MAX_CONNECTIONS connections: each needs a descriptor, of which a process has few.
+
+    Everybody on the machine can connect. Of connections that have not shown the token, the oldest makes room for a new
+    one, and each is closed after a short time: so strangers do not keep the owner out.
+    """
 
     def initialize(self, *arguments: Any, **options: Any) -> None:
         """Begin without connections."""
         super().initialize(*arguments, **options)
         self._open = 0
+        self._strangers: dict[IOStream, None] = {}
 
     def handle_stream(self, stream: IOStream, address: tuple[str, int]) -> None:
-        """Serve a connection, unless there are too many."""
+        """Serve a connection; of too many, close the oldest that has not shown the token, or else this one."""
         if self._open >= MAX_CONNECTIONS:
-            stream.close()
-            return
+            oldest = next(iter(self._strangers), stream)
+            self._close_stranger(oldest)
+            if oldest is stream:
+                return
         self._open += 1
+        self._strangers[stream] = None
+        asyncio.get_running_loop().call_later(FIRST_REQUEST_TIMEOUT, self._close_if_stranger, stream)
         super().handle_stream(stream, address)
 
-    def on_close(self, server_conn: object) -> None:
+    def trust(self, stream: IOStream) -> None:
+        """Note that a connection has shown the token."""
+        self._strangers.pop(stream, None)
+
+    def on_close(self, server_conn: Any) -> None:
         """Note the end of a connection."""
         self._open -= 1
+        self._strangers.pop(server_conn.stream, None)
         super().on_close(server_conn)
+
+    def _close_if_stranger(self, stream: IOStream) -> None:
+        if stream in self._strangers:
+            self._close_stranger(stream)
+
+    def _close_stranger(self, stream: IOStream) -> None:
+        self._strangers.pop(stream, None)
+        stream.close()
 
 
 class ViewerServer:
@@ -148,6 +172,10 @@ class ViewerServer:
             self._worker.submit(self._answer_next, self._answer)
         except RuntimeError:
             return  # the server was closed meanwhile
+
+    def trust(self, stream: IOStream) -> None:
+        """Note that a connection has shown the token."""
+        self._http.trust(stream)
 
     def forget(self, page: Page) -> None:
         """Drop a page that is gone, and its requests."""
@@ -291,7 +319,7 @@ class ViewerServer:
             websocket_max_message_size=MAX_MESSAGE,
         )
         self.sockets = bind_sockets(self._requested_port, ADDRESS)
-        http = BoundedServer(
+        self._http = http = BoundedServer(
             application, max_body_size=MAX_BODY, max_buffer_size=MAX_BUFFER, idle_connection_timeout=IDLE_TIMEOUT
         )
         http.add_sockets(self.sockets)
