@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from numpy.typing import ArrayLike
 
 from dhkit import description as describe
+from dhkit.cached_property import cached_property
 from dhkit.description import Array, Description, DHTable, Named, Robot
 from dhkit.display import repr_line
 from dhkit.errors import DescriptionError

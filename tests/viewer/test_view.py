@@ -1,4 +1,4 @@
-"""Facts of a view that need no browser."""
+"""Facts of a view that need no browser. Modules: view, opening."""
 
 import subprocess
 import sys

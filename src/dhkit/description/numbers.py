@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dhkit.cached_property import cached_property
 from dhkit.description.arrays import Array
 from dhkit.description.bodies import INERTIA_PLACES, Body, joined
 from dhkit.description.exact_poses import pose_of

@@ -5,9 +5,10 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from functools import cached_property, wraps
+from functools import wraps
 from typing import Any, Concatenate, ParamSpec, TypeVar, cast
 
+from dhkit.cached_property import cached_property
 from dhkit.description.bodies import Body
 from dhkit.description.numbers import Numbers
 from dhkit.description.parameters import resolved

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import cached_property
 from typing import TypeAlias
 
+from dhkit.cached_property import cached_property
 from dhkit.description.bodies import ORIGIN, Body, Vector, joined, vector_text
 from dhkit.display import counted, repr_line, value_line
 from dhkit.expressions import PI, ZERO, Expression, exact

@@ -12,9 +12,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from decimal import Context, Decimal
 from fractions import Fraction
-from functools import cached_property
 from typing import TypeAlias
 
+from dhkit.cached_property import cached_property
 from dhkit.display import LONGEST_LINE, plain
 from dhkit.errors import ExpressionError
 from dhkit.expressions.budget import spend
