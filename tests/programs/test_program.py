@@ -14,11 +14,13 @@ import threading
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import psutil
 import pytest
 
 from acceptance import ACCEPTING
 from dhkit.programs import program as program_module
+from dhkit.programs.caller import Caller
 from dhkit.programs.process import Failure, Limits, ProgramError
 from dhkit.programs.program import Program
 from waiting import HANGS, wait_for
@@ -263,3 +265,25 @@ def test_a_sandbox_writes_nowhere_and_has_no_network(program, tmp_path):
         (tmp_path / "written").unlink()
         assert program(text, sandbox="bwrap").call("fk", q=[1.0]) == 0.0
     assert not (tmp_path / "written").exists()
+
+
+BUSY = """
+import time
+def fk(q):
+    begun = time.process_time()
+    while time.process_time() < begun + 0.2:
+        pass
+    return [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+"""
+
+
+def test_all_calls_together_are_limited_by_processor_time(program, monkeypatch):
+    monkeypatch.setattr("dhkit.programs.caller.MAX_TIME", 0.5)
+    busy = program(BUSY)
+    caller = Caller(busy, "fk")
+    with pytest.raises(ProgramError, match="not called any more"):
+        for _ in range(20):
+            caller(np.zeros(2))
+    assert 1 < len(caller.seconds) < 10
+    assert busy.processor_time > 0.5
+    assert caller.failure_texts() == ("scoring took longer than 0.5 s: not called any more (1 time)",)

@@ -7,6 +7,7 @@ from collections import Counter
 from typing import Any
 
 from dhkit.description import Array
+from dhkit.grading.isolation import WAITING_FACTOR
 from dhkit.programs.process import Failure, ProgramError
 from dhkit.programs.program import Program
 
@@ -17,7 +18,7 @@ MAX_DETAILS = 5
 MAX_FATAL_FAILURES = 3
 """Failures in a row that end a program, after which it is not called again."""
 MAX_TIME = 600.0
-"""Longest time of all calls of a function together, s."""
+"""Largest processor time of all calls of a function together, s; on the clock it may be four times as long."""
 FATAL = {Failure.LATE, Failure.MEMORY, Failure.PROCESSES, Failure.ENDED, Failure.GARBAGE}
 
 
@@ -38,6 +39,7 @@ class Caller:
         self.seconds: list[float] = []
         self._fatal = 0
         self._begun = time.perf_counter()
+        self._processor_begun = program.processor_time
 
     def __call__(self, *arguments: Any) -> Array:
         """Return the function's value, as :meth:`Program.fk` and the others return it.
@@ -49,7 +51,8 @@ class Caller:
         """
         if self._fatal >= MAX_FATAL_FAILURES:
             raise ProgramError("not called any more", Failure.ENDED)
-        if time.perf_counter() - self._begun > MAX_TIME:
+        processor = self.program.processor_time - self._processor_begun
+        if processor > MAX_TIME or time.perf_counter() - self._begun > WAITING_FACTOR * MAX_TIME:
             self.failures[f"scoring took longer than {MAX_TIME:g} s: not called any more"] = 1
             raise ProgramError("not called any more", Failure.LATE)
         begin = time.perf_counter()

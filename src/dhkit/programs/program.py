@@ -64,6 +64,7 @@ class Program:
         self._process: Process | None = None
         self._lock = threading.Lock()
         self._closed = False
+        self._ended_time = 0.0
 
     def start(self) -> None:
         """Start the program, unless it runs, and wait until it has named its functions.
@@ -152,6 +153,12 @@ class Program:
         running = self._process
         return "" if running is None else running.output()
 
+    @property
+    def processor_time(self) -> float:
+        """Processor time of all its processes so far, s."""
+        running = self._process
+        return self._ended_time + (0.0 if running is None else running.processor_time)
+
     def close(self) -> None:
         """End the program and all processes that it started, also during a call; it is not started again."""
         self._closed = True
@@ -223,6 +230,7 @@ class Program:
         if self._process is not None:
             self._process.close()
             if not keep:
+                self._ended_time += self._process.processor_time
                 self._process = None
 
     def _command(self, folder: Path) -> list[str]:
