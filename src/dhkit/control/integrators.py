@@ -15,6 +15,13 @@ from dhkit.errors import SimulationError
 
 MAX_STEPS = 5_000
 """Largest number of DOP853's steps to the next requested time."""
+USUAL_STEPS = 30
+"""Number of steps to the next requested time after which jumps of the torques are looked for."""
+MAX_JUMPS = 100
+"""Largest number of steps of a run with such a jump: a controller may switch at times, and not all the time."""
+JUMP_SHARE = 1e-3
+"""Change of torques, as a share of the largest torque, that is a jump if no part of a step is too short for it."""
+HALVINGS = 40
 Torques = Callable[[float, Array, Array, Array], tuple[Array, Array]]
 """Function of time (s), joint values and rates (n,) and the controller's internal states (m,), that returns torques
 (n,) and the derivatives of the internal states (m,)."""
@@ -125,6 +132,8 @@ class DormandPrince:
         self._steps = 0
         """Number of steps so far to ``_end``."""
         self._end = 0.0
+        self._jumps = 0
+        """Number of steps of the run in which torques were seen to jump."""
         self._solver: DOP853 | None = None
         self._last: State | None = None
 
@@ -191,14 +200,55 @@ class DormandPrince:
         self._steps += 1
         if self._steps > MAX_STEPS:
             raise SimulationError(
-                f"more than {MAX_STEPS:,} steps before {self._end:g} s, the last at {begin:g} s: torques that jump"
-                " with the state, as those of a relay, have no continuous solution; expected a rate in Hz"
+                f"more than {MAX_STEPS:,} steps before {self._end:g} s, the last at {begin:g} s;"
+                f" {self._fastest(solver)}: the motion diverges, or torques are too steep; expected a stabler controller"
+                " or a rate in Hz"
             )
         with np.errstate(over="ignore", invalid="ignore"):  # the error is raised below
             message = solver.step()
         if message is not None or not np.isfinite(solver.y).all():
-            raise SimulationError(f"no step from {begin:g} s on meets the tolerance of {self.tolerance:g}")
+            raise SimulationError(
+                f"no step from {begin:g} s on meets the tolerance of {self.tolerance:g}; {self._fastest(solver)}"
+            )
         self._length = solver.h_abs
+        if self._steps > USUAL_STEPS and self._torques_jump(solver):
+            self._jumps += 1
+            if self._jumps > MAX_JUMPS:
+                raise SimulationError(
+                    f"torques jumped in {MAX_JUMPS} steps, the last at {begin:g} s: torques that jump with the state,"
+                    " as those of a relay, have no continuous solution; expected a rate in Hz"
+                )
+
+    def _fastest(self, solver: DOP853) -> str:
+        """Return a text on the joint that moves fastest in the last finite state."""
+        n = self.plant.n
+        y = solver.y if np.isfinite(solver.y).all() else solver.y_old
+        rates = np.abs(y[n : 2 * n])
+        i = int(rates.argmax())
+        unit = "m/s" if self.plant.description.numbers.prismatic[i] else "rad/s"
+        return f"{self.plant.description.joints[i].name} moves at {rates[i]:.3g} {unit} there"
+
+    def _torques_jump(self, solver: DOP853) -> bool:
+        """Return whether torques jump on the line between the states at both ends of the last step, by bisection."""
+        n = self.plant.n
+
+        def torques_at(s: float) -> Array:
+            t = solver.t_old + s * (solver.t - solver.t_old)
+            y = solver.y_old + s * (solver.y - solver.y_old)
+            return self.torques(t, y[:n], y[n : 2 * n], y[2 * n : -3])[0]
+
+        low, high = 0.0, 1.0
+        below, above = torques_at(low), torques_at(high)
+        for _ in range(HALVINGS):
+            if np.max(np.abs(above - below)) <= JUMP_SHARE * max(np.max(np.abs(above)), np.max(np.abs(below))):
+                return False
+            middle = (low + high) / 2
+            between = torques_at(middle)
+            if np.max(np.abs(between - below)) > np.max(np.abs(above - between)):
+                high, above = middle, between
+            else:
+                low, below = middle, between
+        return True
 
     def _state(self, before: State, y: Array, t: float) -> State:
         n = self.plant.n
