@@ -201,8 +201,8 @@ class DormandPrince:
         if self._steps > MAX_STEPS:
             raise SimulationError(
                 f"more than {MAX_STEPS:,} steps before {self._end:g} s, the last at {begin:g} s;"
-                f" {self._fastest(solver)}: the motion diverges, or torques are too steep; expected a stabler controller"
-                " or a rate in Hz"
+                f" {self._fastest(solver)}: the motion diverges, or torques are too steep; expected a stabler"
+                " controller or a rate in Hz"
             )
         with np.errstate(over="ignore", invalid="ignore"):  # the error is raised below
             message = solver.step()
