@@ -13,15 +13,26 @@ from dhkit.control.plant import Phase, Plant
 from dhkit.description import Array
 from dhkit.errors import SimulationError
 
-MAX_STEPS = 5_000
-"""Largest number of DOP853's steps to the next requested time."""
-USUAL_STEPS = 30
-"""Number of steps to the next requested time after which jumps of the torques are looked for."""
-MAX_JUMPS = 100
-"""Largest number of steps of a run with such a jump: a controller may switch at times, and not all the time."""
+USUAL_STEPS_PER_SECOND = 30_000.0
+"""Steps of DOP853 in a second of the simulated time that a run may always take: about one in a thousand of them is usual,
+and a stiff controller of 1e5 1/s takes about so many."""
+STEPS_BEFORE_JUMPS = 30
+"""Number of steps beyond the usual ones after which jumps of the torques are looked for."""
+MAX_JUMPS = 50
+"""Largest number of steps with such a jump before the run takes its usual steps again: a controller may switch at times,
+not all the time."""
+STEPS_BEFORE_DIVERGENCE = 2_000
+"""Number of steps beyond the usual ones after which a run ends whose joints move faster than FASTEST_RATE."""
+FASTEST_RATE = 1_000.0
+"""Joint rate, rad/s or m/s, that no arm reaches: where a run that takes too many steps is faster, it diverges."""
+MAX_EXCESS_STEPS = 100_000
+"""Largest number of steps beyond the usual ones, whatever the reason."""
+HALVINGS = 24
+"""Number of bisections in the search for a jump: a continuous change within a step becomes 2^-24 of itself, 6e-8."""
 JUMP_SHARE = 1e-3
-"""Change of torques, as a share of the largest torque, that is a jump if no part of a step is too short for it."""
-HALVINGS = 40
+"""Share of the change of the torques within a step that is left after all bisections if they jump."""
+ROUNDING = 1e-13
+"""Change of torques relative to the largest torque below which it is rounding."""
 Torques = Callable[[float, Array, Array, Array], tuple[Array, Array]]
 """Function of time (s), joint values and rates (n,) and the controller's internal states (m,), that returns torques
 (n,) and the derivatives of the internal states (m,)."""
@@ -129,11 +140,12 @@ class DormandPrince:
         self.plant, self.torques, self.tolerance, self.edges = plant, torques, tolerance, edges
         self.longest = longest
         self._length: float | None = None
-        self._steps = 0
-        """Number of steps so far to ``_end``."""
-        self._end = 0.0
+        self._usual_rate = max(USUAL_STEPS_PER_SECOND, plant.stiffness)
+        """Number of steps in a second that a run may always take; stiff friction needs a sixth of its stiffness."""
+        self._excess = 0.0
+        """Number of steps beyond the usual ones, since the run last took no more than these."""
         self._jumps = 0
-        """Number of steps of the run in which torques were seen to jump."""
+        """Number of those steps in which torques jump."""
         self._solver: DOP853 | None = None
         self._last: State | None = None
 
@@ -147,10 +159,8 @@ class DormandPrince:
         Raises
         ------
         SimulationError
-            The tolerance cannot be met with any step length.
+            The torques jump in every step, the motion diverges, or the tolerance cannot be met with any step length.
         """
-        if end != self._end:
-            self._end, self._steps = end, 0
         if self.plant.has_no_events:
             return self._passing(state, phase, end)
         solver = self._started(state, phase, end)
@@ -196,40 +206,65 @@ class DormandPrince:
             return DOP853(rates, state.t, start, end, first_step=length, **options)
 
     def _advance(self, solver: DOP853) -> None:
+        """Take one step.
+
+        Raises
+        ------
+        SimulationError
+            The steps are too short: says whether torques jump, the motion diverges, or neither is seen.
+        """
         begin = solver.t
-        self._steps += 1
-        if self._steps > MAX_STEPS:
-            raise SimulationError(
-                f"more than {MAX_STEPS:,} steps before {self._end:g} s, the last at {begin:g} s;"
-                f" {self._fastest(solver)}: the motion diverges, or torques are too steep; expected a stabler"
-                " controller or a rate in Hz"
-            )
         with np.errstate(over="ignore", invalid="ignore"):  # the error is raised below
             message = solver.step()
         if message is not None or not np.isfinite(solver.y).all():
-            raise SimulationError(
-                f"no step from {begin:g} s on meets the tolerance of {self.tolerance:g}; {self._fastest(solver)}"
-            )
+            self._raise_jumping_or_diverging(begin, solver.y_old if message is None else solver.y)
+            raise SimulationError(f"no step from {begin:g} s on meets the tolerance of {self.tolerance:g}")
         self._length = solver.h_abs
-        if self._steps > USUAL_STEPS and self._torques_jump(solver):
-            self._jumps += 1
-            if self._jumps > MAX_JUMPS:
-                raise SimulationError(
-                    f"torques jumped in {MAX_JUMPS} steps, the last at {begin:g} s: torques that jump with the state,"
-                    " as those of a relay, have no continuous solution; expected a rate in Hz"
-                )
 
-    def _fastest(self, solver: DOP853) -> str:
-        """Return a text on the joint that moves fastest in the last finite state."""
-        n = self.plant.n
-        y = solver.y if np.isfinite(solver.y).all() else solver.y_old
-        rates = np.abs(y[n : 2 * n])
+        usual = self._usual_rate * (solver.t - begin)
+        self._excess = max(0.0, self._excess + 1.0 - usual)
+        if not self._excess:
+            self._jumps = 0
+        if self._excess > STEPS_BEFORE_JUMPS and self._torques_jump(solver):
+            self._jumps += 1
+            if self._jumps >= MAX_JUMPS:
+                self._raise_jumping_or_diverging(begin, solver.y)
+        if self._excess > STEPS_BEFORE_DIVERGENCE:
+            self._raise_diverging(begin, solver.y)
+        if self._excess > MAX_EXCESS_STEPS:
+            raise SimulationError(
+                f"the last of {MAX_EXCESS_STEPS:,} too short steps begins at {begin:g} s: torques are too steep in the"
+                " state or in time; expected smaller gains, or a rate in Hz"
+            )
+
+    def _raise_jumping_or_diverging(self, t: float, y: Array) -> None:
+        """Raise the error of torques that jump, if some of the last steps had a jump, or of a motion that diverges."""
+        if self._jumps:
+            raise SimulationError(
+                f"torques jump in step after step, the last at {t:g} s: torques that jump with the state, as those of"
+                " a relay, have no continuous solution; expected a rate in Hz"
+            )
+        self._raise_diverging(t, y)
+
+    def _raise_diverging(self, t: float, y: Array) -> None:
+        """Raise the error of a motion that diverges if a joint is faster than ``FASTEST_RATE``."""
+        rates = np.abs(y[self.plant.n : 2 * self.plant.n])
         i = int(rates.argmax())
-        unit = "m/s" if self.plant.description.numbers.prismatic[i] else "rad/s"
-        return f"{self.plant.description.joints[i].name} moves at {rates[i]:.3g} {unit} there"
+        if rates[i] <= FASTEST_RATE:
+            return
+        description = self.plant.description
+        unit = "m/s" if description.numbers.prismatic[i] else "rad/s"
+        raise SimulationError(
+            f"the motion diverges: {description.joints[i].name} moves at {rates[i]:.3g} {unit} at {t:g} s; expected a"
+            " controller that is stable, or effort limits"
+        )
 
     def _torques_jump(self, solver: DOP853) -> bool:
-        """Return whether torques jump on the line between the states at both ends of the last step, by bisection."""
+        """Return whether torques jump on the line between the states at both ends of the last step, by bisection.
+
+        Of the two halves the one with the larger change is kept. The change of continuous torques becomes as small as
+        the part of the step, that of a jump does not, however small the jump is beside the torques.
+        """
         n = self.plant.n
 
         def torques_at(s: float) -> Array:
@@ -239,12 +274,15 @@ class DormandPrince:
 
         low, high = 0.0, 1.0
         below, above = torques_at(low), torques_at(high)
+        largest = max(float(np.abs(below).max()), float(np.abs(above).max()))
+        first = float(np.abs(above - below).max())
+        least = max(JUMP_SHARE * first, ROUNDING * largest)
         for _ in range(HALVINGS):
-            if np.max(np.abs(above - below)) <= JUMP_SHARE * max(np.max(np.abs(above)), np.max(np.abs(below))):
+            if np.abs(above - below).max() <= least:
                 return False
             middle = (low + high) / 2
             between = torques_at(middle)
-            if np.max(np.abs(between - below)) > np.max(np.abs(above - between)):
+            if np.abs(between - below).max() > np.abs(above - between).max():
                 high, above = middle, between
             else:
                 low, below = middle, between

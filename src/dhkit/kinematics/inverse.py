@@ -15,6 +15,7 @@ from dhkit.errors import ModelError
 from dhkit.kernels import EXACT_RANGE, Kernel, check_whole, kernel, pose_rows, result_array
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import OUTPUT_TYPES, Fit, limit_parameters
+from dhkit.kinematics.closed_form.nearest_wrist import nearest_wrist_distance
 from dhkit.kinematics.solutions import IKSolutions
 from dhkit.symbolic import Graph
 
@@ -84,6 +85,10 @@ def inverse_kinematics(
             status.reshape(count, 1),
         ]
         solver.kernel(solver.parameters, [poses.reshape(count, 16), free.reshape(count, 2)], rows, threads)
+        if fit.ring is not None and fit.parameters["offset"]:
+            # The kernel's distance is that of the nearest point in one plane: too much if the plane has an offset.
+            beyond = np.flatnonzero(distance.reshape(count) > 0)
+            distance.reshape(count)[beyond] = nearest_wrist_distance(fit, poses.reshape(count, 4, 4)[beyond])
     return IKSolutions(
         q=q,
         valid=valid.view(np.bool_),

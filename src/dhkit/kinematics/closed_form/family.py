@@ -54,6 +54,8 @@ class Fit:
     """What the formulas depend on besides their parameters, such as the order of the joints."""
     free: int | None = None
     """Index, from 0, of the joint that is free where two axes of the wrist coincide; None if there is none."""
+    ring: tuple[float, float] | None = None
+    """Least and largest distance of a spherical wrist's centre from axis 2 in the arm's plane, m; None without one."""
 
     def vector(self) -> Array:
         """Return all parameters, shape (parameters,), rad and m."""

@@ -46,6 +46,12 @@ def link_parameters(axes: Axes, plane: ArmPlane, end: Array) -> dict[str, Parame
     }
 
 
+def link_range(parameters: Mapping[str, Parameter]) -> tuple[float, float]:
+    """Return the least and the largest distance that the two links reach, m."""
+    upper, fore = (float(np.asarray(parameters[name])) for name in ("L2", "L3"))
+    return abs(upper - fore), upper + fore
+
+
 @dataclass(frozen=True)
 class Elbow:
     """One of the two solutions of joints 2 and 3."""

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from dhkit.description import Array
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.closed_form.arm_plane import (
@@ -42,7 +44,7 @@ from dhkit.kinematics.closed_form.formulas import (
     turn_by_pi,
     unit_pair,
 )
-from dhkit.kinematics.closed_form.links import ELBOWS, elbows, link_parameters
+from dhkit.kinematics.closed_form.links import ELBOWS, elbows, link_parameters, link_range
 from dhkit.kinematics.closed_form.wrist import ill_determined, joints_5_and_6, wrist_axes, wrist_parameters
 
 
@@ -76,6 +78,7 @@ def elbow_fit(axes: Axes) -> Fit | None:
         parameters=wrist_parameters(axes, plane, axes.direction(4), centre) | links,
         branches=branch_names(links["offset"], ELBOWS, FLIPS),
         free=3,
+        ring=link_range(links),
     )
 
 
@@ -121,6 +124,7 @@ def slide_fit(axes: Axes) -> Fit | None:
         parameters=wrist_parameters(axes, plane, axes.direction(4), centre) | geometry,
         branches=branch_names(geometry["offset"], ("out", "in"), FLIPS),
         free=3,
+        ring=(abs(float(geometry["lift"])), np.inf),
     )
 
 
