@@ -63,9 +63,9 @@ class IKSolutions:
     status_code: NDArray[np.uint8]
     """:class:`IKStatus` of each pose, shape (...)."""
     distance: Array
-    """Distance from the point that decides the reach (the wrist's centre, or the tool) to the nearest reachable one, m,
-    shape (...): exact for arms with a spherical wrist, an upper bound for others. 0 where the pose is reached, NaN where
-    it is no pose. Joint limits do not count."""
+    """Distance, m, shape (...), from the point that decides the reach (the wrist's centre, or the tool) to the nearest
+    reachable one: exact for arms with a spherical wrist, an upper bound for others. 0 where the pose is reached, NaN
+    where it is no pose. Joint limits do not count."""
     branches: tuple[str, ...]
     """The branches' names, in words that :meth:`branch` understands."""
     met: tuple[str, ...]
