@@ -137,14 +137,16 @@ def test_a_relay_has_no_continuous_solution():
     def relay(t, q, qd, setpoint):
         return ARM.gravity_torque(q) + [20, 8] * np.sign(setpoint.q - q - 0.2 * qd)
 
-    with pytest.raises(SimulationError, match=r"torques jumped in 100 steps, .* a relay, .* a rate in Hz") as caught:
+    with pytest.raises(
+        SimulationError, match=r"torques jump in step after step, .* a relay, "
+    ) as caught:
         ARM.simulate(relay, [0.5, 0.5], 0.1, q0=[0.0, 0.0], rate=None)
     assert len(caught.value.result.t) >= 1
 
 
 def test_torques_of_noise_have_no_continuous_solution():
     rng = np.random.default_rng(0)
-    with pytest.raises(SimulationError, match=r"torques jumped in 100 steps|meets the tolerance"):
+    with pytest.raises(SimulationError, match=r"torques jump in step after step|meets the tolerance"):
         ARM.simulate(lambda t, q, qd, setpoint: rng.normal(size=2), [0.5, 0.5], 0.1, q0=[0.0, 0.0], rate=None)
 
 
@@ -155,6 +157,6 @@ def test_a_smooth_controller_that_diverges_is_not_called_a_relay():
     def pushing(t, q, qd, setpoint):
         return 5 * qd * np.abs(qd)
 
-    with pytest.raises(SimulationError, match=r"no step from .* moves at .* rad/s there") as caught:
+    with pytest.raises(SimulationError, match=r"the motion diverges: .* moves at .* rad/s") as caught:
         free.simulate(pushing, [0.5, 0.5], 1.0, q0=[0.0, 0.0], qd0=[0.1, 0.1], rate=None)
     assert "relay" not in str(caught.value)

@@ -14,13 +14,13 @@ from dhkit.description import Array
 from dhkit.errors import SimulationError
 
 USUAL_STEPS_PER_SECOND = 30_000.0
-"""Steps of DOP853 in a second of the simulated time that a run may always take: about one in a thousand of them is usual,
-and a stiff controller of 1e5 1/s takes about so many."""
+"""Steps of DOP853 in a second of the simulated time that a run may always take: about one in a thousand of them is
+usual, and a stiff controller of 1e5 1/s takes about so many."""
 STEPS_BEFORE_JUMPS = 30
 """Number of steps beyond the usual ones after which jumps of the torques are looked for."""
 MAX_JUMPS = 50
-"""Largest number of steps with such a jump before the run takes its usual steps again: a controller may switch at times,
-not all the time."""
+"""Largest number of steps with such a jump before the run takes its usual steps again: a controller may switch at
+times, not all the time."""
 STEPS_BEFORE_DIVERGENCE = 2_000
 """Number of steps beyond the usual ones after which a run ends whose joints move faster than FASTEST_RATE."""
 FASTEST_RATE = 1_000.0
@@ -31,6 +31,9 @@ HALVINGS = 24
 """Number of bisections in the search for a jump: a continuous change within a step becomes 2^-24 of itself, 6e-8."""
 JUMP_SHARE = 1e-3
 """Share of the change of the torques within a step that is left after all bisections if they jump."""
+LOOK_AHEAD = 10.0
+"""Length of the line on which a jump is looked for, in steps: a step that is accepted often ends just before the jump
+that the rejected, longer steps crossed."""
 ROUNDING = 1e-13
 """Change of torques relative to the largest torque below which it is rounding."""
 Torques = Callable[[float, Array, Array, Array], tuple[Array, Array]]
@@ -260,10 +263,11 @@ class DormandPrince:
         )
 
     def _torques_jump(self, solver: DOP853) -> bool:
-        """Return whether torques jump on the line between the states at both ends of the last step, by bisection.
+        """Return whether torques jump on the line through the states at both ends of the last step, by bisection.
 
-        Of the two halves the one with the larger change is kept. The change of continuous torques becomes as small as
-        the part of the step, that of a jump does not, however small the jump is beside the torques.
+        The line begins with the step and is ``LOOK_AHEAD`` times as long. Of the two halves the one with the larger
+        change is kept. The change of continuous torques becomes as small as the part of the step, that of a jump does
+        not, however small the jump is beside the torques.
         """
         n = self.plant.n
 
@@ -272,7 +276,7 @@ class DormandPrince:
             y = solver.y_old + s * (solver.y - solver.y_old)
             return self.torques(t, y[:n], y[n : 2 * n], y[2 * n : -3])[0]
 
-        low, high = 0.0, 1.0
+        low, high = 0.0, LOOK_AHEAD
         below, above = torques_at(low), torques_at(high)
         largest = max(float(np.abs(below).max()), float(np.abs(above).max()))
         first = float(np.abs(above - below).max())
