@@ -3,6 +3,8 @@
 Modules: controller, simulation.
 """
 
+import re
+
 import numpy as np
 import pytest
 
@@ -133,30 +135,85 @@ def test_progress_can_end_a_run():
         run(duration=3.0, progress=stop)
 
 
+JUMPING = r"torques jump in step after step, .* a relay, .* a rate in Hz"
+MOST_CALLS = 100_000
+"""Calls of a controller before its run must have failed: a few seconds of work on any machine."""
+
+
+def continuous_failure(arm, torques, duration, qd0=(0.0, 0.0)):
+    """Return the error of a continuous run, and the number of times that its controller was called."""
+    calls = 0
+
+    def counting(t, q, qd, setpoint):
+        nonlocal calls
+        calls += 1
+        return torques(t, q, qd, setpoint)
+
+    with pytest.raises(SimulationError) as caught:
+        arm.simulate(counting, [0.5, 0.5], duration, q0=[0.0, 0.0], qd0=qd0, rate=None)
+    assert "\n" not in str(caught.value)
+    return caught.value, calls
+
+
+def damped(t, q, qd, setpoint):
+    return ARM.gravity_torque(q) + 100 * (setpoint.q - q) - 20 * qd
+
+
 def test_a_relay_has_no_continuous_solution():
     def relay(t, q, qd, setpoint):
         return ARM.gravity_torque(q) + [20, 8] * np.sign(setpoint.q - q - 0.2 * qd)
 
-    with pytest.raises(
-        SimulationError, match=r"torques jump in step after step, .* a relay, "
-    ) as caught:
-        ARM.simulate(relay, [0.5, 0.5], 0.1, q0=[0.0, 0.0], rate=None)
-    assert len(caught.value.result.t) >= 1
-
-
-def test_torques_of_noise_have_no_continuous_solution():
-    rng = np.random.default_rng(0)
-    with pytest.raises(SimulationError, match=r"torques jump in step after step|meets the tolerance"):
-        ARM.simulate(lambda t, q, qd, setpoint: rng.normal(size=2), [0.5, 0.5], 0.1, q0=[0.0, 0.0], rate=None)
+    error, calls = continuous_failure(ARM, relay, 0.1)
+    assert re.search(JUMPING, str(error))
+    assert len(error.result.t) >= 1
+    assert calls < 10_000
 
 
 @pytest.mark.slow
-def test_a_smooth_controller_that_diverges_is_not_called_a_relay():
+@pytest.mark.parametrize("size", [1e-3, 1e-6])
+def test_a_relay_that_is_small_beside_smooth_torques_has_no_continuous_solution(size):
+    def relay(t, q, qd, setpoint):
+        return damped(t, q, qd, setpoint) + size * np.sign(setpoint.q - q - 0.2 * qd)
+
+    error, calls = continuous_failure(ARM, relay, 3.0)
+    assert re.search(JUMPING, str(error))
+    assert calls < MOST_CALLS
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-7])
+def test_torques_of_noise_have_no_continuous_solution(size):
+    rng = np.random.default_rng(0)
+
+    def noisy(t, q, qd, setpoint):
+        return damped(t, q, qd, setpoint) + size * rng.normal(size=2)
+
+    error, calls = continuous_failure(ARM, noisy, 1.0)
+    assert re.search(JUMPING, str(error))
+    assert calls < MOST_CALLS
+
+
+def test_a_controller_may_switch_at_times():
+    def square_wave(t, q, qd, setpoint):
+        return damped(t, q, qd, setpoint) + 3 * np.sign(np.sin(200 * t))
+
+    run = ARM.simulate(square_wave, [0.5, 0.5], 0.1, q0=[0.0, 0.0], rate=None)
+    assert run.t[-1] == pytest.approx(0.1)
+
+
+DIVERGING = {
+    "quadratic": lambda t, q, qd, setpoint: 5 * qd * np.abs(qd),
+    "slow": lambda t, q, qd, setpoint: 2 * qd,
+    "fast": lambda t, q, qd, setpoint: 1e6 * qd,
+    "wrong sign": lambda t, q, qd, setpoint: 20 * qd - 100 * (setpoint.q - q),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", DIVERGING)
+def test_a_smooth_controller_that_diverges_is_not_called_a_relay(name):
     free = ARM.with_limits(lower=[-np.inf] * 2, upper=[np.inf] * 2, torque=[np.inf] * 2)
-
-    def pushing(t, q, qd, setpoint):
-        return 5 * qd * np.abs(qd)
-
-    with pytest.raises(SimulationError, match=r"the motion diverges: .* moves at .* rad/s") as caught:
-        free.simulate(pushing, [0.5, 0.5], 1.0, q0=[0.0, 0.0], qd0=[0.1, 0.1], rate=None)
-    assert "relay" not in str(caught.value)
+    error, calls = continuous_failure(free, DIVERGING[name], 5.0, qd0=(0.1, 0.1))
+    assert re.search(
+        r"the motion diverges: \w+ moves at .* rad/s at .* expected a controller that is stable", str(error)
+    )
+    assert calls < 2 * MOST_CALLS

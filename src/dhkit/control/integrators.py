@@ -25,16 +25,16 @@ STEPS_BEFORE_DIVERGENCE = 2_000
 """Number of steps beyond the usual ones after which a run ends whose joints move faster than FASTEST_RATE."""
 FASTEST_RATE = 1_000.0
 """Joint rate, rad/s or m/s, that no arm reaches: where a run that takes too many steps is faster, it diverges."""
-MAX_EXCESS_STEPS = 100_000
+MAX_EXCESS_STEPS = 50_000
 """Largest number of steps beyond the usual ones, whatever the reason."""
 HALVINGS = 24
-"""Number of bisections in the search for a jump: a continuous change within a step becomes 2^-24 of itself, 6e-8."""
-JUMP_SHARE = 1e-3
-"""Share of the change of the torques within a step that is left after all bisections if they jump."""
+"""Number of bisections in the search for a jump: a smooth change becomes 2^-24 of itself, 6e-8."""
+JUMP_SHARE = 1e-6
+"""Share of the change of the torques on the line searched above which what is left after all bisections is a jump."""
 LOOK_AHEAD = 10.0
 """Length of the line on which a jump is looked for, in steps: a step that is accepted often ends just before the jump
 that the rejected, longer steps crossed."""
-ROUNDING = 1e-13
+ROUNDING = 1e-12
 """Change of torques relative to the largest torque below which it is rounding."""
 Torques = Callable[[float, Array, Array, Array], tuple[Array, Array]]
 """Function of time (s), joint values and rates (n,) and the controller's internal states (m,), that returns torques
