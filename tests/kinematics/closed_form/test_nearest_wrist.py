@@ -1,4 +1,7 @@
-"""Distances of poses out of reach, beside SciPy's least squares from the nearest of many sampled states."""
+"""Distances of poses out of reach, beside SciPy's least squares from the nearest of many sampled states.
+
+Module: nearest_wrist.
+"""
 
 import numpy as np
 import pytest
