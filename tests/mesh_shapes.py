@@ -89,3 +89,19 @@ def ply(vertices=4, faces=4, content=None):
         f"ply\nformat ascii 1.0\nelement vertex {vertices}\nproperty float x\nproperty float y\nproperty float z\n"
         f"element face {faces}\nproperty list uchar int vertex_indices\nend_header\n{content}"
     )
+
+
+ONE_LINK_WITH_A_MESH = """format = 1
+name = "one_link"
+convention = "standard"
+
+[[joint]]
+name = "turn"
+type = "revolute"
+a = 0.5
+alpha = 0
+d = 0
+theta = 0
+shape = { mesh = "link.stl" }
+"""
+"""A robot file; its mesh lies beside it."""

@@ -16,6 +16,7 @@ from dhkit.cli.options import load_arm
 from dhkit.cli.output import MotionFiles, finite, output_folder
 from dhkit.cli.units import joint_entry
 from dhkit.errors import DescriptionError
+from mesh_shapes import ONE_LINK_WITH_A_MESH
 
 
 def test_the_commands_are_those_of_the_modules():
@@ -74,29 +75,14 @@ def test_a_benchmark_is_written_as_markdown_and_json_whatever_the_suffix(tmp_pat
     assert written[0].read_text() == "# Times\n" and json.loads(written[1].read_text("utf-8")) == {"unit": "µs"}
 
 
-MESH_THAT_IS_TEXT = """format = 1
-name = "r"
-convention = "standard"
-
-[[joint]]
-name = "turn"
-type = "revolute"
-a = 0.3
-alpha = 0
-d = 0
-theta = 0
-shape = { mesh = "x.stl" }
-"""
-
-
 @pytest.mark.parametrize(
     "words", [["build", "r.toml", "-o", "r.urdf"], ["verify", "r.toml"], ["demo", "--robot", "r.toml"]]
 )
 def test_commands_print_the_warnings_of_a_robot_file(words, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "r.toml").write_text(MESH_THAT_IS_TEXT)
-    (tmp_path / "x.stl").write_text("no mesh")
+    (tmp_path / "r.toml").write_text(ONE_LINK_WITH_A_MESH)
+    (tmp_path / "link.stl").write_text("no mesh")
     with pytest.raises(SystemExit):
         main(words)
     written = capsys.readouterr().err
-    assert "dhkit: warning: link of turn: shape.mesh: 'x.stl' is no mesh that can be read" in written
+    assert "dhkit: warning: link of turn: shape.mesh: 'link.stl' is no mesh that can be read" in written

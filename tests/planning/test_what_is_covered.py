@@ -12,6 +12,7 @@ from dhkit.description import asset, pose
 from dhkit.errors import PlanningError
 from dhkit.model.shapes import link_parts
 from dhkit.planning import Obstacle
+from mesh_shapes import ONE_LINK_WITH_A_MESH
 
 START, GOAL = np.array([-0.8, -0.5, 0.5, 0, 0, 0.0]), np.array([0.8, -0.5, 0.5, 0, 0, 0])
 UR5 = asset("urdf/ur5.urdf").read_text()
@@ -86,29 +87,14 @@ def test_a_pose_that_is_not_met_is_refused_unless_its_coordinates_are_named(name
     assert arm.plan(start, arm.fk(q), intervals=12, compare=False).report.coordinates == ()
 
 
-BOX = """format = 1
-name = "box"
-convention = "standard"
-
-[[joint]]
-name = "turn"
-type = "revolute"
-a = 0.5
-alpha = 0
-d = 0
-theta = 0
-shape = { mesh = "box.stl" }
-"""
-
-
 def test_a_mesh_that_is_replaced_is_read_again(tmp_path):
     """In one process, and for an arm that was loaded before."""
-    (tmp_path / "box.toml").write_text(BOX)
-    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "box.stl")
+    (tmp_path / "box.toml").write_text(ONE_LINK_WITH_A_MESH)
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "link.stl")
     arm = dhkit.Arm.load(tmp_path / "box.toml")
     ball = Obstacle.sphere(0.1, (1.0, 0.0, 0.0))
     small = arm.distance([0.0], [ball]).distance
-    trimesh.creation.box((0.4, 0.1, 0.1)).export(tmp_path / "box.stl")
+    trimesh.creation.box((0.4, 0.1, 0.1)).export(tmp_path / "link.stl")
     large = arm.distance([0.0], [ball]).distance
     assert small - large > 0.1
     assert dhkit.Arm.load(tmp_path / "box.toml").distance([0.0], [ball]).distance == large

@@ -245,3 +245,16 @@ def test_another_robots_motion_is_refused_by_names():
 
 def _parts(motion):
     return motion.breaks, motion.coefficients
+
+
+@given(st.integers(0, 1000), st.integers(1, 6), st.integers(0, 9), st.integers(1, 5))
+def test_divided_pieces_are_the_same_function_between_their_bernstein_coefficients(seed, pieces, degree, parts):
+    whole = random_motion(ARM, pieces, degree, seed).pieces
+    divided = whole.divided(parts)
+    assert len(divided.coefficients) == parts * len(whole.coefficients)
+    t, values = divided.inside(20)
+    largest = max(1.0, float(np.abs(divided.bernstein).max()))
+    np.testing.assert_allclose(values[:, 1:-1], whole(t[:, 1:-1]), atol=ROUNDING * largest)
+    low = divided.bernstein.min(axis=1)[:, None]
+    high = divided.bernstein.max(axis=1)[:, None]
+    assert (values > low - ROUNDING * largest).all() and (values < high + ROUNDING * largest).all()

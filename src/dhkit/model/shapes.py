@@ -7,6 +7,7 @@ longer hub. A prismatic joint is a square bar of the stroke's length in a block.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -115,7 +116,7 @@ def mesh_versions(description: Description) -> MeshVersions:
     folder = description.mesh_folder
     if folder is None:
         return None, ()
-    return folder, tuple(_version(folder / path) for path in _mesh_paths(description))
+    return folder, tuple(_version(f"{folder}/{path}") for path in _mesh_paths(description))
 
 
 @lru_cache(maxsize=256)
@@ -126,9 +127,9 @@ def _mesh_paths(description: Description) -> tuple[str, ...]:
     return tuple(dict.fromkeys(mesh.path.replace("\\", "/") for mesh in meshes))
 
 
-def _version(file: Path) -> tuple[int, int, int] | None:
+def _version(file: str) -> tuple[int, int, int] | None:
     try:
-        status = file.stat()
+        status = os.stat(file)  # noqa: PTH116 - a Path takes longer than the call, which every distance makes
     except (OSError, ValueError):
         return None
     return status.st_size, status.st_mtime_ns, status.st_ino

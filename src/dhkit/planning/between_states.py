@@ -26,7 +26,7 @@ MAX_TURN = 0.5
 
 
 def smallest_between(
-    states: States, found: Array, gaps: Callable[[Array], Array], least: Array, *, of_shapes: bool = False
+    states: States, found: Array, gaps: Callable[[Array], Array], least: Array, beside_axes: float = 0.0
 ) -> Array:
     """Return the smallest distances that are found after each state, before the next, shape (N, G), m.
 
@@ -43,13 +43,13 @@ def smallest_between(
         Returns them for joint values (M, n), rad and m, as (M, G).
     least
         Distances that are asked for between the states, shape (G,), m.
-    of_shapes
-        Whether they are distances of the shapes in the capsules, whose points are as far from the axes as the surface.
+    beside_axes
+        Largest distance of the points that are measured from the capsules' axes, m; 0 where capsules are measured.
     """
     smallest = np.full(found.shape, np.inf)
     step = np.append(np.diff(states.times), 0.0)
     steps = np.flatnonzero(step > 0)
-    travels = _travels(states, steps, of_shapes)
+    travels = _travels(states, steps, beside_axes)
     # Parts of steps: their step, as an index of ``steps``, beginning and end, 0 to 1, and the distances there.
     which, low, high = np.arange(len(steps)), np.zeros(len(steps)), np.ones(len(steps))
     at_low, at_high = found[steps], found[steps + 1]
@@ -102,8 +102,8 @@ def _joint_values(states: States, step: NDArray[np.int_], s: Array) -> Array:
     return values
 
 
-def _travels(states: States, steps: NDArray[np.int_], of_shapes: bool) -> Array:
-    """Return bounds of the distance that a point of the capsules' axes, or of the capsules, travels, shape (K,), m."""
+def _travels(states: States, steps: NDArray[np.int_], beside_axes: float) -> Array:
+    """Return bounds of the distance that a point beside the capsules' axes travels in steps, shape (K,), m."""
     h = (states.times[steps + 1] - states.times[steps])[:, None]
     numbers = states.description.numbers
 
@@ -116,10 +116,9 @@ def _travels(states: States, steps: NDArray[np.int_], of_shapes: bool) -> Array:
     turn = way[:, ~numbers.prismatic].sum(axis=1)
     # Inside a step a lever is longer than at its ends by no more than a point travels; in large turns by any length
     # that the arm has.
-    outside = max((capsule.radius for capsule in link_capsules(states.description)), default=0.0) if of_shapes else 0.0
-    levers = larger(_levers(states)) + np.where(numbers.prismatic, 0.0, outside)
+    levers = larger(_levers(states)) + np.where(numbers.prismatic, 0.0, beside_axes)
     near = np.einsum("ki,ki->k", way, levers) / np.where(turn < MAX_TURN, 1 - turn, 1.0)
-    far = way @ np.where(numbers.prismatic, 1.0, _longest_lever(states) + outside)
+    far = way @ np.where(numbers.prismatic, 1.0, _longest_lever(states) + beside_axes)
     travels: Array = np.where(turn < MAX_TURN, np.minimum(near, far), far)
     return travels
 

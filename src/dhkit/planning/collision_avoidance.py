@@ -26,6 +26,7 @@ from dhkit.planning.obstacles import (
     check_obstacles,
     checked_pairs,
     distance,
+    link_capsules,
     link_name,
     link_pairs,
     not_checked,
@@ -226,7 +227,9 @@ class CollisionAvoidance:
         def gaps(q: Array) -> Array:
             return self._shape_gaps(states.description, q, MEASURED)
 
-        between = smallest_between(states, found, gaps, least, of_shapes=True)
+        # A shape lies in its link's capsules, so that its points are at most a radius away from their axes.
+        largest_radius = max(capsule.radius for capsule in link_capsules(states.description))
+        between = smallest_between(states, found, gaps, least, largest_radius)
         missing = np.where(between < least, kept - between, -np.inf)
         shortfalls: Array = np.maximum(kept - found, missing).max(axis=1)
         return shortfalls

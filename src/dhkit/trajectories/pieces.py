@@ -98,6 +98,26 @@ class Pieces:
         signs = (-1.0) ** np.arange(turned.shape[1])[:, None]
         return Pieces(self.end - self.breaks[::-1], turned * signs)
 
+    def divided(self, parts: int) -> Pieces:
+        """Return the same function with each piece divided into equal parts."""
+        width = np.repeat(np.diff(self.breaks) / parts, parts)
+        begin = np.tile(np.arange(parts), len(self.coefficients)) * width
+        breaks = np.append(np.repeat(self.breaks[:-1], parts) + begin, self.end)
+        return Pieces(breaks, shift(np.repeat(self.coefficients, parts, axis=0), begin))
+
+    @property
+    def bernstein(self) -> Array:
+        """Bernstein coefficients of each piece, shape (K, p+1, m).
+
+        On a piece of width w the function lies between the smallest and the largest of them (Farin 2002, ch. 5):
+
+            b_i = sum_j binomial(i, j) / binomial(p, j) w^j c_j.
+        """
+        p = self.coefficients.shape[1] - 1
+        powers = np.diff(self.breaks)[:, None] ** np.arange(p + 1)
+        matrix = np.array([[comb(i, j) / comb(p, j) for j in range(p + 1)] for i in range(p + 1)])
+        return np.asarray(np.einsum("ij,kj,kjm->kim", matrix, powers, self.coefficients))
+
     def inside(self, points: int) -> tuple[Array, Array]:
         """Return times (K, points) evenly spread over each piece, both its ends included, and values (K, points, m)."""
         width = np.diff(self.breaks)[:, None]

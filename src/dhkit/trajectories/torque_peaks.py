@@ -13,7 +13,7 @@ makes up for that. Cells in which the bound does not decide are sampled more fin
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import comb, factorial
+from math import factorial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from dhkit.description import Array, Description
 from dhkit.dynamics import inverse_dynamics
 from dhkit.dynamics.torque_bounds import torque_derivative_bounds
 from dhkit.symbolic import Friction
-from dhkit.trajectories.pieces import shift
+from dhkit.trajectories.pieces import Pieces
 from dhkit.trajectories.trajectory import Trajectory
 
 ORDER = 4
@@ -52,65 +52,11 @@ class TorquePeaks:
     seen: Array
     """Lower bounds, shape (n,): torques at samples."""
     is_proved: NDArray[np.bool_]
-    """Whether the bound is below the accepted share, or within ``TOLERANCE`` of the truth, shape (n,)."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Cells:
-    """C parts of the intervals of a motion."""
-
-    begin: Array
-    """Shape (C,), s."""
-    width: Array
-    """Shape (C,), s."""
-    coefficients: Array
-    """Polynomials in the time since the beginning, shape (C, p+1, n)."""
-
-    @classmethod
-    def of(cls, trajectory: Trajectory) -> _Cells:
-        """Return at least ``CELLS`` cells, as many in each interval."""
-        breaks = trajectory.breaks
-        intervals = len(breaks) - 1
-        each = -(-CELLS // intervals)
-        width = np.repeat(np.diff(breaks) / each, each)
-        part = np.tile(np.arange(each), intervals)
-        coefficients = shift(np.repeat(trajectory.coefficients, each, axis=0), part * width)
-        return cls(np.repeat(breaks[:-1], each) + part * width, width, coefficients)
-
-    def derivative_bounds(self, orders: int) -> Array:
-        """Return bounds of |q| and its derivatives below ``orders``, shape (orders, C, n)."""
-        bounds = []
-        c = self.coefficients
-        for _ in range(orders):
-            bounds.append(np.abs(_bernstein(c, self.width)).max(axis=1))
-            c = _derivative(c)
-        return np.stack(bounds)
-
-    def rate_bounds(self) -> tuple[Array, Array]:
-        """Return a lower and an upper bound of qd, shape (C, n)."""
-        bernstein = _bernstein(_derivative(self.coefficients), self.width)
-        return bernstein.min(axis=1), bernstein.max(axis=1)
-
-    def states(self, rows: NDArray[np.intp], count: int) -> tuple[Array, Array, Array]:
-        """Return q, qd and qdd at evenly spread states of R cells, shape (R, count, n)."""
-        u = self.width[rows, None, None] * np.linspace(0.0, 1.0, count)[:, None]
-        values = []
-        c = self.coefficients[rows]
-        for _ in range(3):
-            value = c[:, None, -1] + 0.0 * u
-            for power in range(c.shape[1] - 2, -1, -1):
-                value = value * u + c[:, None, power]
-            values.append(value)
-            c = _derivative(c)
-        return values[0], values[1], values[2]
+    """Whether the bound is below the limit, or within ``TOLERANCE`` of the truth, shape (n,)."""
 
 
 def torque_peaks(
-    description: Description,
-    trajectory: Trajectory,
-    limit: Array,
-    friction: Friction | None = None,
-    accepted: float = 1.0,
+    description: Description, trajectory: Trajectory, limit: Array, friction: Friction | None = None
 ) -> TorquePeaks:
     """Return proved bounds of the torques of a motion.
 
@@ -124,13 +70,13 @@ def torque_peaks(
         Limits of the torques, shape (n,), N m and N; infinite where there is none.
     friction
         Friction that the torques include, None for none.
-    accepted
-        Share of the limits below which a bound need not be tight.
     """
     numbers = description.numbers
-    cells = _Cells.of(trajectory)
-    count = len(cells.width)
-    motion = cells.derivative_bounds(ORDER + 3)
+    intervals = len(trajectory.breaks) - 1
+    cells = trajectory.pieces.divided(-(-CELLS // intervals))
+    width = np.diff(cells.breaks)
+    count = len(width)
+    motion = np.stack([np.abs(cells.differentiated(m).bernstein).max(axis=1) for m in range(ORDER + 3)])
     fourth = torque_derivative_bounds(description, motion)
     if friction is not None:
         fourth += np.abs(numbers.viscous) * motion[ORDER + 1]
@@ -143,7 +89,8 @@ def torque_peaks(
     proved = np.zeros_like(highest, dtype=bool)
 
     def measure(rows: NDArray[np.intp], samples: int) -> None:
-        q, qd, qdd = cells.states(rows, samples)
+        u = width[rows, None] * np.linspace(0.0, 1.0, samples)
+        q, qd, qdd = (cells.differentiated(m).on(rows[:, None], u) for m in range(3))
         tau = inverse_dynamics(description, q, qd, qdd)
         if friction is not None:
             tau = tau + numbers.viscous * qd
@@ -153,15 +100,15 @@ def torque_peaks(
         least = np.maximum(tau + least_dry[rows, None], -tau - most_dry[rows, None]) / limit
         seen[rows] = np.maximum(seen[rows], least.max(axis=1))
 
-        h = cells.width[rows, None] / (samples - 1)
+        h = width[rows, None] / (samples - 1)
         error = h**ORDER / factorial(ORDER) * fourth[rows]
         highest[rows] = np.maximum(above, below) + error
-        times[rows] = cells.begin[rows, None] + h * np.where(above >= below, at_above, at_below)
-        proved[rows] = (highest[rows] <= accepted) | ((error <= TOLERANCE) & is_dry_constant[rows])
+        times[rows] = cells.breaks[rows, None] + h * np.where(above >= below, at_above, at_below)
+        proved[rows] = (highest[rows] <= 1) | ((error <= TOLERANCE) & is_dry_constant[rows])
 
     measure(np.arange(count), FIRST_SAMPLES)
     # Samples N of a cell of width w with which the error is the tolerance: (w / (N - 1))^4 / 4! D = TOLERANCE.
-    steps = cells.width[:, None] * (fourth / (factorial(ORDER) * TOLERANCE)) ** (1 / ORDER)
+    steps = width[:, None] * (fourth / (factorial(ORDER) * TOLERANCE)) ** (1 / ORDER)
     steps = np.where(proved, 0.0, steps).max(axis=1)
     # Rounded up to powers of sqrt(2), so that cells are computed together.
     samples = np.exp2(np.ceil(2 * np.log2(np.clip(steps, 1, MOST_SAMPLES))) / 2).astype(int) + 2
@@ -178,15 +125,17 @@ def torque_peaks(
 
 
 def _dry_friction(
-    description: Description, cells: _Cells, friction: Friction | None
+    description: Description, cells: Pieces, friction: Friction | None
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Return the least and the largest dry friction in each cell, and whether it is constant there, shape (C, n)."""
-    shape = len(cells.width), description.n
+    shape = len(cells.coefficients), description.n
     if friction is None:
         return np.zeros(shape), np.zeros(shape), np.ones(shape, dtype=bool)
     forwards = np.broadcast_to(description.numbers.coulomb[:, 0], shape)
     backwards = np.broadcast_to(description.numbers.coulomb[:, 1], shape)
-    slowest, fastest = cells.rate_bounds()
+    rates = cells.derivative.bernstein
+    slowest = rates.min(axis=1)
+    fastest = rates.max(axis=1)
     rounding = RATE_ROUNDING * np.maximum(np.abs(slowest), np.abs(fastest)).max(axis=0)
     rests = (slowest >= -rounding) & (fastest <= rounding)
     # A joint that goes one way may rest at single instants, where it has no dry friction: these are ends of intervals,
@@ -248,23 +197,3 @@ def cubic_peaks(y: Array) -> tuple[Array, Array]:
         places = np.where(value > peaks, inside, places)
         peaks = np.maximum(peaks, value)
     return peaks, places + np.arange(1, pieces + 1)[:, None]
-
-
-def _derivative(c: Array) -> Array:
-    """Return the coefficients (C, p, n) of the derivatives of polynomials (C, p+1, n)."""
-    if c.shape[1] == 1:
-        return np.zeros_like(c)
-    return np.asarray(c[:, 1:] * np.arange(1, c.shape[1])[:, None])
-
-
-def _bernstein(c: Array, width: Array) -> Array:
-    """Return the Bernstein coefficients, shape (C, p+1, n), of polynomials on cells of widths w, shape (C,).
-
-    A polynomial lies between the smallest and the largest of them (Farin 2002, ch. 5):
-
-        b_i = sum_j binomial(i, j) / binomial(p, j) w^j c_j.
-    """
-    degree = c.shape[1] - 1
-    powers = width[:, None] ** np.arange(degree + 1)
-    matrix = np.array([[comb(i, j) / comb(degree, j) for j in range(degree + 1)] for i in range(degree + 1)])
-    return np.asarray(np.einsum("ij,cj,cjn->cin", matrix, powers, c))

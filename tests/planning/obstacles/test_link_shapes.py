@@ -71,7 +71,7 @@ def test_a_depth_that_coal_does_not_find_is_a_penetration():
     assert np.isfinite(found).all() and found.min() > -1.0
     one = coal.Cylinder(0.1, 0.2)
     place = coal.Transform3s()
-    same = signed_distance(one, place, coal.Cylinder(0.1, 0.2), place, distance_request(), coal.DistanceResult())
+    same = signed_distance(coal, one, place, coal.Cylinder(0.1, 0.2), place, distance_request(), coal.DistanceResult())
     assert -0.3 < same < 0
 
 

@@ -55,7 +55,8 @@ def shape_distances(description: Description, q: Array, links: tuple[int, int], 
     solids = _solids(description, mesh_versions(description))
     frames = world_to_frames(description, q)
     least = np.full(len(q), np.inf)
-    request, result = distance_request(), coal_module().DistanceResult()
+    coal = coal_module()
+    request, result = distance_request(), coal.DistanceResult()
     for first, second in product(*(solids.get(link, ()) for link in links)):
         T1 = frames[:, links[0]] @ first.T_link_solid
         T2 = frames[:, links[1]] @ second.T_link_solid
@@ -63,7 +64,11 @@ def shape_distances(description: Description, q: Array, links: tuple[int, int], 
         decided = bound >= np.minimum(least, enough)
         least[decided] = np.minimum(least, bound)[decided]
         for k in np.flatnonzero(~decided):
-            gap = signed_distance(first.shape, _place(T1[k]), second.shape, _place(T2[k]), request, result)
+            here, there = (
+                coal.Transform3s(np.ascontiguousarray(T[k, :3, :3]), np.ascontiguousarray(T[k, :3, 3]))
+                for T in (T1, T2)
+            )
+            gap = signed_distance(coal, first.shape, here, second.shape, there, request, result)
             least[k] = min(least[k], gap)
     return least
 
@@ -97,10 +102,6 @@ def _separation(first: _Solid, T1: Array, second: _Solid, T2: Array) -> Array:
     gaps: Array = np.abs(along) - first.extent(n @ R1) - second.extent(-n @ R2)
     largest: Array = gaps.max(axis=1)
     return largest
-
-
-def _place(T: Array) -> Any:
-    return coal_module().Transform3s(np.ascontiguousarray(T[:3, :3]), np.ascontiguousarray(T[:3, 3]))
 
 
 @lru_cache(maxsize=64)

@@ -17,7 +17,7 @@ POINT = 1e-9
 """Length of an axis (m) below which its capsule is a ball."""
 FAILED = -1e300
 """Largest number that coal returns where it finds a penetration and not its depth: some symmetric places."""
-SHIFTS = (np.zeros(3), np.array([3e-8, 1e-8, 2e-8]), np.array([-2e-8, 3e-8, -1e-8]))
+SHIFTS = (np.array([3e-8, 1e-8, 2e-8]), np.array([-2e-8, 3e-8, -1e-8]))
 """Moves of a solid, m, with which it is asked again then."""
 UNKNOWN_DEPTH = -1e-6
 """Distance, m, of solids that penetrate each other to a depth that is not found."""
@@ -59,7 +59,7 @@ def obstacle_distances(radius: float, axes: Array, obstacle: Obstacle) -> Array:
     place = coal.Transform3s(np.array(T[:3, :3]), np.array(T[:3, 3]))
     capsule, places = _capsule(coal, radius, axes)
     request, result = distance_request(), coal.DistanceResult()
-    return np.array([signed_distance(capsule, own, solid, place, request, result) for own in places])
+    return np.array([signed_distance(coal, capsule, own, solid, place, request, result) for own in places])
 
 
 def capsule_distances(radii: tuple[float, float], first: Array, second: Array) -> Array:
@@ -75,19 +75,25 @@ def capsule_distances(radii: tuple[float, float], first: Array, second: Array) -
     other, other_places = _capsule(coal, radii[1], second)
     request, result = distance_request(), coal.DistanceResult()
     pairs = zip(places, other_places, strict=True)
-    return np.array([signed_distance(one, own, other, place, request, result) for own, place in pairs])
+    return np.array([signed_distance(coal, one, own, other, place, request, result) for own, place in pairs])
 
 
-def signed_distance(first: Any, T1: Any, second: Any, T2: Any, request: Any, result: Any) -> float:
+def signed_distance(coal: CoalModule, first: Any, T1: Any, second: Any, T2: Any, request: Any, result: Any) -> float:
     """Return the signed distance of two of coal's shapes at poses T1 and T2, m; ``result`` is a scratch value."""
-    coal = coal_module()
+    found = _distance(coal, first, T1, second, T2, request, result)
+    if found > FAILED:
+        return found
     for shift in SHIFTS:
-        result.clear()  # coal keeps the smallest of a result's queries
         moved = coal.Transform3s(T2.getRotation(), T2.getTranslation() + shift)
-        found = float(coal.distance(first, T1, second, moved, request, result))
+        found = _distance(coal, first, T1, second, moved, request, result)
         if found > FAILED:
             return found
     return UNKNOWN_DEPTH
+
+
+def _distance(coal: CoalModule, first: Any, T1: Any, second: Any, T2: Any, request: Any, result: Any) -> float:
+    result.clear()  # coal keeps the smallest of a result's queries
+    return float(coal.distance(first, T1, second, T2, request, result))
 
 
 def _capsule(coal: CoalModule, radius: float, axes: Array) -> tuple[Any, list[Any]]:
