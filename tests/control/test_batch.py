@@ -165,7 +165,14 @@ def test_threads_and_sensors(compiled):
     assert np.array_equal(noisy.q, again.q) and not np.array_equal(noisy.q, one.q[:3])
 
 
-@pytest.mark.parametrize("kind", [ComputedTorque, PDGravity, FeedForward])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        PDGravity,
+        pytest.param(ComputedTorque, marks=pytest.mark.slow),
+        pytest.param(FeedForward, marks=pytest.mark.slow),
+    ],
+)
 def test_a_law_in_the_program_is_the_controller(kind, compiled, law):
     """Blocks with the law in the program, and one batch for which the controller is called; two arms, two steps."""
     arm = Arm.load("puma560")

@@ -26,6 +26,16 @@ CORPUS = {
 }
 
 
+SLOW = {
+    "puma560/kin_alpha4_sign.toml",
+    "planar2r/half_angles.toml",
+    "planar2r/tan_half_angle.toml",
+    "planar3r/com3_at_tip.toml",
+    "cobra600/kin_column_not_d.toml",
+}
+"""Sheets that take a second or more."""
+
+
 @cache
 def report_on(name):
     """Return the report on a sheet of the corpus; each is judged once."""
@@ -45,7 +55,9 @@ def test_the_corpus_is_large_enough():
     assert robots >= {"planar2r", "planar3r", "polar_rp", "cart_pendulum", "pan_tilt", "cobra600", "puma3"}
 
 
-@pytest.mark.parametrize("name", CORPUS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in CORPUS]
+)
 def test_no_wrong_answer_is_accepted_and_no_right_one_rejected(name):
     expected, _ = label(CORPUS[name])
     report = report_on(name)

@@ -41,7 +41,9 @@ def checked(arm, text, tmp_path, **options):
         return check(arm, program, **({"seed": 1, "samples": 40} | options))
 
 
-@pytest.mark.parametrize("name", EDITS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name == "slow" else name for name in EDITS]
+)
 def test_ten_solutions_are_scored_as_a_teacher_would(name, puma, tmp_path):
     report = checked(puma, solution(name), tmp_path)
     expected, said = EXPECTED[name]

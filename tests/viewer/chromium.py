@@ -23,13 +23,22 @@ from tornado.websocket import WebSocketClientConnection, websocket_connect
 from waiting import HANGS, wait_for
 
 BINARY = next(
-    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
+    (
+        path
+        for name in ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
+        if (path := shutil.which(name))
+    ),
+    None,
 )
+"""The headless shell first: it has no user interface, which takes a third of the time of opening a page."""
 FLAGS = [
     "--headless",
     "--no-sandbox",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
+    # WebGL alone is drawn by SwiftShader: text and boxes are drawn faster without it.
+    "--disable-gpu-compositing",
+    "--disable-gpu-rasterization",
     "--disable-quic",
     "--no-first-run",
     "--disable-background-networking",
@@ -59,7 +68,7 @@ def require_chromium() -> None:
         return
     if "chromium" in os.environ.get("DHKIT_REQUIRE", "").split(","):
         pytest.fail("Chromium is required by DHKIT_REQUIRE and not installed")
-    pytest.skip("Chromium is not installed (apt-get install chromium)")
+    pytest.skip("Chromium is not installed (apt-get install chromium-headless-shell)")
 
 
 class Chromium:
