@@ -4,7 +4,6 @@
 
 import json
 import os
-import time
 from pathlib import Path
 
 import pytest
@@ -105,7 +104,7 @@ def test_texts_are_texts_and_the_order_of_states_does_not_matter(visit, read, op
     assert page.evaluate(texts) == [HOSTILE, "b & c"]
     for place in ("#panel-task h2", ".goals li span:nth-child(2)"):
         assert page.evaluate(f"document.querySelector({json.dumps(place)}).textContent") == HOSTILE
-    time.sleep(0.3)
+    page.images_have_failed()
     assert page.evaluate("[document.querySelectorAll('img').length, globalThis.hacked ?? null]") == [0, None]
     told = (
         "(names => { const { task } = dhkit.lab.state, own = { file: 'mine.py', functions: [] };"

@@ -630,7 +630,7 @@ def test_names_with_html_are_text_everywhere(visit):
     for name in PANELS:
         panel(page, name)
         page.settle()
-    time.sleep(0.5)
+    page.images_have_failed()
     assert page.evaluate("document.querySelectorAll('img').length") == 0
     assert page.evaluate("globalThis.hacked ?? null") is None
     for place in (
