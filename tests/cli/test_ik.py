@@ -158,7 +158,29 @@ def test_iteration_finds_one_solution_for_any_arm(facts, ik):
     assert np.abs(arm.fk(joints(said)[0]) - np.array(said["T"])).max() < 1e-11
     status, out, _ = ik("panda", "--xyz", "5", "0", "0", "--numeric")
     assert status == 1
-    assert "no solution found by iteration: the best try misses the position by 4." in out
+    assert "out of reach: the best try misses the position by 4." in out
+    status, out, _ = ik("panda", "--xyz", "0.9", "0", "0.333", "--numeric")
+    assert status == 1
+    assert "no solution found by iteration: the best try misses the position by 0." in out
+
+
+def test_an_arm_near_a_family_is_solved_from_its_neighbour(facts, ik, tmp_path):
+    rows = [(0, 0.3, 0, "pi/2"), (0, 0, 0.4, 1e-6), (0, 0.1, 0.05, "-pi/2"), (0, 0.4, 0, "pi/2")]
+    arm = Arm.from_dh([*rows, (0, 0, 0, "-pi/2"), (0, 0.1, 0, 0)], name="tilted")
+    file = str(tmp_path / "tilted.toml")
+    arm.save(file)
+    status, said = facts(file, "--like", "0.3", "0.5", "-1.2", "0.4", "0.9", "-0.2")
+    assert (status, said["method"], len(said["branches"])) == (0, "iteration from an arm of the family", 8)
+    assert all(branch["flags"] == ["refined"] for branch in said["branches"])
+    assert np.abs(arm.fk(joints(said)) - np.array(said["T"])).max() < 1e-9
+    _, out, _ = ik(file, "--like", "0.3", "0.5", "-1.2", "0.4", "0.9", "-0.2")
+    assert "8 solutions found by iteration from an arm of the family" in out
+    for xyz, refusal in (
+        (("0", "0", "0.3"), "no solution found by iteration from an arm of the family, which does not prove"),
+        (("9", "0", "0"), "out of reach: farther from axis 1 than all links in one line"),
+    ):
+        status, out, _ = ik(file, "--xyz", *xyz)
+        assert status == 1 and refusal in out
 
 
 def test_iteration_steps_in_where_ssik_is_missing(facts, ik, monkeypatch):

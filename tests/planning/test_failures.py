@@ -15,7 +15,7 @@ import pytest
 
 import dhkit
 from acceptance import only_accepting
-from dhkit.description import library_robot, pose
+from dhkit.description import from_dh, library_robot, pose
 from dhkit.errors import DescriptionError, PlanningError, UnreachableError
 from dhkit.planning import Constraint, MotorPower, Obstacle, Payload, Planner, ToolDirection, ToolOrientation, ToolSpeed
 from dhkit.trajectories import Limits, Trajectory
@@ -74,6 +74,17 @@ def test_a_pose_out_of_reach(planner):
     )
     with pytest.raises(UnreachableError):
         planner.solve(START, T)
+
+
+def test_a_pose_for_which_nothing_was_found_is_not_called_out_of_reach():
+    rows = [(0, 0.3, 0, "pi/2"), (0, 0, 0.4, 1e-6), (0, 0.1, 0.05, "-pi/2"), (0, 0.4, 0, "pi/2")]
+    tilted = from_dh([*rows, (0, 0, 0, "-pi/2"), (0, 0.1, 0, 0)])
+    refused(
+        r"^goal: no joint values were found that bring the tool to this pose, at \(0, 0, 0.3\) m; that does not prove",
+        lambda: Planner(tilted, limits=Limits.of(tilted, lower=-3.0, upper=3.0, velocity=2.0)).solve(
+            START, pose((0, 0, 0.3))
+        ),
+    )
 
 
 def test_a_pose_that_is_reached_outside_the_limits_alone():

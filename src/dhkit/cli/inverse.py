@@ -19,6 +19,7 @@ from dhkit.cli.units import angle_key, joint_entry
 from dhkit.description import Array, pose_parts
 from dhkit.errors import ModelError
 from dhkit.kinematics import IKFlag, IKSolutions, IKStatus, classify
+from dhkit.kinematics.neighbour import has_neighbour
 from dhkit.kinematics.solutions import LIMIT_SLACK
 
 FLAG_DESCRIPTIONS = {
@@ -27,6 +28,8 @@ FLAG_DESCRIPTIONS = {
     IKFlag.wrist: "wrist singular",
     IKFlag.clamped: "on the boundary",
 }
+REPORTED_FLAGS = (*FLAG_DESCRIPTIONS, IKFlag.refined)
+"""Flags in JSON; the line below the table tells of refined branches, which all are if one is."""
 NEAREST_MARK = "→"
 
 app = typer.Typer(rich_markup_mode=None)
@@ -36,6 +39,7 @@ class Method(StrEnum):
     """The method that found solutions."""
 
     CLOSED_FORM = "closed form"
+    NEIGHBOUR = "iteration from an arm of the family"
     SSIK = "ssik"
     NUMERIC = "numeric"
 
@@ -96,12 +100,16 @@ class ReachedPose:
         if self.solutions.valid.any():
             return "reached, but by no branch inside the joint limits"
         distance = float(self.solutions.distance)
+        is_proved = self.solutions.status_code == IKStatus.out_of_reach
         if self.method is Method.NUMERIC:
+            verdict = "out of reach" if is_proved else "no solution found by iteration"
             missing = f"misses the position by {distance:.4g} m" if distance > 0 else "misses the orientation"
-            return f"no solution found by iteration: the best try {missing}"
-        if self.method is Method.SSIK:
-            return "out of reach: no solution found"
-        return f"out of reach by {distance:.4g} m"
+            return f"{verdict}: the best try {missing}"
+        if not is_proved:
+            return f"no solution found by {self.method}, which does not prove that there is none"
+        if self.method is Method.CLOSED_FORM:
+            return f"out of reach by {distance:.4g} m"
+        return "out of reach: farther from axis 1 than all links in one line"
 
 
 @app.command(cls=with_long_options({"--xyz": 3, "--euler": 3, "--matrix": None, "--like": None, "--near": None}))
@@ -155,14 +163,20 @@ def _solve(arm: Arm, T: Array, near: Array | None, *, limits: bool, numeric: boo
     note = ""
     if not numeric:
         try:
-            method = Method.CLOSED_FORM if classify(arm.description).fit else Method.SSIK
-            return arm.ik(T, seed=near), method, ""
+            return arm.ik(T, seed=near), _method_of(arm), ""
         except ModelError as error:
             note = f"one solution by iteration: {error}"
     solutions = arm.ik_numeric(T, near)
     if not limits and not solutions.valid.any():
         solutions = arm.ik_numeric(T, near, limits=False)
     return solutions, Method.NUMERIC, note
+
+
+def _method_of(arm: Arm) -> Method:
+    """Return the method by which :meth:`dhkit.Arm.ik` solves an arm."""
+    if classify(arm.description).fit is not None:
+        return Method.CLOSED_FORM
+    return Method.NEIGHBOUR if has_neighbour(arm.description) else Method.SSIK
 
 
 def _with_whole_turns(solutions: IKSolutions, near: Array | None) -> Array:
@@ -232,7 +246,7 @@ def _facts(reached: ReachedPose) -> dict[str, Any]:
             "name": solutions.branches[k],
             **joint_entry(reached.arm, "q", reached.q[k], degrees=reached.degrees),
             "within_limits": bool(solutions.allowed[k]),
-            "flags": [flag.name for flag in FLAG_DESCRIPTIONS if solutions.flags[k] & flag],
+            "flags": [flag.name for flag in REPORTED_FLAGS if solutions.flags[k] & flag],
         }
         for k in reached.shown
     ]

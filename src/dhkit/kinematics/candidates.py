@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array, Description
 from dhkit.description.poses import ORTHONORMAL
+from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.solutions import LIMIT_SLACK, IKFlag, IKSolutions, IKStatus
+
+SINGULARITIES = np.uint8(IKFlag.shoulder | IKFlag.elbow | IKFlag.wrist)
+"""Flags of a branch at a singularity."""
+BOUND_ROUNDING = 1e-12
+"""Relative margin of the arm's greatest length for rounding in the sum of its links."""
 
 
 def collect(
@@ -17,9 +23,11 @@ def collect(
     q: Array,
     distance: Array,
     *,
+    positions: Array,
     posed: NDArray[np.bool_],
     branches: tuple[str, ...],
     met: tuple[str, ...],
+    flags: NDArray[np.uint8] | None = None,
 ) -> IKSolutions:
     """Return joint positions as solutions.
 
@@ -31,18 +39,28 @@ def collect(
         Joint positions that reach the poses, shape (..., B, n), rad and m; NaN rows where none was found.
     distance
         Distance to report for poses without solution, m, shape (...).
+    positions
+        Required positions of the tool in the world, shape (..., 3), m.
     posed
         Whether each matrix is a pose, shape (...).
     branches, met
         See :class:`dhkit.kinematics.IKSolutions`.
+    flags
+        Flags of the branches but for limits, shape (..., B); none unless given.
     """
     valid = np.asarray(~np.isnan(q).any(axis=-1))
     found = valid.any(axis=-1)
-    status = np.where(posed, np.where(found, IKStatus.ok, IKStatus.out_of_reach), IKStatus.not_a_pose)
+    special = np.zeros(valid.shape, dtype=np.uint8)
+    if flags is not None:
+        special[valid] = flags[valid]
+    singular = np.any(special & SINGULARITIES != 0, axis=-1)
+    missed = np.where(is_beyond_all_links(description, positions), IKStatus.out_of_reach, IKStatus.not_found)
+    status = np.where(found, np.where(singular, IKStatus.singular, IKStatus.ok), missed)
+    status = np.where(posed, status, IKStatus.not_a_pose)
     return IKSolutions(
         q=q,
         valid=valid,
-        flags=np.where(valid & _outside(description, q), np.uint8(IKFlag.out_of_limits), np.uint8(0)),
+        flags=np.where(valid & _outside(description, q), special | np.uint8(IKFlag.out_of_limits), special),
         status_code=status.astype(np.uint8),
         distance=np.where(posed, np.where(found, 0.0, distance), np.nan),
         branches=branches,
@@ -80,6 +98,25 @@ def wrap_angles(q: Array, turning: NDArray[np.bool_]) -> Array:
     """Return joint values q (..., n), rad and m, with angles of the marked joints (n,) reduced to (-pi, pi]."""
     inside = (q > -np.pi) & (q <= np.pi)
     return np.where(turning & ~inside, q - math.tau * np.ceil((q - np.pi) / math.tau), q)
+
+
+def is_beyond_all_links(description: Description, positions: Array) -> NDArray[np.bool_]:
+    """Return whether positions (..., 3), m, are farther from axis 1 than all links in one line reach, shape (...).
+
+    A revolute joint does not move the points of its axis, so the distances of points on consecutive axes are constant.
+    A prismatic joint without regard to its limits has no bound.
+    """
+    axes = Axes.of(description)
+    if axes.prismatic.any():
+        return np.zeros(positions.shape[:-1], dtype=bool)
+    chain = np.vstack([axes.points, axes.T_world_tool[:3, 3]])
+    length = np.linalg.norm(np.diff(chain, axis=0), axis=1).sum()
+    with np.errstate(all="ignore"):
+        away = np.linalg.norm(positions - chain[0], axis=-1)
+        # The squares of positions above 1e154 m overflow: they are infinitely far away.
+        beyond: NDArray[np.bool_] = away > length + BOUND_ROUNDING * (length + np.abs(positions).sum(axis=-1))
+        overflows: NDArray[np.bool_] = np.isinf(away)
+    return np.asarray(beyond | overflows)
 
 
 def _outside(description: Description, q: Array) -> NDArray[np.bool_]:

@@ -11,21 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Description
 from dhkit.errors import ModelError, from_checkout
-from dhkit.kernels import pose_rows, uncounted
+from dhkit.kernels import pose_rows
 from dhkit.kinematics.axes import Axes
-from dhkit.kinematics.candidates import are_poses, collect, orthonormal, wrap_angles
+from dhkit.kinematics.candidates import are_poses, collect, orthonormal
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
-from dhkit.kinematics.newton import Newton
-from dhkit.kinematics.numeric import closes, descend
+from dhkit.kinematics.numeric import refined
 from dhkit.kinematics.solutions import IKSolutions
 
 log = logging.getLogger(__name__)
 
-CLOSES = 1e-10
-"""Largest error of a solution: position as a share of the reach, rotation in rad."""
-POLISHED = 1e-13
-"""Error at which Newton's method stops polishing a solution."""
 SAME_ANGLE = 1e-6
 """Angles that differ by less, rad, count as equal when solutions are sorted."""
 
@@ -51,8 +46,8 @@ def solve_externally(description: Description, T: ArrayLike) -> IKSolutions:
     IKSolutions
         Branches ``"solution 1"`` ... ``"solution B"``, B the largest number found for a pose of the batch and at least
         1. They are ordered by their joint values, the first joint's first: the same number at another pose need not
-        be the same way to reach. Singular branches are not flagged. ``distance`` is NaN where nothing was found:
-        how far it is is not known.
+        be the same way to reach. Singular branches are not flagged. Where nothing was found, the status is
+        ``not_found``, or ``out_of_reach`` where all links in one line are too short, and ``distance`` is NaN.
 
     Raises
     ------
@@ -69,13 +64,14 @@ def solve_externally(description: Description, T: ArrayLike) -> IKSolutions:
     counts = np.array([len(q) for q in found], dtype=int)
     owner = np.repeat(np.flatnonzero(posed), counts)
     q = np.concatenate([np.empty((0, n)), *found])
-    q, closed = _polished(description, q, np.repeat(goals.reshape(-1, 16), counts, axis=0))
+    q, closed = refined(description, q, np.repeat(goals.reshape(-1, 16), counts, axis=0))
     table = _ordered(q[closed], owner[closed], posed.size)
     B = table.shape[1]
     return collect(
         description,
         table.reshape(*poses.shape[:-2], B, n),
         np.full(posed.shape, np.nan),
+        positions=poses[..., :3, 3],
         posed=posed,
         branches=tuple(f"solution {k + 1}" for k in range(B)),
         met=ALL_COORDINATES,
@@ -118,15 +114,6 @@ def _solutions(solver: Any, goal: Array, n: int) -> Array:
         log.warning("ssik failed at a pose, which counts as not reached: %s", error)
         found = []
     return np.array([solution.q for solution in found], dtype=float).reshape(-1, n)
-
-
-def _polished(description: Description, q: Array, goals: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return joint positions (K, n) after some Newton steps, angles in (-pi, pi], and whether each closes."""
-    newton = Newton.of(description, position_only=False, limits=False)
-    # Not counted, so that many solutions of one pose do not start a compilation in a control loop.
-    with np.errstate(all="ignore"), uncounted():
-        q, error = descend(newton, goals, q, POLISHED)
-    return wrap_angles(q, ~description.numbers.prismatic), closes(error, CLOSES)
 
 
 def _ordered(q: Array, owner: NDArray[np.intp], poses: int) -> Array:

@@ -14,7 +14,7 @@ from dhkit.description.frames import configuration
 from dhkit.errors import ModelError
 from dhkit.kernels import EXACT_RANGE, Kernel, check_whole, kernel, pose_rows, result_array
 from dhkit.kinematics.closed_form import classify
-from dhkit.kinematics.closed_form.family import OUTPUT_TYPES, Fit, limit_parameters
+from dhkit.kinematics.closed_form.family import OUTPUT_TYPES, Family, Fit, limit_parameters
 from dhkit.kinematics.closed_form.nearest_wrist import nearest_wrist_distance
 from dhkit.kinematics.solutions import IKSolutions
 from dhkit.symbolic import Graph
@@ -29,8 +29,10 @@ def inverse_kinematics(
 ) -> IKSolutions:
     """Return all solutions of T_world_tool(q) = T in closed form.
 
-    Arms of six or seven revolute joints without a closed form of ours are handed to the package ssik, which finds all
-    solutions of six joints too: see :func:`dhkit.kinematics.external.solve_externally`.
+    An arm whose axes are nearly those of a family, to 1e-3, is solved by Newton's method from the solutions of the
+    exact member of the family: see :mod:`dhkit.kinematics.neighbour`. Other arms of six or seven revolute joints
+    without a closed form of ours are handed to the package ssik, which finds all solutions of six joints too: see
+    :func:`dhkit.kinematics.external.solve_externally`.
 
     Parameters
     ----------
@@ -43,14 +45,14 @@ def inverse_kinematics(
         or q6 of an arm with three parallel axes), and where the point that joint 1 turns is on its axis, joint 1 is:
         a free joint takes its angle from the seed, or 0. ssik does not use it.
     out
-        Array for the joint positions, shape (..., B, n), float64, contiguous. Not with ssik.
+        Array for the joint positions, shape (..., B, n), float64, contiguous. Only for closed forms.
     threads
-        Number of threads for a large batch. Not with ssik.
+        Number of threads for a large batch. Only for closed forms.
 
     Returns
     -------
     IKSolutions
-        B branches in a fixed order. The status tells poses that are out of reach, or that are no pose.
+        B branches in a fixed order. The status tells poses that are out of reach, or that are not a pose.
 
     Raises
     ------
@@ -64,7 +66,30 @@ def inverse_kinematics(
     poses = pose_rows(T)
     solver = solver_of(description)
     if solver is None:
-        return _solved_externally(description, poses, out)
+        return _solved_otherwise(description, poses, seed, out)
+    batch = poses.shape[:-2]
+    free = free_angles(description, solver.fit, seed, batch)
+    return solve_in_closed_form(description, solver, poses, free, out, threads)
+
+
+def solve_in_closed_form(
+    description: Description, solver: Solver, poses: Array, free: Array, out: Array | None = None, threads: int = 1
+) -> IKSolutions:
+    """Return the solutions of a closed form.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    solver
+        The closed form.
+    poses
+        Poses of the tool in the world, shape (..., 4, 4), m.
+    free
+        Angles of free joints, shape (..., 2), rad: see :func:`free_angles`.
+    out, threads
+        As for :func:`inverse_kinematics`.
+    """
     fit = solver.fit
     batch = poses.shape[:-2]
     B, n = len(fit.branches), description.n
@@ -76,7 +101,6 @@ def inverse_kinematics(
     status = np.empty(batch, dtype=np.uint8)
     count = poses.size // 16
     if count:
-        free = _free_angles(description, fit, seed, batch)
         rows = [
             q.reshape(count, B * n),
             distance.reshape(count, 1),
@@ -151,16 +175,20 @@ def inverse_kinematics_in_chunks(
     return map(solve, range(0, len(poses), size))
 
 
-def _solved_externally(description: Description, T: Array, out: Array | None) -> IKSolutions:
+def _solved_otherwise(description: Description, T: Array, seed: ArrayLike | None, out: Array | None) -> IKSolutions:
+    """Return the solutions of an arm without a closed form: from those of its neighbour, or else by ssik."""
     from dhkit.kinematics.external import solve_externally
+    from dhkit.kinematics.neighbour import has_neighbour, solve_from_neighbour
 
     if out is not None:
         words = classify(description).words
         raise ValueError(f"out is given, but {description.name} is {words}: how many branches there will be is open")
-    return solve_externally(description, T)
+    return (
+        solve_from_neighbour(description, T, seed) if has_neighbour(description) else solve_externally(description, T)
+    )
 
 
-def _free_angles(description: Description, fit: Fit, seed: ArrayLike | None, batch: tuple[int, ...]) -> Array:
+def free_angles(description: Description, fit: Fit, seed: ArrayLike | None, batch: tuple[int, ...]) -> Array:
     """Return the angles that joint 1 and the wrist's free joint take where they are free, shape (..., 2), rad."""
     if seed is None:
         return np.zeros((*batch, 2))
@@ -188,7 +216,12 @@ def solver_of(description: Description) -> Solver | None:
     found = classify(description)
     if found.family is None or found.fit is None:
         return None
-    family, fit, numbers = found.family, found.fit, description.numbers
+    return solver_for(description, found.family, found.fit)
+
+
+def solver_for(description: Description, family: Family, fit: Fit) -> Solver:
+    """Return the solver of a family's closed form with an arm's limits."""
+    numbers = description.numbers
     prismatic = tuple(bool(slides) for slides in numbers.prismatic)
     limits = limit_parameters(numbers.lower, numbers.upper, prismatic)
 

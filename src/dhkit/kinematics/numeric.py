@@ -36,6 +36,10 @@ MIN_DAMPING, DAMPING_DECREASE, DAMPING_INCREASE = 1e-4, 0.25, 4.0
 """Damping over the squared error: its smallest value, and its factors after a step that helps and one that does not."""
 BASE_DAMPING = 1e-13
 """Damping that is always added, for Jacobians without full rank."""
+REFINED = 1e-13
+"""Error at which Newton's method stops refining a solution of another solver: share of the reach, and rad."""
+REFINED_CLOSES = 1e-10
+"""Largest error of a refined solution: position as a share of the reach, rotation in rad."""
 
 
 @takes_robot
@@ -90,9 +94,9 @@ def solve_numerically(
     -------
     IKSolutions
         One branch, ``"numeric"``. Angles of joints without limits are in (-pi, pi], all are with ``limits=False``;
-        others are inside their limits. Singular branches are not flagged. Where no solution was found, ``distance`` is
-        the position error of the best search: 0 means that only the rotation is not reached. It does not prove that the
-        pose is out of reach.
+        others are inside their limits. Singular branches are not flagged. Where no solution was found, the status is
+        ``not_found``, or ``out_of_reach`` where all links in one line are too short, and ``distance`` is the position
+        error of the best search: 0 means that only the rotation is not reached.
 
     Raises
     ------
@@ -142,6 +146,7 @@ def solve_numerically(
         description,
         wrap_angles(q, ~description.numbers.prismatic & np.isinf(newton.upper)).reshape(*batch, 1, n),
         distance.reshape(batch),
+        positions=poses[..., :3, 3],
         posed=posed,
         branches=("numeric",),
         met=ALL_COORDINATES[: newton.size],
@@ -290,6 +295,30 @@ def descend(newton: Newton, goals: Array, q: Array, tolerance: float) -> tuple[A
         if len(searches.row):
             searches = searches.step(newton)
     return last_q, last_error
+
+
+def refined(description: Description, q: Array, goals: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return joint values after Newton's method, and whether they close.
+
+    Parameters
+    ----------
+    description
+        The robot; limits do not count.
+    q
+        Joint values near solutions, shape (K, n), rad and m.
+    goals
+        Their poses, with orthonormal rotations, shape (K, 16), m.
+
+    Returns
+    -------
+    tuple[Array, NDArray[np.bool_]]
+        Joint values (K, n), angles in (-pi, pi], and whether their pose is the goal to ``REFINED_CLOSES``, shape (K,).
+    """
+    newton = Newton.of(description, position_only=False, limits=False)
+    # Not counted, so that many solutions of one pose do not start a compilation in a control loop.
+    with np.errstate(all="ignore"), uncounted():
+        q, error = descend(newton, goals, q, REFINED)
+    return wrap_angles(q, ~description.numbers.prismatic), closes(error, REFINED_CLOSES)
 
 
 def closes(error: Array, tolerance: float) -> NDArray[np.bool_]:

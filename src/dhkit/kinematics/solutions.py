@@ -22,14 +22,17 @@ FIRST = 5
 
 
 class IKStatus(IntEnum):
-    """What became of a pose, from best to worst: the numbers of ``IKSolutions.status_code``."""
+    """What became of a pose: the numbers of ``IKSolutions.status_code``."""
 
     ok = 0
     singular = 1
     """Reached, but a branch is at a singularity: see its flags."""
     out_of_reach = 2
+    """Proved to have no solution, by a closed form or because the arm is too short."""
     not_a_pose = 3
     """The matrix has NaN, or its rotation is not orthonormal to 1e-6."""
+    not_found = 4
+    """No solution was found by iteration or by ssik, which does not prove that there is none."""
 
 
 class IKFlag(IntFlag):
@@ -45,6 +48,9 @@ class IKFlag(IntFlag):
     """The pose was beyond reach by no more than rounding, and counts as on the boundary."""
     out_of_limits = 16
     """Some joint is outside its limits, whatever whole turns are added."""
+    refined = 32
+    """Found by Newton's method from a solution of a neighbouring arm, as its own has no closed form: see
+    :mod:`dhkit.kinematics.neighbour`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +96,7 @@ class IKSolutions:
 
     @property
     def status(self) -> NDArray[np.str_]:
-        """Names of the status of the poses, without unit, shape (...): ok, singular, out_of_reach or not_a_pose."""
+        """Names of the status of the poses, shape (...): ok, singular, out_of_reach, not_a_pose or not_found."""
         return np.array([status.name for status in IKStatus])[self.status_code]
 
     @property
@@ -302,6 +308,8 @@ class IKSolutions:
         status = IKStatus(int(self.status_code[place]))
         if status is IKStatus.not_a_pose:
             return f"{where}{others} is no pose: NaN, or a rotation that is not orthonormal"
+        if status is IKStatus.not_found:
+            return f"{where}{others}: no solution was found, which does not prove that there is none"
         if status is IKStatus.out_of_reach:
             distance = float(self.distance[place])
             return f"{where}{others} is out of reach" + (f" by {distance:.4g} m" if distance > 0 else "")

@@ -11,6 +11,7 @@ from dhkit.arm import Arm
 from dhkit.description import Array, pose
 from dhkit.errors import DhkitError
 from dhkit.kinematics import IKFlag, IKSolutions, IKStatus, classify
+from dhkit.kinematics.neighbour import has_neighbour
 from dhkit.lab.desk import Desk
 from dhkit.lab.requests import Fields, JsonObject, Panel, answers
 
@@ -236,7 +237,7 @@ def solve_pose(arm: Arm, T: Array, near: Array) -> tuple[IKSolutions, bool]:
     near
         Joint values where the iteration begins, shape (n,), rad and m.
     """
-    if classify(arm.description).fit is not None:
+    if classify(arm.description).fit is not None or has_neighbour(arm.description):
         return arm.ik(T), False
     return arm.ik_numeric(T, near, restarts=MAX_RESTARTS, position_only=arm.n < 6), True
 
@@ -246,7 +247,7 @@ def _unreached_message(solutions: IKSolutions, *, outside_limits: bool) -> str:
         return "in reach only outside the joint limits"
     distance = float(solutions.distance)
     if not np.isfinite(distance):
-        return "not reached by iteration from here"
+        return "no solution was found"
     if distance == 0:
         return "the position is in reach, this orientation is not"
     return f"out of reach by {distance:.3g} m" if distance >= 1 else f"out of reach by {1000 * distance:.3g} mm"

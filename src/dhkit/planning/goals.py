@@ -14,7 +14,7 @@ from dhkit.description import Array, Description, check_pose, joint_array, world
 from dhkit.description.arrays import number_array
 from dhkit.description.joint_text import joint_text
 from dhkit.errors import DescriptionError, ModelError, PlanningError, UnreachableError
-from dhkit.kinematics import inverse_kinematics, solve_numerically
+from dhkit.kinematics import IKStatus, inverse_kinematics, solve_numerically
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
 from dhkit.trajectories import Limits
 
@@ -122,7 +122,7 @@ def find_routes(
     Raises
     ------
     UnreachableError
-        A pose that the arm cannot reach.
+        A pose that the arm cannot reach, or for which no solution was found.
     PlanningError
         A pose that it reaches only outside its limits, or of which it meets some coordinates alone.
     ValueError
@@ -157,15 +157,22 @@ def _configurations(
         every, labels = solutions.q, [str(label) for label in solutions.branches]
         met = solutions.met
         angles = solutions.within_limits(near)
+        is_proved = int(solutions.status_code) == IKStatus.out_of_reach
     except (DescriptionError, ModelError):
         every, labels = _iterative_solutions(description, T, near)
         angles, met = every, ALL_COORDINATES
+        is_proved = False
     if coordinates is not None and tuple(coordinates) not in (met, ALL_COORDINATES):
         raise ValueError(f"coordinates is {coordinates!r}; {description.name} meets {met}")
     if not np.isfinite(every).all(axis=-1).any():
-        raise UnreachableError(
-            f"{place.name}: no joint values bring the tool to this pose; {_position_text(T)} is out of reach"
-        )
+        if is_proved:
+            problem = f"no joint values bring the tool to this pose; {_position_text(T)} is out of reach"
+        else:
+            problem = (
+                f"no joint values were found that bring the tool to this pose, at {_position_text(T)}; "
+                "that does not prove that there are none"
+            )
+        raise UnreachableError(f"{place.name}: {problem}")
     if coordinates is None or tuple(coordinates) != met:
         _require_met(description, place, every, met)
     inside = np.atleast_1d(

@@ -116,6 +116,27 @@ def test_every_branch_closes_at_singularities_and_is_flagged(name, kind, law):
                 law.holds("share not flagged", (~flagged).mean(), UNFLAGGED if ur else 0.0, (name, kind))
 
 
+@pytest.mark.parametrize("name", FAMILY_B)
+@pytest.mark.parametrize(("elbow", "wrist"), [(1e-5, 1e-5), (1e-6, 1e-6), (1e-8, 1e-6), (1e-6, 1e-9), (1e-7, 1e-12)])
+def test_a_stretched_arm_whose_wrist_is_nearly_straight_is_reached(name, elbow, wrist):
+    """Rounding of a pose decides there how links 2 to 4 turn together, for the wrist with a flip and without."""
+    arm = library_robot(name)
+    rng = np.random.default_rng(0)
+    q = rng.uniform(-3, 3, (1000, 6))
+    q[:, 2] = elbow * rng.uniform(-3, 3, 1000)
+    q[:, 4] = wrist * rng.uniform(-3, 3, 1000)
+    T = forward_kinematics(arm, q)
+    solutions = inverse_kinematics(arm, T)
+    # Joints 1 and 5 are well determined, and tell shoulder and flip; joint 6 is nearly free.
+    apart = np.abs(np.remainder(solutions.q - q[:, None] + np.pi, 2 * np.pi) - np.pi)[..., [0, 4]].max(axis=-1)
+    original = solutions.valid & (apart < FOUND)
+    assert original.any(axis=1).all()
+    assert closure(arm, solutions, T) < OTHERS_CLOSE
+    special = IKFlag.elbow | IKFlag.wrist
+    assert np.all(solutions.flags[original] & IKFlag.wrist) or wrist > 1e-6
+    assert np.all((solutions.flags[original] & special) != 0) or elbow > 1e-6
+
+
 @pytest.mark.parametrize("name", SIX_JOINTS)
 def test_the_free_joint_of_a_straight_wrist_comes_from_the_seed_or_is_zero(name):
     arm = library_robot(name)

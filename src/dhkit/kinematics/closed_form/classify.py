@@ -23,8 +23,8 @@ FAMILIES = (
     Family("slider", planar.slider_fit, planar.slider_formulas),
 )
 """Families of closed forms, in the order in which they are tried."""
-NEAR_MISS = 1e-3
-"""Tolerance (rad, share of the reach) within which an arm that misses a family probably has a typing error."""
+NEAR_MISSES = (1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
+"""Tolerances (rad, share of the reach) within which an arm that misses a family probably has a typing error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +37,8 @@ class Classification:
     """The family of arms that share its closed form; None if none is known."""
     fit: Fit | None
     """The arm's parameters in the family's formulas; None if there is no family."""
+    neighbour: tuple[Family, Fit] | None = None
+    """Family and parameters of an arm whose axes miss the family by at most 1e-3, where the arm itself has none."""
 
     @property
     def closed_form(self) -> bool:
@@ -77,10 +79,10 @@ def classify(description: Description) -> Classification:
         met = "" if len(fit.coordinates) == 6 else f"; meets {', '.join(fit.coordinates)}"
         return Classification(f"{kinds}, {fit.geometry}: closed form, {branches}{met}", family, fit)
     words = f"{kinds}: no closed form known"
-    near = _first(Axes.of(description, NEAR_MISS))
+    near = next(filter(None, (_first(Axes.of(description, tolerance)) for tolerance in NEAR_MISSES)), None)
     if near is not None:
         words += f" (nearly one of {kinds} with {near[1].geometry}, but not to {TOLERANCE:g}: are its angles rounded?)"
-    return Classification(words, None, None)
+    return Classification(words, None, None, near)
 
 
 def _first(axes: Axes) -> tuple[Family, Fit] | None:

@@ -21,6 +21,7 @@ from dhkit.kinematics.closed_form.arm_plane import (
 )
 from dhkit.kinematics.closed_form.family import Fit, FramedPose, Parameter, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
+    MIN_DIRECTION,
     SINGULAR,
     SX,
     Branch,
@@ -100,7 +101,8 @@ def _wrists(
     c6, s6 = pose.free
     swing = hypot(wrist.a[0], wrist.a[1])
     free = unit_pair(c6 * wrist.n[1] - s6 * wrist.m[1], s6 * wrist.m[0] - c6 * wrist.n[0])
-    rho = _within_reach(p, position, unit_pair(wrist.a[0], wrist.a[1], ill_determined(pose), free), swing, pose.noise)
+    rho = unit_pair(wrist.a[0], wrist.a[1], ill_determined(pose), free)
+    rho = _within_reach(p, position, rho, swing, pose)
     unflipped, flipped = joints_5_and_6(p, wrist, rho)
     singular = swing < SINGULAR
     return (
@@ -109,27 +111,45 @@ def _wrists(
     )
 
 
-def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX, noise: SX) -> Pair:
+def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX, pose: PoseSymbols) -> Pair:
     """Return rho, or the nearest one for which axis 4 is within reach of the two links.
 
-    Near the wrist's singularity rho is ill determined: changing it rotates the tool only ``swing`` times as much.
+    Near the wrist's singularity rho is ill determined: changing it rotates the tool only ``swing`` times as much. The
+    wrist with a flip has rho + pi. Rho is changed for the wrist that is out of reach; if both are, for the one that
+    misses by less. Where rho is free, it is not changed for the flip alone.
     """
     lever = p["lever"]
     x, u = position[0] - p["a1"], position[1]
-    far, arm = hypot(x, u), hypot(lever[0], lever[1])
-    reached = add_angles(rho, lever)
-    distance = hypot(x - reached[0], u - reached[1])
     reach, gap = p["L2"] + p["L3"], fabs(p["L2"] - p["L3"])
-    wanted = if_else(distance > reach, reach, fmax(distance, gap))
+    reached = add_angles(rho, lever)
+
+    def end(sense: float) -> tuple[SX, SX]:
+        """Return axis 4's distance from axis 2 for rho (sense 1) or rho + pi (-1), and the nearest within reach."""
+        distance = hypot(x - sense * reached[0], u - sense * reached[1])
+        return distance, if_else(distance > reach, reach, fmax(distance, gap))
+
+    unflipped, flipped = end(1.0), end(-1.0)
+    excess = fabs(unflipped[0] - unflipped[1])
+    excess_of_flip = fabs(flipped[0] - flipped[1])
+    is_determined = swing > MIN_DIRECTION * ill_determined(pose)
+    alone = logic_and(excess <= 0, is_determined)
+    of_flip = logic_and(excess_of_flip > 0, logic_or(alone, excess_of_flip < excess))
+    sense = if_else(of_flip, -1.0, 1.0)
+    wanted = if_else(of_flip, flipped[1], unflipped[1])
+
     # The triangle of axis 2, axis 4 and the meeting point: its angle at the latter by the law of cosines.
+    far, arm = hypot(x, u), hypot(lever[0], lever[1])
     area = 2.0 * far * arm
     cosine = (far * far + arm * arm - wanted * wanted) / if_else(area > 0, area, 1.0)
     to_end, to_lever = unit_pair(x, u), unit_pair(lever[0], lever[1])
-    side = sign(add_angles(add_angles(rho, to_lever), to_end, -1.0)[1])
+    side = sign(sense * add_angles(add_angles(rho, to_lever), to_end, -1.0)[1])
     corner = unit_pair(cosine, side * sqrt(positive_part(1.0 - cosine * cosine)))
     turned = add_angles(add_angles(to_end, corner), to_lever, -1.0)
+    turned = (sense * turned[0], sense * turned[1])
     cost = swing * hypot(turned[0] - rho[0], turned[1] - rho[1])
-    return select_pair(logic_and(wanted != distance, cost < ROTATION_SLACK + ERROR_OVER_DEFECT * noise), turned, rho)
+    is_beyond = logic_or(of_flip, excess > 0)
+    is_harmless = cost < ROTATION_SLACK + ERROR_OVER_DEFECT * pose.noise
+    return select_pair(logic_and(is_beyond, is_harmless), turned, rho)
 
 
 def _elbows(
