@@ -1,5 +1,9 @@
-"""Ctrl-C at any time: one line and status 130 from the command, KeyboardInterrupt from Python, never a motion."""
+"""Ctrl-C at any time: one line and status 130 from the command, KeyboardInterrupt from Python, never a motion.
 
+Module: endings.
+"""
+
+import os
 import signal
 import subprocess
 import sys
@@ -10,6 +14,7 @@ import pytest
 from acceptance import ACCEPTING
 from dhkit.cli import _reliable_interrupts
 from dhkit.planning.solver import delayed_interrupts
+from waiting import HANGS, wait_for
 
 PLANNING = """
 import os, signal, sys, threading
@@ -60,6 +65,32 @@ def test_a_command_ends_in_one_line(command, seconds):
     assert (done.stdout, done.stderr) == ("", "dhkit: interrupted\n")
     # Python itself may end by the signal where an extension was being imported; a shell shows 130 for both.
     assert done.returncode in (130, -signal.SIGINT)
+
+
+WAITS = """
+def fk(q):
+    open("called", "w").close()
+    while True:
+        pass
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="Windows runs no programs")
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGKILL"])
+@pytest.mark.slow
+def test_a_check_that_is_ended_leaves_nothing(name, tmp_path):
+    (tmp_path / "student.py").write_text(WAITS)
+    command = [sys.executable, "-m", "dhkit", "check", "planar2r", str(tmp_path / "student.py"), "--seconds", "3600"]
+    process = subprocess.Popen(
+        command, env=os.environ | {"TMPDIR": str(tmp_path)}, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    wait_for(lambda: list(tmp_path.glob("dhkit-program-*/called")), "the call of the program")
+    process.send_signal(getattr(signal, name))
+    _, err = process.communicate(timeout=HANGS)
+    if name != "SIGKILL":
+        assert (process.returncode, err) == (130, "dhkit: interrupted\n")
+        assert not list(tmp_path.glob("dhkit-program-*"))
+    wait_for(lambda: not list(tmp_path.glob("dhkit-program-*")), "the end of the folder")
 
 
 @pytest.mark.parametrize("seconds", [0.0, 0.01, 0.05, 0.3, 0.6, 0.9] if ACCEPTING else [0.0, 0.05, 0.3])

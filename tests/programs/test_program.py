@@ -1,6 +1,6 @@
 """Programs that do harm, lie or dawdle: the parent says what happened and on which line; nothing is left behind.
 
-Modules: process, program, python_runner, supervisor.
+Modules: confinement, files_written, orphans, process, program, python_runner, supervisor.
 """
 
 # ruff: noqa: E501 - programs in one line
@@ -8,6 +8,7 @@ Modules: process, program, python_runner, supervisor.
 import os
 import shutil
 import socket
+import subprocess
 import sys
 import tempfile
 import threading
@@ -19,8 +20,12 @@ import psutil
 import pytest
 
 from acceptance import ACCEPTING
-from dhkit.programs import program as program_module
+from dhkit import Arm
+from dhkit.programs import check, program as program_module
 from dhkit.programs.caller import Caller
+from dhkit.programs.confinement import landlock_version
+from dhkit.programs.files_written import WrittenFiles
+from dhkit.programs.orphans import end_orphans, orphans
 from dhkit.programs.process import Failure, Limits, ProgramError
 from dhkit.programs.program import Program
 from waiting import HANGS, wait_for
@@ -57,6 +62,27 @@ HARMFUL = {
     "has no function": ("x = 1\n", "unreadable", "defines none of fk, ik, controller"),
     "has a NUL": ("def fk(q):\n    return 1\n\0", "unreadable", "null bytes"),
 }  # fmt: skip
+
+ESCAPES = """
+import os, signal, time
+supervisor = os.getppid()
+def fk(q):
+    if os.fork() == 0:
+        os.setsid()
+        if os.fork() == 0:
+            os.setsid()
+            null = os.open(os.devnull, os.O_RDWR)
+            for descriptor in range(5):
+                os.dup2(null, descriptor)
+            time.sleep(1000)
+        try:
+            os.kill(supervisor, signal.SIGKILL)
+        finally:
+            os._exit(0)
+    os.wait()
+    return 1.0
+"""
+"""A process forks twice and kills its supervisor at once: nobody may have seen its child before."""
 
 LEFT_BEHIND = {
     "children": "import os, time\ndef fk(q):\n    for k in range(5):\n        if os.fork() == 0:\n            time.sleep(1000)\n    return 1.0\n",
@@ -137,6 +163,30 @@ def test_what_it_starts_ends_with_it(name, program):
     assert one.call("fk", q=[1.0]) == 1.0
 
 
+@pytest.mark.parametrize("landlock", [landlock_version(), 0], ids=["Landlock", "no Landlock"])
+def test_who_forks_twice_and_kills_the_supervisor_is_found(landlock, program, tmp_path, monkeypatch):
+    monkeypatch.setattr(program_module, "landlock_version", lambda: landlock)
+    one = program(ESCAPES)
+    with suppress(ProgramError):  # where the supervisor can be killed, the program ends with it
+        assert one.call("fk", q=[1.0]) == 1.0
+    one.close()
+    assert not left(tmp_path)
+    assert not orphans()
+
+
+def test_a_child_of_this_process_is_no_orphan_of_a_program(program):
+    child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    one = program(GOOD)
+    one.start()
+    try:
+        end_orphans()
+        assert child.poll() is None
+        assert one.call("fk", q=[2.0])[0][0] == 2.0
+    finally:
+        child.communicate(b"\n")
+    assert child.returncode == 0
+
+
 def test_a_program_goes_on_after_an_exception_and_is_started_anew_after_its_end(program):
     text = "count = 0\ndef fk(q):\n    global count\n    count += 1\n    if q[0] < 0:\n        raise ValueError(q[0])\n    if q[0] > 9:\n        import os; os._exit(1)\n    return count\n"
     one = program(text)
@@ -196,12 +246,109 @@ def test_nothing_of_ours_is_handed_over(program, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "text", ["import dhkit\ndef fk(q):\n    return 1\n", "def fk(q):\n    import dhkit.arm\n    return 1\n"]
+    "text",
+    [
+        "import dhkit\ndef fk(q):\n    return 1\n",
+        "def fk(q):\n    import dhkit.arm\n    return 1\n",
+        "import importlib\ndef fk(q):\n    importlib.import_module('dhkit')\n    return 1\n",
+        "import sys\nimport dhkit\nfor name in [name for name in sys.modules if name.startswith('dhkit')]:\n"
+        "    del sys.modules[name]\ndef fk(q):\n    return 1\n",
+        "import json\nplain = json.dumps\njson.dumps = lambda value: plain({**value, 'imported': []})\n"
+        "def fk(q):\n    import dhkit\n    return 1\n",
+    ],
+    ids=["when loaded", "when called", "by importlib", "removes its modules", "replaces json.dumps"],
 )
 def test_who_imports_dhkit_is_reported(text, program):
     one = program(text, limits=Limits(20.0))
     one.call("fk", q=[1.0])
     assert one.imported == ("dhkit",)
+
+
+def test_who_does_not_import_dhkit_cannot_read_it_in_any_process(program):
+    if landlock_version() == 0:
+        pytest.skip("no Landlock: Linux 5.13")
+    folder = str(Path(program_module.__file__).parents[1])
+    read = f"print(len(open({folder + '/arm.py'!r}).read()))"
+    text = f"import subprocess, sys\ndef fk(q):\n    return subprocess.call([sys.executable, '-c', {read!r}])\n"
+    one = program(text, limits=Limits(20.0))
+    assert one.call("fk", q=[1.0]) == 1.0
+    assert "PermissionError" in one.output and one.imported == ()
+
+
+def test_a_program_of_another_kind_asks_for_dhkit(program, tmp_path):
+    (tmp_path / "foreign.py").write_text(
+        f'import os\nos.write(4, b\'{{"imported": ["dhkit"]}}\\n\')\nimport dhkit\n{FOREIGN}'
+    )
+    with Program([sys.executable, str(tmp_path / "foreign.py")], Limits(20.0)) as one:
+        assert one.call("fk", q=[1.0, 2.5]) == 3.5
+        assert one.imported == ("dhkit",)
+
+
+def test_a_system_that_hides_nothing_is_named_in_the_report(program, monkeypatch):
+    monkeypatch.setattr(program_module, "landlock_version", lambda: 0)
+    one = program(GOOD)
+    report = check(Arm.load("planar2r"), one, samples=1)
+    assert any("no Landlock" in note for note in report.notes)
+
+
+FILLS_ITS_FOLDER = """
+import numpy as np
+def fk(q):
+    k = 0
+    while True:
+        with open(f"file-{k}", "wb") as file:
+            file.write(b"x" * 2**20)
+        k += 1
+"""
+FILLS_FILES_WITHOUT_A_NAME = """
+import os
+files = []
+def fk(q):
+    while True:
+        file = {new}
+        for k in range(40):
+            os.write(file, b"x" * 2**20)
+        files.append(file)
+"""
+IN_MEMORY = FILLS_FILES_WITHOUT_A_NAME.format(new='os.memfd_create("file")')
+DELETED = FILLS_FILES_WITHOUT_A_NAME.format(new='os.open("file", os.O_RDWR | os.O_CREAT); os.unlink("file")')
+
+
+FILLS_ANOTHER_FOLDER = """
+import itertools, time
+def fk(q):
+    for k in itertools.count():
+        with open(f"../elsewhere-{k}", "wb", 0) as file:
+            for _ in range(60):
+                file.write(b"x" * 2**20)
+                time.sleep(0.01)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="files without a name are found in /proc")
+@pytest.mark.parametrize(
+    "text",
+    [FILLS_ITS_FOLDER, IN_MEMORY, DELETED, pytest.param(FILLS_ANOTHER_FOLDER, marks=pytest.mark.slow)],
+    ids=["folder", "memory", "deleted", "elsewhere"],
+)
+def test_files_are_bounded_together(text, program):
+    with pytest.raises(ProgramError, match="wrote more than 128 MB to files") as caught:
+        program(text, limits=Limits(60.0)).call("fk", q=[1.0])
+    assert caught.value.failure == Failure.FILES
+
+
+def test_a_file_that_was_there_counts_by_what_it_grows(tmp_path):
+    (tmp_path / "folder").mkdir()
+    own, old = tmp_path / "folder/own", tmp_path / "old"
+    own.write_bytes(b"x" * 2**20)
+    old.write_bytes(b"x" * 2**20)
+    files = WrittenFiles(tmp_path / "folder")
+    with old.open("ab") as file:
+        before = files.size([os.getpid()], 2**30)
+        file.write(b"x" * 2**20)
+    # Blocks of a file system are some kilobytes; other files that the tests have open may grow.
+    assert before == pytest.approx(2**20, abs=2**16)
+    assert files.size([], 2**30) - before == pytest.approx(2**20, abs=2**18)
 
 
 def test_files_that_are_none(tmp_path):

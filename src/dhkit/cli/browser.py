@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import signal
-import threading
 import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from dhkit.cli.endings import end_in_order_on_signals
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.options import Robot, load_arm
 from dhkit.cli.output import PAGES, check_outputs, say
@@ -23,9 +22,8 @@ app = typer.Typer(rich_markup_mode=None)
 
 
 def until_interrupted(url: str, what: str, *, open_browser: bool) -> ExitStatus:
-    """Print the address of a page, open it, and wait for Ctrl-C or SIGTERM."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, _raise_interrupt)  # processes are ended, and folders removed
+    """Print the address of a page, open it, and wait for Ctrl-C, SIGTERM or SIGHUP."""
+    end_in_order_on_signals()
     try:
         say(f"{what} at {url}; Ctrl-C ends it")
         if open_browser:
@@ -34,10 +32,6 @@ def until_interrupted(url: str, what: str, *, open_browser: bool) -> ExitStatus:
             time.sleep(3600)
     except KeyboardInterrupt:
         return ExitStatus.FINE
-
-
-def _raise_interrupt(*_: object) -> None:
-    raise KeyboardInterrupt
 
 
 @app.command()

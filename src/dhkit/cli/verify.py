@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from dhkit.arm import Arm
+from dhkit.cli.endings import end_in_order_on_signals
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.extract import chain_of
 from dhkit.cli.options import Json, Robot, Seed, Uniform, load_arm
@@ -96,6 +97,7 @@ def check(
         raise DescriptionError(f"{len(program)} files; expected one, or --run with a program and its arguments")
     arm, source = Arm.load(robot), program if run else Path(program[0])
     protect_from_children()
+    end_in_order_on_signals()
     points = None if rubric is None else CheckRubric.read(rubric)
     with Program(source, Limits(seconds=seconds), sandbox) as loaded:
         try:

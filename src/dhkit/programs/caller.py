@@ -19,7 +19,7 @@ MAX_FATAL_FAILURES = 3
 """Failures in a row that end a program, after which it is not called again."""
 MAX_TIME = 600.0
 """Largest processor time of all calls of a function together, s; on the clock it may be four times as long."""
-FATAL = {Failure.LATE, Failure.MEMORY, Failure.PROCESSES, Failure.ENDED, Failure.GARBAGE}
+FATAL = {Failure.LATE, Failure.MEMORY, Failure.PROCESSES, Failure.FILES, Failure.ENDED, Failure.GARBAGE}
 
 
 class Caller:

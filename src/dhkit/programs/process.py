@@ -23,6 +23,9 @@ import psutil
 
 from dhkit.errors import DhkitError
 from dhkit.grading.isolation import WAITING_FACTOR
+from dhkit.programs.confinement import Confinement
+from dhkit.programs.files_written import WrittenFiles
+from dhkit.programs.orphans import begin_adoption, end_adoption, end_orphans
 
 HERE = Path(__file__).parent
 MAX_LINE_BYTES = 1 << 22
@@ -32,6 +35,8 @@ MAX_UNREAD_ANSWERS = 1_000
 MAX_OUTPUT_BYTES = 1 << 16
 """Bytes that are kept of a program's printed output: the last ones."""
 MAX_PROCESSES = 64
+MAX_WRITTEN_BYTES = 128 << 20
+"""Largest size of all files together that a program may write, bytes."""
 EXIT_DELAY = 0.3
 """Longest time from the end of a program's answers to its own end, s."""
 WATCH_PERIOD = 0.05
@@ -51,6 +56,8 @@ class Failure(StrEnum):
     """The processes needed too much memory."""
     PROCESSES = "processes"
     """The program started too many processes."""
+    FILES = "files"
+    """The program wrote too much to files."""
     ENDED = "ended"
     """The process ended."""
     GARBAGE = "garbage"
@@ -138,19 +145,26 @@ class Process:
         Limits of the program.
     sandbox
         ``"bwrap"``, or None.
+    confinement
+        Rights that the program does not have.
     """
 
-    def __init__(self, command: Callable[[Path], list[str]], limits: Limits, sandbox: str | None) -> None:
+    def __init__(
+        self, command: Callable[[Path], list[str]], limits: Limits, sandbox: str | None, confinement: Confinement
+    ) -> None:
         self.failure: Failure | None = None
         self._limits = limits
         self._folder = tempfile.TemporaryDirectory(prefix="dhkit-program-", ignore_cleanup_errors=True)
+        begin_adoption()
         try:
-            self._start(command, sandbox)
+            self._start(command, sandbox, confinement)
         except BaseException:
+            end_adoption()
             self._folder.cleanup()
             raise
         self.processor_time = 0.0
         """Processor time of all processes of the program, when the watch last looked, s."""
+        self._files = WrittenFiles(Path(self._folder.name))
         self._descendants: dict[int, psutil.Process] = {}
         self._processor_times: dict[int, float] = {}
         self._lines: queue.Queue[bytes | None] = queue.Queue(MAX_UNREAD_ANSWERS)
@@ -233,17 +247,17 @@ class Process:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        # Processes that were seen and are still there: the program has killed their supervisor.
         self._kill_descendants()
+        end_adoption()
         os.close(self._requests)
         for thread in self._threads:
             if thread is not threading.current_thread():
                 thread.join(MAX_END_TIME)
         self._folder.cleanup()
 
-    def _start(self, command: Callable[[Path], list[str]], sandbox: str | None) -> None:
+    def _start(self, command: Callable[[Path], list[str]], sandbox: str | None, confinement: Confinement) -> None:
         folder = Path(self._folder.name).resolve()
-        program = _sandboxed(command(folder), folder, sandbox)
+        program = _sandboxed(confinement.command(command(folder)), folder, sandbox)
         requests, self._requests = os.pipe()
         os.set_blocking(self._requests, False)
         self._answers, answers = os.pipe()
@@ -251,7 +265,7 @@ class Process:
             self._process = subprocess.Popen(  # noqa: S603 - this module is made to run programs of others
                 [
                     *(sys.executable, "-I", "-S", str(HERE / "supervisor.py")),
-                    *map(str, (requests, answers, 4 * self._limits.memory)),
+                    *map(str, (requests, answers, 4 * self._limits.memory, folder)),
                     *program,
                 ],
                 stdin=subprocess.DEVNULL,
@@ -273,6 +287,7 @@ class Process:
             Failure.LATE: call.late,
             Failure.MEMORY: f"needed more than {self._limits.memory / (1 << 30):.3g} GB of memory",
             Failure.PROCESSES: f"started more than {MAX_PROCESSES} processes",
+            Failure.FILES: f"wrote more than {MAX_WRITTEN_BYTES >> 20} MB to files",
             Failure.ENDED: f"the program ended{self._exit_status_text()}",
             Failure.GARBAGE: "wrote what is no answer",
         }
@@ -317,7 +332,7 @@ class Process:
                 del self._output[:-MAX_OUTPUT_BYTES]
 
     def _watch(self) -> None:
-        """Watch processor time, memory and number of the processes, and end the process beyond its limits."""
+        """Watch processor time, memory, number and files of the processes, and end the process beyond its limits."""
         while not self._closed.wait(WATCH_PERIOD):
             self._find_descendants()
             memory = 0
@@ -329,13 +344,15 @@ class Process:
                 except psutil.Error:
                     self._descendants.pop(process.pid, None)
             self.processor_time = sum(self._processor_times.values())
-            if (self._process.poll() or 0) < 0:  # the program has killed its supervisor
+            if (self._process.poll() or 0) < 0:  # the supervisor was killed
                 self.failure = self.failure or Failure.ENDED
                 self._kill_descendants()
             elif memory > self._limits.memory:
                 self._terminate(Failure.MEMORY)
             elif len(self._descendants) > MAX_PROCESSES:
                 self._terminate(Failure.PROCESSES)
+            elif self._files.size(list(self._descendants), MAX_WRITTEN_BYTES) > MAX_WRITTEN_BYTES:
+                self._terminate(Failure.FILES)
 
     def _find_descendants(self) -> None:
         """Note the processes that the program has started."""
@@ -344,9 +361,12 @@ class Process:
                 self._descendants.setdefault(process.pid, process)
 
     def _kill_descendants(self) -> None:
+        """Kill the processes that were seen, and all others if the supervisor was killed and has not ended them."""
         for process in list(self._descendants.values()):
             with suppress(psutil.Error):
                 process.kill()
+        if (self._process.poll() or 0) < 0:
+            end_orphans()
 
     def _terminate(self, failure: Failure) -> None:
         self.failure = self.failure or failure

@@ -9,6 +9,7 @@ import shutil
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,11 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.display import repr_line
+from dhkit.errors import DhkitError
+from dhkit.kernels.store import cache_folder
+from dhkit.programs.confinement import Confinement, landlock_version
 from dhkit.programs.process import HERE, CallTime, Failure, Limits, Process, ProgramError, printable
+from dhkit.programs.python_runner import dhkit_packages
 
 if TYPE_CHECKING:
     from dhkit.control import Setpoint
@@ -28,10 +33,19 @@ MAX_SOLUTIONS = 64
 """Most solutions of a pose: no arm of six joints has more than 16."""
 MAX_START_TIME = 30.0
 """Processor time from the start to the first line, s: importing numpy may take some seconds."""
+RUNNERS = HERE / "python_runner.py", HERE / "octave_runner.m"
+"""Files of dhkit that every program may read: they are executed in its process."""
+
+
+class _DhkitImportedError(Exception):
+    """A program asks for dhkit, which it could not read so far."""
 
 
 class Program:
     """A program that is started when it is first called, and again after a failure that ended it.
+
+    It cannot read dhkit's files, unless it imports dhkit openly: then it is started again with them, and
+    :attr:`imported` says so. Where the system cannot hide files (:attr:`sees_dhkit`), it may use dhkit unseen.
 
     Parameters
     ----------
@@ -59,12 +73,18 @@ class Program:
         self.name = source.name if isinstance(source, Path) else source[0]
         self.functions: tuple[str, ...] = ()
         self.imported: tuple[str, ...] = ()
-        """Modules that it imported although it must not: ``dhkit``."""
+        """Modules that it imported although it should not: ``dhkit``."""
         self._source, self._sandbox = source, sandbox
         self._process: Process | None = None
         self._lock = threading.Lock()
         self._closed = False
         self._ended_time = 0.0
+        self._landlock = landlock_version()
+
+    @property
+    def sees_dhkit(self) -> bool:
+        """Whether this system cannot keep the program from reading dhkit's files: it has no Landlock (Linux 5.13)."""
+        return self._landlock == 0
 
     def start(self) -> None:
         """Start the program, unless it runs, and wait until it has named its functions.
@@ -93,10 +113,10 @@ class Program:
             The call failed. If the process has ended or cannot be trusted any more, the next call starts another.
         """
         with self._lock:
-            running = self._running_process()
-            if function not in self.functions:
-                raise ProgramError(f"{self.name} has no function {function}", Failure.UNREADABLE)
-            answer = self._answer_to(running, {"call": function, "arguments": arguments})
+            try:
+                answer = self._answer_to(function, arguments)
+            except _DhkitImportedError:  # raised once at most
+                answer = self._answer_to(function, arguments)
         if "error" in answer:
             raise ProgramError(_text(answer["error"]), Failure.RAISED, _line(answer))
         if "value" not in answer:
@@ -181,8 +201,15 @@ class Program:
         running = self._process
         if running is not None and running.failure is None:
             return running
+        try:
+            return self._start()
+        except _DhkitImportedError:  # raised once at most
+            return self._start()
+
+    def _start(self) -> Process:
+        """Start a process, and wait until it has named its functions."""
         self._end()
-        running = self._process = Process(self._command, self.limits, self._sandbox)
+        running = self._process = Process(self._command, self.limits, self._sandbox, self._confinement())
         if self._closed:  # meanwhile, by another thread, which has not seen this process
             self._end()
             raise ProgramError(f"{self.name} was closed", Failure.ENDED)
@@ -197,7 +224,11 @@ class Program:
         self.functions = tuple(map(str, functions))
         return running
 
-    def _answer_to(self, running: Process, request: dict[str, object]) -> dict[str, object]:
+    def _answer_to(self, function: str, arguments: dict[str, object]) -> dict[str, object]:
+        running = self._running_process()
+        if function not in self.functions:
+            raise ProgramError(f"{self.name} has no function {function}", Failure.UNREADABLE)
+        request = {"call": function, "arguments": arguments}
         number = running.next_number()
         # Octave reads one character beyond a line, here of the empty line behind it.
         line = json.dumps({"id": number, **request}).encode() + b"\n\n"
@@ -220,9 +251,10 @@ class Program:
             except ProgramError:
                 self._end(keep=True)
                 raise
-            imported = message.get("imported")
-            if isinstance(imported, list):
-                self.imported = tuple(sorted({*self.imported, *map(str, imported)} & {"dhkit"}))
+            if message.get("imported") == ["dhkit"] and not self.imported:
+                self.imported = ("dhkit",)
+                self._end()
+                raise _DhkitImportedError
             if is_answer(message):
                 return message
 
@@ -232,6 +264,17 @@ class Program:
             if not keep:
                 self._ended_time += self._process.processor_time
                 self._process = None
+
+    def _confinement(self) -> Confinement:
+        """Return the rights that the program does not have: to read dhkit and its kernels, unless it imports dhkit."""
+        if self.imported:
+            return Confinement(self._landlock)
+        hidden = dhkit_packages()
+        with suppress(DhkitError):
+            kernels = cache_folder()
+            if kernels is not None:
+                hidden.append(str(kernels))
+        return Confinement(self._landlock, tuple(hidden), tuple(str(path.resolve()) for path in RUNNERS))
 
     def _command(self, folder: Path) -> list[str]:
         """Copy the source into the program's folder, and return the command to execute."""
@@ -251,7 +294,8 @@ class Program:
         except OSError as error:
             raise ProgramError(f"{source}: {error.strerror}", Failure.UNREADABLE) from None
         if source.suffix == ".py":
-            return [sys.executable, "-I", "-B", "-u", str(HERE / "python_runner.py"), str(copy)]
+            options = ["with-dhkit"] if self.imported else []
+            return [sys.executable, "-I", "-B", "-u", str(HERE / "python_runner.py"), str(copy), *options]
         if source.suffix == ".m":
             octave = shutil.which("octave-cli") or shutil.which("octave")
             if octave is None:
