@@ -19,7 +19,6 @@ from dhkit.cli.units import angle_key, joint_entry
 from dhkit.description import Array, pose_parts
 from dhkit.errors import ModelError
 from dhkit.kinematics import IKFlag, IKSolutions, IKStatus, classify
-from dhkit.kinematics.neighbour import has_neighbour
 from dhkit.kinematics.solutions import LIMIT_SLACK
 
 FLAG_DESCRIPTIONS = {
@@ -174,9 +173,10 @@ def _solve(arm: Arm, T: Array, near: Array | None, *, limits: bool, numeric: boo
 
 def _method_of(arm: Arm) -> Method:
     """Return the method by which :meth:`dhkit.Arm.ik` solves an arm."""
-    if classify(arm.description).fit is not None:
+    family = classify(arm.description)
+    if family.closed_form:
         return Method.CLOSED_FORM
-    return Method.NEIGHBOUR if has_neighbour(arm.description) else Method.SSIK
+    return Method.SSIK if family.neighbour is None else Method.NEIGHBOUR
 
 
 def _with_whole_turns(solutions: IKSolutions, near: Array | None) -> Array:

@@ -29,10 +29,10 @@ from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.candidates import SINGULARITIES, are_poses, collect, is_beyond_all_links, orthonormal
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
-from dhkit.kinematics.inverse import Solver, free_angles, solve_in_closed_form, solver_for
 from dhkit.kinematics.newton import Newton
 from dhkit.kinematics.numeric import descend, refined, solve_numerically
 from dhkit.kinematics.solutions import IKFlag, IKSolutions
+from dhkit.kinematics.solver import Solver, free_angles, solve_in_closed_form, solver_for
 
 OTHER = "other"
 """Name of the last branch: a solution that iteration finds where no branch of the neighbour leads to one."""
@@ -53,19 +53,13 @@ SAME_ANGLE = 1e-6
 """Joint values, rad or share of the reach, that differ by less are the same solution."""
 
 
-def has_neighbour(description: Description) -> bool:
-    """Return whether an arm without a closed form has a neighbour that meets all coordinates of a pose."""
-    neighbour = classify(description).neighbour
-    return neighbour is not None and neighbour[1].coordinates == ALL_COORDINATES
-
-
 def solve_from_neighbour(description: Description, T: ArrayLike, seed: ArrayLike | None = None) -> IKSolutions:
     """Return the solutions of T_world_tool(q) = T that Newton's method finds from those of the neighbouring arm.
 
     Parameters
     ----------
     description
-        The robot, with :func:`has_neighbour`.
+        The robot; its classification has a neighbour.
     T
         Poses of the tool in the world, shape (..., 4, 4).
     seed

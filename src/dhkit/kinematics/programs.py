@@ -9,9 +9,9 @@ from dhkit.kernels import Kernel
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import limit_parameters
 from dhkit.kinematics.forward import frames_kernel, tool_kernel
-from dhkit.kinematics.inverse import solver_of
 from dhkit.kinematics.jacobian import jacobian_dot_kernel, jacobian_kernel
 from dhkit.kinematics.newton import error_kernel, step_kernel
+from dhkit.kinematics.solver import solver_of
 from dhkit.symbolic import Graph, SymbolicTable, export_c, jacobian, joint_symbols
 
 

@@ -11,7 +11,6 @@ from dhkit.arm import Arm
 from dhkit.description import Array, pose
 from dhkit.errors import DhkitError
 from dhkit.kinematics import IKFlag, IKSolutions, IKStatus, classify
-from dhkit.kinematics.neighbour import has_neighbour
 from dhkit.lab.desk import Desk
 from dhkit.lab.requests import Fields, JsonObject, Panel, answers
 
@@ -237,7 +236,8 @@ def solve_pose(arm: Arm, T: Array, near: Array) -> tuple[IKSolutions, bool]:
     near
         Joint values where the iteration begins, shape (n,), rad and m.
     """
-    if classify(arm.description).fit is not None or has_neighbour(arm.description):
+    family = classify(arm.description)
+    if family.closed_form or family.neighbour is not None:
         return arm.ik(T), False
     return arm.ik_numeric(T, near, restarts=MAX_RESTARTS, position_only=arm.n < 6), True
 

@@ -9,7 +9,7 @@ from dhkit.description import Description, takes_robot
 from dhkit.display import LONGEST_LINE, plain
 from dhkit.kinematics.axes import TOLERANCE, Axes
 from dhkit.kinematics.closed_form import planar, spherical_wrist, three_parallel, turret
-from dhkit.kinematics.closed_form.family import Family, Fit
+from dhkit.kinematics.closed_form.family import ALL_COORDINATES, Family, Fit
 
 FAMILIES = (
     Family("elbow_wrist", spherical_wrist.elbow_fit, spherical_wrist.elbow_formulas),
@@ -38,7 +38,8 @@ class Classification:
     fit: Fit | None
     """The arm's parameters in the family's formulas; None if there is no family."""
     neighbour: tuple[Family, Fit] | None = None
-    """Family and parameters of an arm whose axes miss the family by at most 1e-3, where the arm itself has none."""
+    """Family of six joints and parameters of its member that this arm misses by at most 1e-3; None if the arm has a
+    closed form itself, or is not near a family."""
 
     @property
     def closed_form(self) -> bool:
@@ -82,7 +83,8 @@ def classify(description: Description) -> Classification:
     near = next(filter(None, (_first(Axes.of(description, tolerance)) for tolerance in NEAR_MISSES)), None)
     if near is not None:
         words += f" (nearly one of {kinds} with {near[1].geometry}, but not to {TOLERANCE:g}: are its angles rounded?)"
-    return Classification(words, None, None, near)
+    meets_all = near is not None and near[1].coordinates == ALL_COORDINATES
+    return Classification(words, None, None, near if meets_all else None)
 
 
 def _first(axes: Axes) -> tuple[Family, Fit] | None:

@@ -1,0 +1,117 @@
+"""The closed form of an arm's family as a kernel, with the arm's parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dhkit.description import Array, Description, joint_array
+from dhkit.description.frames import configuration
+from dhkit.kernels import EXACT_RANGE, Kernel, kernel, result_array
+from dhkit.kinematics.closed_form import classify
+from dhkit.kinematics.closed_form.family import OUTPUT_TYPES, Family, Fit, limit_parameters
+from dhkit.kinematics.closed_form.nearest_wrist import nearest_wrist_distance
+from dhkit.kinematics.solutions import IKSolutions
+from dhkit.symbolic import Graph
+
+
+@dataclass(frozen=True)
+class Solver:
+    """The kernel of an arm's closed form with the arm's parameters."""
+
+    fit: Fit
+    kernel: Kernel
+    parameters: Array
+
+
+@lru_cache(maxsize=512)
+def solver_of(description: Description) -> Solver | None:
+    """Return the solver of an arm's closed form; None if no closed form is known."""
+    found = classify(description)
+    if found.family is None or found.fit is None:
+        return None
+    return solver_for(description, found.family, found.fit)
+
+
+def solver_for(description: Description, family: Family, fit: Fit) -> Solver:
+    """Return the solver of a family's closed form with an arm's limits."""
+    numbers = description.numbers
+    prismatic = tuple(bool(slides) for slides in numbers.prismatic)
+    limits = limit_parameters(numbers.lower, numbers.upper, prismatic)
+
+    def derived() -> Graph:
+        from dhkit.kinematics.closed_form.program import program
+
+        return program(family, fit, prismatic)
+
+    solver = kernel(f"ik_{family.name}", fit.structure, derived, OUTPUT_TYPES)
+    return Solver(fit, solver, np.concatenate([fit.vector(), limits]))
+
+
+def solve_in_closed_form(
+    description: Description, solver: Solver, poses: Array, free: Array, out: Array | None = None, threads: int = 1
+) -> IKSolutions:
+    """Return the solutions of a closed form.
+
+    Parameters
+    ----------
+    description
+        The robot.
+    solver
+        The closed form.
+    poses
+        Poses of the tool in the world, shape (..., 4, 4), m.
+    free
+        Angles of free joints, shape (..., 2), rad: see :func:`free_angles`.
+    out, threads
+        As for :func:`dhkit.kinematics.inverse_kinematics`.
+    """
+    fit = solver.fit
+    batch = poses.shape[:-2]
+    B, n = len(fit.branches), description.n
+    q = result_array((*batch, B, n), out)
+    if out is not None and np.may_share_memory(out, poses):
+        poses = poses.copy()
+    distance = np.empty(batch)
+    valid, flags = np.empty((2, *batch, B), dtype=np.uint8)
+    status = np.empty(batch, dtype=np.uint8)
+    count = poses.size // 16
+    if count:
+        rows = [
+            q.reshape(count, B * n),
+            distance.reshape(count, 1),
+            valid.reshape(count, B),
+            flags.reshape(count, B),
+            status.reshape(count, 1),
+        ]
+        solver.kernel(solver.parameters, [poses.reshape(count, 16), free.reshape(count, 2)], rows, threads)
+        if fit.ring is not None and fit.parameters["offset"]:
+            # The kernel's distance is that of the nearest point in one plane: too much if the plane has an offset.
+            beyond = np.flatnonzero(distance.reshape(count) > 0)
+            distance.reshape(count)[beyond] = nearest_wrist_distance(fit, poses.reshape(count, 4, 4)[beyond])
+    return IKSolutions(
+        q=q,
+        valid=valid.view(np.bool_),
+        flags=flags,
+        status_code=status,
+        distance=distance,
+        branches=fit.branches,
+        met=fit.coordinates,
+        description=description,
+    )
+
+
+def free_angles(description: Description, fit: Fit, seed: ArrayLike | None, batch: tuple[int, ...]) -> Array:
+    """Return the angles that joint 1 and the wrist's free joint take where they are free, shape (..., 2), rad."""
+    if seed is None:
+        return np.zeros((*batch, 2))
+    start = configuration(description, seed, "seed") if isinstance(seed, str) else seed
+    try:
+        joints = joint_array(description, start, "seed")[..., [0, fit.free or 0]]
+        angles = np.broadcast_to(joints, (*batch, 2))
+    except ValueError:
+        raise ValueError(f"seed has shape {np.shape(seed)}; expected {(*batch, description.n)}") from None
+    return np.ascontiguousarray(np.where(np.abs(angles) <= EXACT_RANGE, angles, 0.0))
