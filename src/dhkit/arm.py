@@ -907,11 +907,26 @@ class Arm:
         limits: Limits | None = None,
         friction: bool | Friction | None = None,
         payload: Payload | None = None,
+        *,
+        obstacles: Scene = (),
+        clearance: float = 0.01,
+        self_collision: bool = False,
+        independent: bool = False,
     ) -> Certificate:
         """Check a motion against limits, the arm's own unless given; see :func:`dhkit.planning.certify`."""
         from dhkit.planning import certify
 
-        return certify(self._description, motion, limits, friction, payload)
+        return certify(
+            self._description,
+            motion,
+            limits,
+            friction,
+            payload,
+            obstacles=obstacles,
+            clearance=clearance,
+            self_collision=self_collision,
+            independent=independent,
+        )
 
     def distance(self, q: ArrayLike, obstacles: Scene = (), self_collision: bool = False) -> Distances:
         """Return the distances of the links from obstacles and from each other; see :func:`dhkit.planning.distance`."""

@@ -52,6 +52,27 @@ def test_a_link_whose_mesh_is_missing_is_named(tmp_path):
     assert whole.not_checked == ()
 
 
+def test_parts_that_stay_beside_an_obstacle_are_named_if_they_are_near_it():
+    arm = dhkit.Arm.load("ur5")
+    post = Obstacle.box((0.05, 0.05, 0.3), (0.1, 0.0, -0.15), name="post")
+    q = np.array([[0.0, -1.2, 0.5, 0, 0, 0], [2.0, -1.2, 0.5, 0, 0, 0]])
+    assert arm.distance(q, [post]).not_checked == ("part of link 1 and post, 19.6 mm apart in all configurations",)
+    far = Obstacle.box((0.05, 0.05, 0.3), (0.8, 0.0, 0.5), name="far")
+    assert arm.distance(q, [far]).not_checked == ()
+    motion = arm.quintic(q[0], q[1])
+    near = arm.plan(q[0], q[1], obstacles=[post], clearance=0.03, compare=False, intervals=24)
+    assert near.report.not_checked == ("part of link 1 and post, 19.6 mm apart in all configurations",)
+    assert arm.certify(motion, obstacles=[post], clearance=0.005, independent=True).independent.ok
+
+
+def test_links_that_turn_about_the_vertical_alone_are_not_named_for_the_floor():
+    for name in ("ur5", "cobra600", "planar3r", "puma560"):
+        assert dhkit.Arm.load(name).distance("zero", [dhkit.planning.Floor(-0.3)]).not_checked == ()
+    assert dhkit.Arm.load("manutec_r3").distance("zero", [dhkit.planning.Floor()]).not_checked == (
+        "part of link 2 and floor, which overlap in all configurations",
+    )
+
+
 @pytest.mark.parametrize(("name", "locked"), [("ur5", {2: 1.6}), ("ur5", {0: 0.4, 4: -1.0}), ("stanford", {2: 0.4})])
 def test_links_of_a_locked_arm_are_where_they_were(name, locked):
     """Points of the solids are those of the whole arm with these joints held."""

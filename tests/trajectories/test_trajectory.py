@@ -12,6 +12,7 @@ from hypothesis import given, strategies as st
 from dhkit.description import library_robot, with_payload
 from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory
+from dhkit.trajectories.pieces import Pieces
 from trajectories_reference import random_motion, reference_torques
 
 ARM, PUMA = library_robot("planar2r"), library_robot("puma560")
@@ -258,3 +259,16 @@ def test_divided_pieces_are_the_same_function_between_their_bernstein_coefficien
     low = divided.bernstein.min(axis=1)[:, None]
     high = divided.bernstein.max(axis=1)[:, None]
     assert (values > low - ROUNDING * largest).all() and (values < high + ROUNDING * largest).all()
+
+
+def test_bounds_of_polynomials_are_proved_and_tight(law):
+    rng = np.random.default_rng(0)
+    for _ in range(law.samples(300, least=20)):
+        degree, pieces = int(rng.integers(0, 8)), int(rng.integers(1, 6))
+        breaks = np.concatenate([[0.0], np.cumsum(rng.uniform(0.1, 2.0, pieces))])
+        f = Pieces.of(breaks, rng.normal(size=(pieces, degree + 1, 3)), 3)
+        bound, place = f.largest(np.full(3, 1e-9))
+        _, sampled = f.inside(4001)
+        law.holds("largest sample above the bound", float((sampled.max(axis=(0, 1)) - bound).max()), 1e-12)
+        reached = np.array([max(f(place[i], "left")[i], f(place[i], "right")[i]) for i in range(3)])
+        law.holds("bound above the value at its place", float((bound - reached).max()), 1.1e-9)

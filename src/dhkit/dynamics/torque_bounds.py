@@ -10,6 +10,13 @@ jets, and the product rule multiplies them, for a scalar times a vector, a dot a
     |(u v)^(m)| <= sum_j binomial(m, j) |u^(j)| |v^(m-j)|.
 
 A vector of length l that is fixed in a body of angular velocity w has v' = w x v, which gives its jet order by order.
+
+Smooth dry friction is (c_pos - c_neg) / 2 s + (c_pos + c_neg) / 2 s^2 with s = x / r, r = sqrt(1 + x^2) and
+x = v / width. The k-th derivatives of both with respect to x are polynomials over powers of r:
+
+    s' = r^-3,    s'' = -3 x r^-5,    s''' = (12 x^2 - 3) r^-7,    s'''' = (45 x - 60 x^3) r^-9,    s^2 = 1 - r^-2,
+
+and as |x| < r they are at most c_k / r^(k+2) and 2 c_k / r^(k+2), with c = 1, 3, 12, 60.
 """
 
 from __future__ import annotations
@@ -18,7 +25,10 @@ from math import comb
 
 import numpy as np
 
-from dhkit.description import Array, Convention, Description
+from dhkit.description import Array, Convention, Description, Numbers
+
+FRICTION_FACTORS = 1.0, 3.0, 12.0, 60.0
+"""The factors c_k of smooth dry friction."""
 
 
 def torque_derivative_bounds(description: Description, motion: Array) -> Array:
@@ -112,3 +122,27 @@ def _rotating_inertia(inertia: Array, spin: Array) -> Array:
     result = np.stack(jet)
     result[0] = max(abs(low), abs(high))
     return result
+
+
+def dry_friction_bounds(numbers: Numbers, width: float, least_speed: Array, motion: Array) -> Array:
+    """Return bounds of the fourth time derivative of smooth dry friction in K intervals, shape (K, n), N m/s^4, N/s^4.
+
+    Parameters
+    ----------
+    numbers
+        The robot's.
+    width
+        Width of the friction, rad/s or m/s, above 0.
+    least_speed
+        Lower bounds of |qd|, shape (K, n), rad/s and m/s.
+    motion
+        Upper bounds of |q|, |q'| ... |q^(5)| at least, shape (6, K, n).
+    """
+    forwards, backwards = numbers.coulomb.T
+    size = np.abs(forwards - backwards) / 2 + np.abs(forwards + backwards)
+    r = np.hypot(1.0, least_speed / width)
+    f1, f2, f3, f4 = (size * FRICTION_FACTORS[k - 1] / (width**k * r ** (k + 2)) for k in (1, 2, 3, 4))
+    v1, v2, v3, v4 = motion[2:6]
+    # d^4 f(v(t)) / dt^4 (Faa di Bruno).
+    bounds: Array = f4 * v1**4 + 6 * f3 * v1**2 * v2 + f2 * (3 * v2**2 + 4 * v1 * v3) + f1 * v4
+    return bounds

@@ -15,6 +15,8 @@ from dhkit.planning.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance,
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.joint_limits import Limit, PositionLimit
 from dhkit.planning.loaded import LoadedArm, loaded
+from dhkit.planning.obstacles import Scene
+from dhkit.planning.second_check import Recheck, recheck
 from dhkit.planning.states import States
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
@@ -33,8 +35,8 @@ ACCEPTED_EXCESS = 5e-7
 """Largest excess of a certified motion, as a share of the limit: half of the documented 1e-6."""
 MAX_SLOW_DOWN, SLOW_DOWN_TOLERANCE = 1e9, 1e-9
 """Largest factor by which a motion is slowed down, and the tolerance of such factors."""
-MIN_SEARCHED_COEFFICIENTS = 3
-"""Number of coefficients from which a polynomial may have an extreme inside its piece."""
+PROVED = 2e-8
+"""Distance of a proved bound of positions and their derivatives from the truth, as a share of the limit."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,8 @@ class Certificate:
     """Share of time for which at least one joint is at a limit."""
     sampled: tuple[str, ...] = ()
     """Limits of which nothing is proved between the states."""
+    independent: Recheck | None = None
+    """Result of the second check; None unless asked for."""
 
     @property
     def violation(self) -> float:
@@ -88,8 +92,8 @@ class Certificate:
 
     @property
     def ok(self) -> bool:
-        """Whether all limits are kept, up to 5e-7 of each."""
-        return self.violation <= ACCEPTED_EXCESS
+        """Whether all limits are kept, up to 5e-7 of each, and the second check, if there was one, found nothing."""
+        return self.violation <= ACCEPTED_EXCESS and (self.independent is None or self.independent.ok)
 
     def with_worse_checks(self, checks: Sequence[Check]) -> Certificate:
         """Return the certificate with checks of the same limits replaced where the given ones are worse."""
@@ -128,7 +132,12 @@ class Certificate:
     def _summary(self) -> str:
         if self.worst is None:
             return f"nothing is limited, {self.states} states"
-        kept = "all limits kept" if self.ok else f"{self.worst.what} exceeded by {100 * self.violation:.2g} %"
+        if self.violation > ACCEPTED_EXCESS:
+            kept = f"{self.worst.what} exceeded by {100 * self.violation:.2g} %"
+        elif self.ok:
+            kept = "all limits kept"
+        else:
+            kept = f"refuted by the second check: {self.independent}"
         only = f"; not proved between them: {', '.join(self.sampled)}" if self.sampled else ""
         return f"{kept}, in {self.states} states by {self.reference}{only}"
 
@@ -140,6 +149,11 @@ def certify(
     limits: Limits | None = None,
     friction: bool | Friction | None = None,
     payload: Payload | None = None,
+    *,
+    obstacles: Scene = (),
+    clearance: float = 0.01,
+    self_collision: bool = False,
+    independent: bool = False,
 ) -> Certificate:
     """Check any motion against limits, with the checks that planned motions pass.
 
@@ -155,11 +169,21 @@ def certify(
         Friction that the drives' torques include, False for none; the motion's own unless given.
     payload
         Payload of the tool; the motion's own unless given.
+    obstacles, clearance, self_collision
+        What the links keep a distance from, and how much, m, as for :meth:`dhkit.planning.Planner.solve`: links that
+        are nearer at the start or the goal keep less there.
+    independent
+        Whether a second check, which shares no code with the first, searches the motion for what the first has
+        overlooked: see :mod:`dhkit.planning.second_check`. It takes 0.1 to 10 s.
 
     Raises
     ------
     DescriptionError
         A motion of another robot.
+    PlanningError
+        A clearance larger than the space in which the arm moves.
+    ModelError
+        What is asked for needs Pinocchio or coal, which is not installed.
 
     Examples
     --------
@@ -181,8 +205,15 @@ def certify(
     carried = motion.payload if payload is None else payload
     chosen = motion.friction if friction is None else Friction.chosen(friction)
     points = max(POINTS, POINTS_PER_COEFFICIENT * motion.coefficients.shape[1], _points_of_turns(description, motion))
-    certificate = Checker(loaded(description, carried), limits, friction=chosen, points=points).check(motion)
-    return certificate.with_worse_checks(_extremes(motion, limits, points))
+    avoidance = CollisionAvoidance.of(obstacles, clearance, self_collision)
+    if avoidance:
+        avoidance = avoidance.between(description, motion.q(0.0), motion.q(motion.duration))
+    checker = Checker(loaded(description, carried), limits, friction=chosen, avoidance=avoidance, points=points)
+    certificate = checker.check(motion)
+    if not independent:
+        return certificate
+    claims = avoidance.claims(description) if avoidance else ()
+    return replace(certificate, independent=recheck(description, motion, limits, carried, chosen, claims))
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +272,9 @@ class Checker:
         for k, use in self.peaks(states).items():
             constraint, _ = self.limiting[k]
             check = _check(constraint, k, use - 1, states.times)
-            if k == Limit.TORQUE:
+            if k <= Limit.JERK:
+                check = _proved_check(trajectory, self.limits, Limit(k))
+            elif k == Limit.TORQUE:
                 check, unproved = self._with_torques_between(trajectory, check)
                 sampled += unproved
             elif k > Limit.CLEARANCE:
@@ -352,28 +385,21 @@ def _points_of_turns(description: Description, motion: Trajectory) -> int:
     return min(int(most / LARGEST_TURN) + 2, MAX_POINTS)
 
 
-def _extremes(motion: Trajectory, limits: Limits, points: int) -> list[Check]:
-    """Return the checks of the extremes of positions and their derivatives, searched from ``points`` in a piece."""
-    found = []
-    kinds = (Limit.POSITION, Limit.VELOCITY, Limit.ACCELERATION, Limit.JERK)
-    position = PositionLimit(limits)
-    for order, kind in enumerate(kinds):
-        pieces = motion.pieces.differentiated(order)
-        if kind is Limit.JERK and pieces.coefficients.shape[1] < MIN_SEARCHED_COEFFICIENTS:
-            t, values = pieces.inside(2)
-            t = np.broadcast_to(t[..., None], values.shape)
-        else:
-            t, values = pieces.extremes(points)
-        if kind is Limit.POSITION:
-            is_limited = position.is_limiting
-            excess = np.maximum(limits.lower - values, values - limits.upper) / position.sizes
-        else:
-            limit = getattr(limits, kind.what)
-            is_limited, excess = bool(np.isfinite(limit).any()), np.abs(values) / limit - 1
-        if is_limited:
-            k, p, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
-            found.append(Check(kind.what, float(excess[k, p, i]), int(i), float(t[k, p, i]), limit=kind))
-    return found
+def _proved_check(motion: Trajectory, limits: Limits, kind: Limit) -> Check:
+    """Return the check of positions or one of their derivatives: bounds of the polynomials, not samples."""
+    pieces = motion.pieces.differentiated(int(kind))
+    if kind is Limit.POSITION:
+        upper, lower, size = limits.upper, limits.lower, PositionLimit(limits).sizes
+    else:
+        upper = size = getattr(limits, kind.what)
+        lower = -upper
+    highest, at_highest = pieces.largest(PROVED * size)
+    lowest, at_lowest = replace(pieces, coefficients=-pieces.coefficients).largest(PROVED * size)
+    above, below = (highest - upper) / size, (lowest + lower) / size
+    excess = np.where(np.isfinite(size), np.maximum(above, below), -1.0)
+    i = int(np.argmax(excess))
+    time = at_highest[i] if above[i] >= below[i] else at_lowest[i]
+    return Check(kind.what, float(excess[i]), i, float(time), limit=kind)
 
 
 def _time_shares(trajectory: Trajectory, states: States) -> Array:

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from numbers import Real
 from typing import Any
 
@@ -33,8 +34,10 @@ from dhkit.planning.obstacles import (
     pair_distances,
     shape_distances,
     smallest_distances,
+    standing,
     world_axes,
 )
+from dhkit.planning.second_check import Claim
 from dhkit.planning.states import States
 from dhkit.trajectories import Limits
 
@@ -137,7 +140,7 @@ class CollisionAvoidance:
                 str(reduced)
                 for reduced in (*self.reduced, *(pair for pair in self.by_shapes if pair.kept < self.clearance))
             ),
-            "not_checked": not_checked(arm, self.self_collision),
+            "not_checked": not_checked(arm, self.obstacles, self.self_collision, self.clearance),
             "is_clearance_reduced_throughout": self.is_reduced_throughout,
         }
 
@@ -165,6 +168,44 @@ class CollisionAvoidance:
             gap = float(shape_distances(description, at_ends, links).min())
             by_shapes.append(LinkClearance(links, self.clearance if gap >= self.clearance else KEPT_SHARE * gap))
         return replace(self, reduced=tuple(reduced), by_shapes=tuple(by_shapes), ends=at_ends)
+
+    def claims(self, description: Description) -> tuple[Claim, ...]:
+        """Return the distances that a certificate claims: of all links but those that reports name as not checked.
+
+        A clearance that is reduced at an end counts as reduced during the whole motion.
+        """
+        capsules = link_capsules(description)
+        with_obstacle: dict[tuple[int, int], float] = {}
+        with_link: dict[tuple[int, int], float] = {}
+        for reduced in self.reduced:
+            link, gap = capsules[reduced.pair.capsule].link, min(reduced.start, reduced.goal, self.clearance)
+            if reduced.pair.other is None:
+                place = link, reduced.pair.obstacle or 0
+                with_obstacle[place] = min(gap, with_obstacle.get(place, gap))
+            else:
+                other = capsules[reduced.pair.other].link
+                place = min(link, other), max(link, other)
+                with_link[place] = min(gap, with_link.get(place, gap))
+        for pair in self.by_shapes:
+            with_link[pair.links] = min(pair.kept, with_link.get(pair.links, pair.kept))
+
+        claims = []
+        for k, obstacle in enumerate(self.obstacles):
+            beside = {link for link, gap in standing(description, obstacle) if gap < self.clearance}
+            claims += [
+                Claim(link, obstacle, with_obstacle.get((link, k), self.clearance))
+                for link in range(1, description.n + 1)
+                if link not in beside
+            ]
+        if self.self_collision:
+            pairs = link_pairs(description)
+            named = {*pairs.unchecked, *((a, b) for a, b, gap in pairs.steady if gap < self.clearance)}
+            claims += [
+                Claim(b, a, with_link.get((a, b), self.clearance))
+                for a, b in combinations(range(description.n + 1), 2)
+                if b - a > 1 and (a, b) not in named
+            ]
+        return tuple(claims)
 
     @property
     def reduced_throughout(self) -> CollisionAvoidance:

@@ -16,6 +16,8 @@ from dhkit.display import counted, repr_line
 
 Side: TypeAlias = Literal["right", "left"]
 """The piece that is evaluated at a break: the one that begins there (right) or ends there (left)."""
+MAX_HALVINGS = 60
+"""Number of times that a piece is halved for a bound: from 2^-26 of a piece on, hulls are exact to rounding."""
 REFINEMENTS = 6
 """Number of Newton steps to an extreme; from a twentieth of a piece away, four reach rounding."""
 
@@ -118,6 +120,34 @@ class Pieces:
         matrix = np.array([[comb(i, j) / comb(p, j) for j in range(p + 1)] for i in range(p + 1)])
         return np.asarray(np.einsum("ij,kj,kjm->kim", matrix, powers, self.coefficients))
 
+    def largest(self, tolerance: Array) -> tuple[Array, Array]:
+        """Return upper bounds of the largest value of each column, shape (m,), and where it is nearly reached, (m,).
+
+        The bounds are proved: the largest Bernstein coefficients of pieces that are halved until these exceed values
+        of the function by no more than ``tolerance``, shape (m,).
+        """
+        b, begin, width = self.bernstein, self.breaks[:-1], np.diff(self.breaks)
+        reached = np.full(b.shape[2], -np.inf)
+        places = np.zeros(b.shape[2])
+        bound = np.full(b.shape[2], -np.inf)
+        for _ in range(MAX_HALVINGS):
+            for values, at in ((b[:, 0], begin), (b[:, -1], begin + width)):
+                k = values.argmax(axis=0)
+                highest = np.take_along_axis(values, k[None], axis=0)[0]
+                places = np.where(highest > reached, at[k], places)
+                reached = np.maximum(reached, highest)
+            hulls = b.max(axis=1)
+            is_open = (hulls > reached + tolerance).any(axis=1)
+            bound = np.maximum(bound, hulls[~is_open].max(axis=0, initial=-np.inf))
+            if not is_open.any():
+                break
+            b = np.concatenate(_halves(b[is_open]))
+            begin, width = begin[is_open], width[is_open] / 2
+            begin, width = np.concatenate([begin, begin + width]), np.concatenate([width, width])
+        else:
+            bound = np.maximum(bound, b.max(axis=(0, 1)))
+        return bound, places
+
     def inside(self, points: int) -> tuple[Array, Array]:
         """Return times (K, points) evenly spread over each piece, both its ends included, and values (K, points, m)."""
         width = np.diff(self.breaks)[:, None]
@@ -153,6 +183,16 @@ class Pieces:
     def __repr__(self) -> str:
         pieces, powers, columns = self.coefficients.shape
         return repr_line("Pieces", summary=f"{pieces} of degree {powers - 1} in {counted(columns, 'column')}")
+
+
+def _halves(b: Array) -> tuple[Array, Array]:
+    """Return the Bernstein coefficients (K, p+1, m) of both halves of pieces, by de Casteljau's algorithm."""
+    left, right = [b[:, 0]], [b[:, -1]]
+    while b.shape[1] > 1:
+        b = (b[:, :-1] + b[:, 1:]) / 2
+        left.append(b[:, 0])
+        right.append(b[:, -1])
+    return np.stack(left, axis=1), np.stack(right[::-1], axis=1)
 
 
 def join(first: Pieces, second: Pieces) -> tuple[Array, Array]:

@@ -8,6 +8,9 @@ the two in the middle, and at the ends of the cell between any two of them,
 (Stoer and Bulirsch 2002, ch. 2.1.4), where D bounds the fourth derivative of the torque. It follows from the motion's
 polynomials, see :mod:`dhkit.dynamics.torque_bounds`, and is too large by several powers of ten; the fourth power of h
 makes up for that. Cells in which the bound does not decide are sampled more finely.
+
+Smooth dry friction is part of tau. Dry friction that is a step is constant while a joint goes one way, and between two
+bounds elsewhere.
 """
 
 from __future__ import annotations
@@ -20,7 +23,7 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array, Description
 from dhkit.dynamics import inverse_dynamics
-from dhkit.dynamics.torque_bounds import torque_derivative_bounds
+from dhkit.dynamics.torque_bounds import dry_friction_bounds, torque_derivative_bounds
 from dhkit.symbolic import Friction
 from dhkit.trajectories.pieces import Pieces
 from dhkit.trajectories.trajectory import Trajectory
@@ -80,8 +83,11 @@ def torque_peaks(
     fourth = torque_derivative_bounds(description, motion)
     if friction is not None:
         fourth += np.abs(numbers.viscous) * motion[ORDER + 1]
+    is_smooth = friction is not None and friction.width > 0
+    if friction is not None and is_smooth:
+        fourth += dry_friction_bounds(numbers, friction.width, _least_speeds(cells), motion)
     fourth /= limit
-    least_dry, most_dry, is_dry_constant = _dry_friction(description, cells, friction)
+    least_dry, most_dry, is_dry_constant = _dry_friction_steps(description, cells, None if is_smooth else friction)
 
     highest = np.zeros((count, description.n))
     seen = np.zeros_like(highest)
@@ -91,9 +97,12 @@ def torque_peaks(
     def measure(rows: NDArray[np.intp], samples: int) -> None:
         u = width[rows, None] * np.linspace(0.0, 1.0, samples)
         q, qd, qdd = (cells.differentiated(m).on(rows[:, None], u) for m in range(3))
-        tau = inverse_dynamics(description, q, qd, qdd)
-        if friction is not None:
-            tau = tau + numbers.viscous * qd
+        if friction is not None and is_smooth:
+            tau = inverse_dynamics(description, q, qd, qdd, friction=friction)
+        else:
+            tau = inverse_dynamics(description, q, qd, qdd)
+            if friction is not None:
+                tau = tau + numbers.viscous * qd
         above, at_above = _largest((tau + most_dry[rows, None]) / limit)
         below, at_below = _largest(-(tau + least_dry[rows, None]) / limit)
 
@@ -107,27 +116,39 @@ def torque_peaks(
         proved[rows] = (highest[rows] <= 1) | ((error <= TOLERANCE) & is_dry_constant[rows])
 
     measure(np.arange(count), FIRST_SAMPLES)
-    # Samples N of a cell of width w with which the error is the tolerance: (w / (N - 1))^4 / 4! D = TOLERANCE.
-    steps = width[:, None] * (fourth / (factorial(ORDER) * TOLERANCE)) ** (1 / ORDER)
-    steps = np.where(proved, 0.0, steps).max(axis=1)
-    # Rounded up to powers of sqrt(2), so that cells are computed together.
-    samples = np.exp2(np.ceil(2 * np.log2(np.clip(steps, 1, MOST_SAMPLES))) / 2).astype(int) + 2
-    # More samples do not help where dry friction alone leaves the bound wide.
-    coarse = np.flatnonzero(samples > FIRST_SAMPLES)
-    for N in np.unique(samples[coarse]).tolist():
-        rows = coarse[samples[coarse] == N]
-        for part in np.array_split(rows, -(-len(rows) * N // BATCH)):
-            measure(part, N)
+    # First with an error of half of what is left to the limit, which decides most cells, then with the tolerance.
+    for is_last in (False, True):
+        wanted = np.full_like(seen, TOLERANCE) if is_last else np.maximum((1 - seen) / 2, TOLERANCE)
+        # Samples N of a cell of width w with which the error is the wanted one: (w / (N - 1))^4 / 4! D.
+        steps = width[:, None] * (fourth / (factorial(ORDER) * wanted)) ** (1 / ORDER)
+        steps = np.where(proved, 0.0, steps).max(axis=1)
+        # Rounded up to powers of sqrt(2), so that cells are computed together.
+        samples = np.exp2(np.ceil(2 * np.log2(np.clip(steps, 1, MOST_SAMPLES))) / 2).astype(int) + 2
+        # More samples do not help where dry friction alone leaves the bound wide.
+        coarse = np.flatnonzero(samples > FIRST_SAMPLES)
+        for N in np.unique(samples[coarse]).tolist():
+            rows = coarse[samples[coarse] == N]
+            for part in np.array_split(rows, -(-len(rows) * N // BATCH)):
+                measure(part, N)
 
     cell = highest.argmax(axis=0)
     joints = np.arange(description.n)
     return TorquePeaks(highest[cell, joints], times[cell, joints], seen.max(axis=0), np.asarray(proved.all(axis=0)))
 
 
-def _dry_friction(
+def _least_speeds(cells: Pieces) -> Array:
+    """Return lower bounds of the speed of each joint in each cell, shape (C, n), rad/s and m/s."""
+    rates = cells.derivative.bernstein
+    return np.asarray(np.maximum(np.maximum(rates.min(axis=1), -rates.max(axis=1)), 0.0))
+
+
+def _dry_friction_steps(
     description: Description, cells: Pieces, friction: Friction | None
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return the least and the largest dry friction in each cell, and whether it is constant there, shape (C, n)."""
+    """Return the least and the largest dry friction in each cell, and whether it is constant there, shape (C, n).
+
+    That of steps; zeros where there is no friction, or a smooth one.
+    """
     shape = len(cells.coefficients), description.n
     if friction is None:
         return np.zeros(shape), np.zeros(shape), np.ones(shape, dtype=bool)
@@ -144,8 +165,6 @@ def _dry_friction(
     goes_backwards = (fastest <= rounding) & ~rests
     least = np.minimum(np.minimum(forwards, backwards), 0.0)
     most = np.maximum(np.maximum(forwards, backwards), 0.0)
-    if friction.width > 0:
-        return least, most, least == most
     least = np.select([rests, goes_forwards, goes_backwards], [0.0, forwards, backwards], least)
     most = np.select([rests, goes_forwards, goes_backwards], [0.0, forwards, backwards], most)
     return least, most, least == most

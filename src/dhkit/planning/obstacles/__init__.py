@@ -3,7 +3,7 @@
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, link_name, world_axes
 from dhkit.planning.obstacles.clearance import Distances, distance, not_checked, pair_distances, smallest_distances
 from dhkit.planning.obstacles.link_shapes import shape_distances
-from dhkit.planning.obstacles.pairs import CheckedPairs, LinkPairs, Pair, checked_pairs, link_pairs
+from dhkit.planning.obstacles.pairs import CheckedPairs, LinkPairs, Pair, checked_pairs, link_pairs, standing
 from dhkit.planning.obstacles.sampling import PathSampler
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
 from dhkit.planning.obstacles.separation import Gaps, PlaneRow, Separation
@@ -31,5 +31,6 @@ __all__ = [
     "pair_distances",
     "shape_distances",
     "smallest_distances",
+    "standing",
     "world_axes",
 ]

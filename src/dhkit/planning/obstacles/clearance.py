@@ -13,7 +13,7 @@ from dhkit.display import counted, repr_line
 from dhkit.model.shapes import links_without_shapes
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, link_name, world_axes
 from dhkit.planning.obstacles.link_shapes import shape_distances
-from dhkit.planning.obstacles.pairs import Pair, capsules_beside, ends_above, link_pairs
+from dhkit.planning.obstacles.pairs import Pair, capsules_beside, ends_above, link_pairs, standing
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
 from dhkit.planning.obstacles.segments import Bounds, axis_bounds, segment_distances
 from dhkit.planning.obstacles.solid_arrays import Solids
@@ -120,14 +120,40 @@ def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self
         pair=_worst(every, found, names),
         per_obstacle=whole(every[:, : len(obstacles)] if found else every[:, :0]),
         itself=whole(itself),
-        not_checked=not_checked(description, self_collision) if found else (),
+        not_checked=_not_checked_beside(description, obstacles, self_collision, every) if found else (),
     )
 
 
-def not_checked(description: Description, self_collision: bool) -> tuple[str, ...]:
-    """Return what distances of an arm do not include, in words."""
+def _not_checked_beside(
+    description: Description, obstacles: Sequence[Obstacle | Floor], self_collision: bool, found: Array
+) -> tuple[str, ...]:
+    """Return what distances (N, m) of an arm do not include, as far as it may be nearer than the smallest of them."""
+    finite = found[np.isfinite(found)]
+    return not_checked(description, obstacles, self_collision, float(finite.min(initial=np.inf)))
+
+
+def not_checked(
+    description: Description, obstacles: Sequence[Obstacle | Floor], self_collision: bool, nearer_than: float
+) -> tuple[str, ...]:
+    """Return what distances of an arm do not include, in words.
+
+    Parameters
+    ----------
+    description, obstacles, self_collision
+        As for :func:`distance`.
+    nearer_than
+        Parts of links whose distance from an obstacle or a link no motion changes are named if it is below this, m.
+    """
     bare = [link_name(link) for link in links_without_shapes(description)]
     words = [f"{', '.join(bare)} without a shape"] if bare else []
+    for obstacle in obstacles:
+        for link, gap in standing(description, obstacle):
+            if gap < nearer_than:
+                state = f"{1000 * gap:.3g} mm apart" if gap > 0 else "which overlap"
+                words.append(f"part of {link_name(link)} and {obstacle.name}, {state} in all configurations")
+    for a, b, gap in link_pairs(description).steady if self_collision else ():
+        if gap < nearer_than:
+            words.append(f"parts of {link_name(a)} and {link_name(b)}, {1000 * gap:.3g} mm apart in all configurations")
     if self_collision and (overlapping := link_pairs(description).unchecked_text):
         words.append(f"{overlapping}, which overlap in all configurations")
     return tuple(words)

@@ -9,11 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dhkit.description import Array, Description
+from dhkit.description import Array, Description, world_to_frames
+from dhkit.description.frames import carrying
 from dhkit.model.shapes import MeshVersions, mesh_versions
 from dhkit.planning.obstacles.capsules import link_capsules, link_name, world_axes
 from dhkit.planning.obstacles.link_shapes import shape_distances
-from dhkit.planning.obstacles.scene import Obstacle
+from dhkit.planning.obstacles.scene import Floor, Obstacle
 from dhkit.planning.obstacles.segments import segment_distances
 from dhkit.planning.obstacles.solids import obstacle_distances
 
@@ -30,6 +31,8 @@ MOST_JOINTS = 2
 """Number of joints between two links up to which their distance is computed on a grid."""
 GRID = 256
 """Number of values of a joint on that grid."""
+VERTICAL = 1e-15
+"""Difference of the cosine of an axis' tilt from 1 that is rounding: a tilt of 4e-8 rad moves 1 m by 40 nm."""
 STILL = 1e-9
 """Largest travel, as a share of the size of the space in which the links move, that is rounding."""
 STANDING_SAMPLES = 400
@@ -56,6 +59,14 @@ class CheckedPairs:
     """Largest edge of the box around all axes of capsules in these configurations, m."""
 
 
+class SteadyPair(NamedTuple):
+    """Two links, and the smallest distance of capsules of theirs that no motion changes, m."""
+
+    first: int
+    second: int
+    distance: float
+
+
 @dataclass(frozen=True)
 class LinkPairs:
     """Pairs of an arm's links that are checked against each other.
@@ -76,6 +87,8 @@ class LinkPairs:
     """Pairs of links whose shapes are checked against each other."""
     unchecked: tuple[tuple[int, int], ...]
     """Pairs of links that overlap in all configurations."""
+    steady: tuple[SteadyPair, ...] = ()
+    """Pairs of links, connected by no joint, with capsules whose distance no motion changes: they are not checked."""
 
     @property
     def unchecked_text(self) -> str:
@@ -138,25 +151,31 @@ def _link_pairs(description: Description, meshes: MeshVersions) -> LinkPairs:
     checked: list[tuple[int, int]] = []
     shapes: list[tuple[int, int]] = []
     unchecked: list[tuple[int, int]] = []
+    steady: list[SteadyPair] = []
     for a, b in combinations(sorted(of_link), 2):
         narrow: list[tuple[int, int]] = []
         has_wide = False
+        same = np.inf
         for i, j in product(of_link[a], of_link[b]):
             gap = segment_distances(axes[:, i], axes[:, j]) - capsules[i].radius - capsules[j].radius
             if np.mean(gap < 0) > OVERLAP_SHARE:
                 has_wide = True
             elif np.ptp(gap) > STEADY or not _always_apart(description, i, j):
                 narrow.append((i, j))
+            else:
+                same = min(same, float(gap.min()))
         overlaps = has_wide and bool((shape_distances(description, q[:SHAPE_SAMPLES], (a, b), enough=0.0) < 0).all())
         touches_by_construction = overlaps and b - a == 1
         if touches_by_construction:
             continue
         checked += narrow
+        if b - a > 1 and np.isfinite(same):
+            steady.append(SteadyPair(a, b, same))
         if overlaps:
             unchecked.append((a, b))
         elif has_wide:
             shapes.append((a, b))
-    return LinkPairs(tuple(checked), tuple(shapes), tuple(unchecked))
+    return LinkPairs(tuple(checked), tuple(shapes), tuple(unchecked), tuple(steady))
 
 
 def _always_apart(description: Description, i: int, j: int) -> bool:
@@ -234,6 +253,58 @@ def _ends_above(description: Description, meshes: MeshVersions, height: float) -
         return bool(np.ptp(lowest) <= radius and (lowest < radius + height).all())
 
     return tuple((i, end) for i, end in checked_pairs(description).heights if not stands_in(i, end))
+
+
+class Standing(NamedTuple):
+    """A link of which some part does not move beside an obstacle, so that no distance is checked there."""
+
+    link: int
+    distance: float
+    """Distance of that part's capsule from the obstacle, the largest in random configurations, m."""
+
+
+def standing(description: Description, obstacle: Obstacle | Floor) -> tuple[Standing, ...]:
+    """Return the links with parts that are not checked against an obstacle since they stay where they are.
+
+    A capsule that turns about its own axis stays where it is, but what it contains need not be round. Links that turn
+    about vertical axes alone are left out for the floor: all their heights stay the same.
+    """
+    return _standing(description, mesh_versions(description), obstacle)
+
+
+@lru_cache(maxsize=MAX_OBSTACLES)
+def _standing(description: Description, meshes: MeshVersions, obstacle: Obstacle | Floor) -> tuple[Standing, ...]:
+    capsules = link_capsules(description)
+    q = _configurations(description)[:STANDING_SAMPLES]
+    axes = world_axes(description, q)
+    found: dict[int, float] = {}
+    if isinstance(obstacle, Floor):
+        upright = _upright_links(description, q)
+        checked = ends_above(description, obstacle.height)
+        for i, end in product(range(len(capsules)), (0, 1)):
+            link = capsules[i].link
+            if link > upright and (i, end) not in checked:
+                gap = float(axes[:, i, end, 2].max()) - capsules[i].radius - obstacle.height
+                found[link] = min(gap, found.get(link, gap))
+    else:
+        beside = capsules_beside(description, obstacle)
+        for i, capsule in enumerate(capsules):
+            if capsule.link and i not in beside:
+                gap = float(obstacle_distances(capsule.radius, axes[:, i], obstacle).max())
+                found[capsule.link] = min(gap, found.get(capsule.link, gap))
+    return tuple(Standing(link, gap) for link, gap in sorted(found.items()))
+
+
+def _upright_links(description: Description, q: Array) -> int:
+    """Return the number of links from the base on that turn about vertical axes alone."""
+    frames = np.moveaxis(world_to_frames(description, q), -3, 0)
+    count = 0
+    for i, T in enumerate(carrying(description.convention, frames)):
+        is_vertical = bool(np.all(np.abs(np.abs(T[:, 2, 2]) - 1) < VERTICAL))
+        if description.numbers.prismatic[i] or not is_vertical:
+            break
+        count += 1
+    return count
 
 
 def _configurations(description: Description) -> Array:

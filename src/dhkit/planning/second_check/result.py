@@ -1,0 +1,68 @@
+"""What a certificate claims about distances, and what a second check has found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dhkit.display import repr_line, value_line
+from dhkit.planning.obstacles import Floor, Obstacle, link_name
+
+ACCEPTED_SHARE, ACCEPTED_GAP = 0.1, 1e-3
+"""Share of a clearance, and at least this, m, by which it may be missed between the states of a certificate."""
+TOUCH = 1e-6
+"""Depth, m, up to which two solids only touch."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Two things whose distance a certificate claims."""
+
+    link: int
+    other: int | Obstacle | Floor
+    """Another link, or what is around the arm."""
+    kept: float
+    """Distance that is kept, m."""
+
+    @property
+    def refuting(self) -> float:
+        """Distance, m, below which the claim is refuted."""
+        return max(self.kept - max(ACCEPTED_SHARE * self.kept, ACCEPTED_GAP), -TOUCH)
+
+    def __str__(self) -> str:
+        other = link_name(self.other) if isinstance(self.other, int) else self.other.name
+        return f"distance of {link_name(self.link)} and {other}"
+
+
+@dataclass(frozen=True)
+class Refutation:
+    """A limit or a distance that a motion does not keep."""
+
+    what: str
+    """Such as ``torque of elbow``, or ``distance of link 3 and box``."""
+    found: float
+    """Share of the limit, which is 1 at the limit; of distances, m."""
+    required: float
+    time: float
+    """s."""
+
+    __repr__ = value_line
+
+
+@dataclass(frozen=True)
+class Recheck:
+    """Result of a second check."""
+
+    states: int
+    """Number of states in which the joints were looked at first."""
+    smallest_distance: float
+    """Smallest distance that was measured, m; a lower bound from 20 mm above what is required; inf without any."""
+    refutations: tuple[Refutation, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing was found that the motion does not keep."""
+        return not self.refutations
+
+    def __repr__(self) -> str:
+        found = "nothing refuted" if self.ok else f"{len(self.refutations)} refuted, first {self.refutations[0].what}"
+        return repr_line("Recheck", f"{self.states} states", found)
