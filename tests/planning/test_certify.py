@@ -31,6 +31,20 @@ def test_a_motion_is_certified_against_the_arms_limits_or_others():
     assert arm.certify(motion, Limits.of(arm.description, jerk=1e-3)).worst.what == "jerk"
 
 
+def test_what_is_not_checked_is_said():
+    rows = [(0, 0.3, 0, "pi/2"), (0, 0, 0.4, 0), (0, 0, 0.3, 0)]
+    bare = dhkit.Arm.from_dh(rows).with_limits(velocity=[2.0] * 3, torque=[50.0] * 3)
+    certificate = bare.certify(bare.quintic([0, 0, 0], [1, 0.5, 0.4]))
+    assert certificate.not_checked == ("torques, as the links of joint1, joint2, joint3 have no body",)
+    assert "; not checked: torques" in certificate._repr_html_()
+    arm = dhkit.Arm.load("panda")
+    swing = arm.quintic("ready", np.array([0.2, -0.4, 0.1, -2.0, 0.1, 1.7, 0.9]))
+    assert arm.certify(swing, self_collision=True, clearance=0.001).not_checked == (
+        "link 1 and link 3, link 3 and link 5, which overlap in all sampled configurations",
+    )
+    assert arm.certify(swing).not_checked == ()
+
+
 def test_a_payload_and_friction_count():
     arm = Arm.load("puma560")
     motion = arm.plan("ready", "nominal")

@@ -69,7 +69,7 @@ def test_links_that_turn_about_the_vertical_alone_are_not_named_for_the_floor():
     for name in ("ur5", "cobra600", "planar3r", "puma560"):
         assert dhkit.Arm.load(name).distance("zero", [dhkit.planning.Floor(-0.3)]).not_checked == ()
     assert dhkit.Arm.load("manutec_r3").distance("zero", [dhkit.planning.Floor()]).not_checked == (
-        "part of link 2 and floor, which overlap in all configurations",
+        "part of link 2 and floor, which overlap in all sampled configurations",
     )
 
 

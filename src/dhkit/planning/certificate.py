@@ -15,7 +15,7 @@ from dhkit.planning.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance,
 from dhkit.planning.constraints import Constraint
 from dhkit.planning.joint_limits import Limit, PositionLimit
 from dhkit.planning.loaded import LoadedArm, loaded
-from dhkit.planning.obstacles import Scene
+from dhkit.planning.obstacles import Scene, not_checked
 from dhkit.planning.second_check import Recheck, recheck
 from dhkit.planning.states import States
 from dhkit.symbolic import Friction
@@ -82,6 +82,8 @@ class Certificate:
     """Share of time for which at least one joint is at a limit."""
     sampled: tuple[str, ...] = ()
     """Limits of which nothing is proved between the states."""
+    not_checked: tuple[str, ...] = ()
+    """What nothing is known of: torques of links without a body, and distances that were not measured."""
     independent: Recheck | None = None
     """Result of the second check; None unless asked for."""
 
@@ -139,7 +141,8 @@ class Certificate:
         else:
             kept = f"refuted by the second check: {self.independent}"
         only = f"; not proved between them: {', '.join(self.sampled)}" if self.sampled else ""
-        return f"{kept}, in {self.states} states by {self.reference}{only}"
+        left_out = f"; not checked: {'; '.join(self.not_checked)}" if self.not_checked else ""
+        return f"{kept}, in {self.states} states by {self.reference}{only}{left_out}"
 
 
 @takes_robot
@@ -209,11 +212,23 @@ def certify(
     if avoidance:
         avoidance = avoidance.between(description, motion.q(0.0), motion.q(motion.duration))
     checker = Checker(loaded(description, carried), limits, friction=chosen, avoidance=avoidance, points=points)
-    certificate = checker.check(motion)
+    certificate = replace(checker.check(motion), not_checked=_not_checked(description, limits, avoidance))
     if not independent:
         return certificate
     claims = avoidance.claims(description) if avoidance else ()
     return replace(certificate, independent=recheck(description, motion, limits, carried, chosen, claims))
+
+
+def _not_checked(description: Description, limits: Limits, avoidance: CollisionAvoidance) -> tuple[str, ...]:
+    """Return what a certificate says nothing of although the robot has such limits, or the motion such obstacles."""
+    bare = [joint.name for joint in description.joints if not joint.bodies]
+    has_efforts = bool(np.isfinite(description.numbers.effort).any())
+    found: list[str] = []
+    if bare and has_efforts and not np.isfinite(limits.torque).any():
+        found.append(f"torques, as the links of {', '.join(bare)} have no body")
+    if avoidance:
+        found += not_checked(description, avoidance.obstacles, avoidance.self_collision, avoidance.clearance)
+    return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)

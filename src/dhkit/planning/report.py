@@ -98,7 +98,7 @@ class PlanReport:
     coordinates: tuple[str, ...] = ()
     """Coordinates of the places' poses that counted; empty if all did."""
     not_checked: tuple[str, ...] = ()
-    """What no distance was measured of: links without a shape, and links that overlap in all configurations."""
+    """What no distance was measured of: links without a shape, and what overlaps in all sampled configurations."""
     is_clearance_reduced_throughout: bool = False
     """Whether it is reduced to them during the whole motion: none was found that keeps the clearance farther away."""
 

@@ -39,7 +39,8 @@ class Distances:
     itself: Array
     """Smallest distance between two links, shape (...), m; inf unless requested."""
     not_checked: tuple[str, ...] = ()
-    """What the distances do not include: links without a shape, and links that overlap in all configurations."""
+    """What the distances do not include: links without a shape, what overlaps in all sampled
+    configurations, and parts whose distance no motion changes."""
 
     def __repr__(self) -> str:
         if self.pair is None:
@@ -149,13 +150,13 @@ def not_checked(
     for obstacle in obstacles:
         for link, gap in standing(description, obstacle):
             if gap < nearer_than:
-                state = f"{1000 * gap:.3g} mm apart" if gap > 0 else "which overlap"
-                words.append(f"part of {link_name(link)} and {obstacle.name}, {state} in all configurations")
+                state = f"{1000 * gap:.3g} mm apart in all" if gap > 0 else "which overlap in all sampled"
+                words.append(f"part of {link_name(link)} and {obstacle.name}, {state} configurations")
     for a, b, gap in link_pairs(description).steady if self_collision else ():
         if gap < nearer_than:
             words.append(f"parts of {link_name(a)} and {link_name(b)}, {1000 * gap:.3g} mm apart in all configurations")
     if self_collision and (overlapping := link_pairs(description).unchecked_text):
-        words.append(f"{overlapping}, which overlap in all configurations")
+        words.append(f"{overlapping}, which overlap in all sampled configurations")
     return tuple(words)
 
 

@@ -86,7 +86,7 @@ class LinkPairs:
     shapes: tuple[tuple[int, int], ...]
     """Pairs of links whose shapes are checked against each other."""
     unchecked: tuple[tuple[int, int], ...]
-    """Pairs of links that overlap in all configurations."""
+    """Pairs of links whose shapes overlap in all sampled configurations."""
     steady: tuple[SteadyPair, ...] = ()
     """Pairs of links, connected by no joint, with capsules whose distance no motion changes: they are not checked."""
 
