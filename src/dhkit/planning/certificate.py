@@ -410,8 +410,9 @@ def _proved_check(motion: Trajectory, limits: Limits, kind: Limit) -> Check:
         lower = -upper
     highest, at_highest = pieces.largest(PROVED * size)
     lowest, at_lowest = replace(pieces, coefficients=-pieces.coefficients).largest(PROVED * size)
-    above, below = (highest - upper) / size, (lowest + lower) / size
-    excess = np.where(np.isfinite(size), np.maximum(above, below), -1.0)
+    unit = np.where(np.isfinite(size), size, 1.0)  # joints without a limit: -inf
+    above, below = (highest - upper) / unit, (lowest + lower) / unit
+    excess = np.maximum(above, below)
     i = int(np.argmax(excess))
     time = at_highest[i] if above[i] >= below[i] else at_lowest[i]
     return Check(kind.what, float(excess[i]), i, float(time), limit=kind)
