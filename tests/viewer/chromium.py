@@ -214,9 +214,8 @@ class Page(Connection):
 
     def images_have_failed(self) -> None:
         """Wait until an image without content has called its handler: handlers of those before it were called too."""
-        self.evaluate(
-            "new Promise(done => { const image = new Image(); image.onerror = done; image.src = 'data:image/png,none'; })"
-        )
+        broken = "image.src = 'data:image/png,none'"
+        self.evaluate(f"new Promise(done => {{ const image = new Image(); image.onerror = done; {broken}; }})")
 
     def press(self, key: str, modifiers: int = 0) -> None:
         """Press and release a key; modifiers: 1 Alt, 2 Control, 8 Shift."""
