@@ -15,6 +15,8 @@ from dhkit import Arm, Limits, Trajectory
 from dhkit.description import from_dh
 from dhkit.expressions import exact
 from dhkit.planning import Payload, certify
+from dhkit.planning.certificate import _proved_check
+from dhkit.planning.joint_limits import Limit
 
 
 def test_a_motion_is_certified_against_the_arms_limits_or_others():
@@ -29,6 +31,15 @@ def test_a_motion_is_certified_against_the_arms_limits_or_others():
     assert certificate.worst.what == "velocity"
     assert certificate.violation == pytest.approx(1.0, rel=1e-3)
     assert arm.certify(motion, Limits.of(arm.description, jerk=1e-3)).worst.what == "jerk"
+
+
+def test_a_polynomial_that_overflows_is_not_certified():
+    limits = Limits([-3.0], [3.0], *([np.inf],) * 4)
+    arm = dhkit.Arm.from_dh([(0, 0, 1, 0)])
+    motion = Trajectory(arm.description, [0, 1e3], [[[0.0], [1e306], [-1e306], [1e303]]])
+    with np.errstate(all="ignore"):
+        check = _proved_check(motion, limits, Limit.POSITION)
+    assert check.excess == np.inf
 
 
 def test_what_is_not_checked_is_said():

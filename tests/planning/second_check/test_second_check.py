@@ -16,7 +16,7 @@ from planning.second_check.random_motions import KINDS, random_case
 
 
 def test_no_certificate_is_refuted(law, tmp_path):
-    """Of random motions whose limits and clearances are the smallest that a certificate accepts, or with room."""
+    """Of random motions with limits and clearances that a certificate just accepts, or with room."""
     certified = 0
     count = law.samples(1000, least=len(KINDS))
     for k in range(count):
@@ -95,8 +95,8 @@ def test_a_jump_is_refuted(puma):
 FREE = {"velocity": np.inf, "torque": np.inf}
 
 
-def test_a_ball_that_is_passed_between_two_states_is_found(puma):
-    """A needle, 1 mm thick, where link 3 passes in one of 5,000 parts of its way."""
+def test_a_needle_that_is_passed_between_two_states_is_found(puma):
+    """It is 1 mm thick, and stands where link 3 passes in a small part of its way."""
     motion = puma.quintic([-1.5, -0.5, 0, 0, 0, 0], [1.5, -0.5, 0, 0, 0, 0], duration=0.2)
     at = motion.q(0.1317)
     reach = puma.frames(at)[..., 3, :3, 3]
