@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 import dhkit
-from dhkit.description import asset, pose
+from dhkit.description import asset, library_robot, pose, robots
 from dhkit.errors import PlanningError
 from dhkit.model.shapes import link_parts
 from dhkit.planning import Obstacle
@@ -90,6 +90,28 @@ def test_links_of_a_locked_arm_are_where_they_were(name, locked):
 
     assert np.abs(centres(arm, q[free]) - centres(whole, q)).max() < 1e-8
     assert not arm.description.drawn
+
+
+@pytest.mark.parametrize("name", [name for name in robots() if library_robot(name).n > 2])
+def test_distances_of_a_locked_arm_from_obstacles_are_those_of_the_whole_arm(tmp_path, name):
+    """Random joints are held at random values; the robot file of the locked arm says the same."""
+    whole = dhkit.Arm.load(name)
+    rng = np.random.default_rng(robots().index(name))
+    lower = whole.limits.lower.clip(-np.pi)
+    upper = whole.limits.upper.clip(None, np.pi)
+    obstacles = [
+        Obstacle.sphere(0.05 * whole.description.reach, tuple(whole.fk(rng.uniform(lower, upper))[:3, 3]), name=f"{k}")
+        for k in range(3)
+    ]
+    held = np.sort(rng.permutation(whole.n)[: rng.integers(1, whole.n - 1)])
+    q = rng.uniform(lower, upper, (40, whole.n))
+    q[:, held] = q[0, held]
+    locked = whole.lock({int(joint): float(q[0, joint]) for joint in held})
+    expected = whole.distance(q, obstacles).per_obstacle
+    locked.save(tmp_path / "locked.toml")
+    for arm in (locked, dhkit.Arm.load(tmp_path / "locked.toml")):
+        found = arm.distance(np.delete(q, held, axis=1), obstacles).per_obstacle
+        assert np.abs(found - expected).max() < 1e-9
 
 
 @pytest.mark.parametrize("name", ["al5d", "cobra600", "pan_tilt"])

@@ -292,7 +292,7 @@ def _moved_bodies(bodies: LinkBodies, T: ExactPose) -> LinkBodies:
 
 
 def _moved_shapes(shapes: tuple[Shape, ...], T: ExactPose) -> tuple[Shape, ...]:
-    return tuple(replace(shape, placement=moved(shape.placement, T)) for shape in shapes)
+    return tuple(replace(shape, frame=moved(shape.frame, T)) for shape in shapes)
 
 
 def _screw_about_axis(joint: Joint, angle: Expression, shift: Expression) -> Joint:

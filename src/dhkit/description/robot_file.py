@@ -40,6 +40,7 @@ if TYPE_CHECKING:
         CouplingForm,
         DriveForm,
         Entry,
+        FrameForm,
         JointForm,
         RobotForm,
         ShapeForm,
@@ -150,7 +151,7 @@ class _FormReader:
         x, y, z = (self.number(f"{where}[{i}]", entry, unit) for i, entry in enumerate(entries))
         return x, y, z
 
-    def placement(self, where: str, form: ToolForm | ShapeForm) -> Placement:
+    def placement(self, where: str, form: ToolForm | ShapeForm | FrameForm) -> Placement:
         roll, pitch, yaw = (self.angle(f"{where}: rpy[{i}]", entry) for i, entry in enumerate(form.rpy))
         return Placement(self.vector(f"{where}: xyz", form.xyz, self.units.metres), (roll, pitch, yaw))
 
@@ -213,7 +214,8 @@ class _FormReader:
 
     def shape(self, where: str, form: ShapeForm) -> Shape:
         placement = self.placement(where, form)
-        return Shape(self.geometry(where, form), placement, form.color)
+        frame = self.placement(f"{where}.frame", form.frame)
+        return Shape(self.geometry(where, form), placement, form.color, frame)
 
     def geometry(self, where: str, form: ShapeForm) -> Geometry:
         if form.mesh is not None:

@@ -171,8 +171,15 @@ class BallForm(Form):
     radius: Number
 
 
+class FrameForm(Form):
+    """The DH frame of a link that was locked to another, in the DH frame of that one."""
+
+    xyz: Triple = Field(default=[0, 0, 0])
+    rpy: Triple = Field(default=[0, 0, 0])
+
+
 class ShapeForm(Form):
-    """One of mesh, box, cylinder, capsule and sphere, placed in the link's DH frame."""
+    """One of mesh, box, cylinder, capsule and sphere, placed in the link's DH frame, or in ``frame``."""
 
     mesh: Text | None = None
     scale: Annotated[Triple, BeforeValidator(_one_or_three), _AlsoTakes(lambda _: NUMBER)] = [1, 1, 1]
@@ -182,6 +189,7 @@ class ShapeForm(Form):
     sphere: BallForm | None = None
     xyz: Triple = Field(default=[0, 0, 0])
     rpy: Triple = Field(default=[0, 0, 0])
+    frame: FrameForm = Field(default=FrameForm())
     color: Text | None = None
 
     @model_validator(mode="after")

@@ -251,6 +251,7 @@ def _check_shapes(shapes: tuple[Shape, ...], where: str, value: Value, descripti
         raise DescriptionError(f"{where}: {len(shapes)} shapes; expected at most {MAX_SHAPES}")
     for shape in shapes:
         _check_placement(shape.placement, f"{where}: shape.", value)
+        _check_placement(shape.frame, f"{where}: shape.frame.", value)
         if shape.color is not None and not COLOR.fullmatch(shape.color):
             raise DescriptionError(f"{where}: shape.color is {shape.color[:80]!r}; expected '#rrggbb'")
         if isinstance(shape.geometry, Mesh):

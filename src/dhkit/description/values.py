@@ -161,12 +161,16 @@ Geometry: TypeAlias = Mesh | Box | Cylinder | Capsule | Sphere
 
 @dataclass(frozen=True)
 class Shape:
-    """Geometry of a link for drawings and collisions, in the link's own DH frame."""
+    """Geometry of a link for drawings and collisions."""
 
     geometry: Geometry
     placement: Placement = Placement()
+    """Its pose in ``frame``."""
     color: str | None = None
     """``#rrggbb``."""
+    frame: Placement = Placement()
+    """Pose of that frame in the link's DH frame. It is the same frame, but for shapes of a link that was locked to this
+    one: they keep their own frame, and remain one body."""
 
     def __repr__(self) -> str:
         color = "" if self.color is None else f", {self.color}"

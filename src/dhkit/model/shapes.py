@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
@@ -17,6 +17,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from dhkit.cached_property import cached_property
 from dhkit.description import Array, Box, Convention, Cylinder, Description, Geometry, Mesh, Shape, Sphere, takes_robot
 from dhkit.description.assets import inside
 from dhkit.description.changes import placement_of_pose
@@ -72,12 +73,22 @@ class Part:
     """The DH frame that it is fixed to: 0 (the base) to n."""
     geometry: Geometry
     """Sizes in m, numbers without parameters; cylinders and capsules lie along z, centred."""
-    T_link_part: Array
-    """The solid in DH frame ``link``, shape (4, 4), m."""
+    T_body_part: Array
+    """The solid in the frame of its body, shape (4, 4), m."""
     color: str
     """``#rrggbb``."""
     file: Path | None = None
     """The mesh's file; None for other geometry."""
+    body: int = 0
+    """Number of its body in the link, from 0: links that were locked together remain bodies of one link."""
+    T_link_body: Array = field(default_factory=lambda: np.eye(4))
+    """Frame of the body in DH frame ``link``, shape (4, 4), m: that of the link before it was locked."""
+
+    @cached_property
+    def T_link_part(self) -> Array:
+        """The solid in DH frame ``link``, shape (4, 4), m."""
+        T: Array = self.T_link_body @ self.T_body_part
+        return T
 
     def __repr__(self) -> str:
         return repr_line("Part", f"link {self.link}", f"{type(self.geometry).__name__.lower()}, {self.color}")
@@ -171,8 +182,8 @@ def _parts(description: Description) -> tuple[list[list[Part]], list[list[Part]]
     n, T_last_tool, arm = description.n, description.numbers.T_last_tool, _Drawing(description)
     colors = [BASE_COLOR, *(PALETTE[i % len(PALETTE)] for i in range(n))]
     own = (description.base.shapes, *(joint.shapes for joint in description.joints))
-    described = [_described_parts(description, shapes, i, IDENTITY, colors[i]) for i, shapes in enumerate(own)]
-    at_tool = _described_parts(description, description.tool.shapes, n, T_last_tool, BASE_COLOR)
+    described = [_described_parts(description, shapes, i, colors[i]) for i, shapes in enumerate(own)]
+    at_tool = _tool_parts(description, described[-1])
     if any(described) and not description.drawn:
         return [*described, at_tool], [[] for _ in range(n + 2)]
     drawn = [[] if parts else _drawn_parts(i, arm.link(i), colors[i]) for i, parts in enumerate(described)]
@@ -186,19 +197,35 @@ def _drawn_parts(link: int, solids: Iterable[Solid], color: str) -> list[Part]:
     return [Part(link, geometry, T, color) for geometry, T in solids]
 
 
-def _described_parts(
-    description: Description, shapes: Sequence[Shape], link: int, T_link_frame: Array, color: str
-) -> list[Part]:
-    """Return shapes in a frame of a link as parts; none if a mesh's file is missing."""
-    values, parts = resolved(description.parameters), []
+def _tool_parts(description: Description, last_link: Sequence[Part]) -> list[Part]:
+    """Return the tool's shapes as parts of the last body of the last link."""
+    n = description.n
+    T_last_tool = description.numbers.T_last_tool
+    in_tool = _described_parts(description, description.tool.shapes, n, BASE_COLOR)
+    body, T_link_body = (last_link[-1].body, last_link[-1].T_link_body) if last_link else (0, IDENTITY)
+    T_body_tool = T_last_tool if np.array_equal(T_link_body, IDENTITY) else np.linalg.solve(T_link_body, T_last_tool)
+    return [
+        replace(part, T_body_part=T_body_tool @ part.T_link_part, body=body, T_link_body=T_link_body)
+        for part in in_tool
+    ]
+
+
+def _described_parts(description: Description, shapes: Sequence[Shape], link: int, color: str) -> list[Part]:
+    """Return shapes of a link as parts; none if a mesh's file is missing."""
+    values = resolved(description.parameters)
+    frames = list(dict.fromkeys(shape.frame for shape in shapes))
+    poses = [matrix(frame, values) for frame in frames]
+    parts: list[Part] = []
     for shape in shapes:
         geometry, file = shape.geometry, None
         if isinstance(geometry, Mesh):
             file = inside(description.mesh_folder, geometry.path, "shape.mesh")
             if file is None or not is_mesh_file(file):
                 return []
-        T_link_part = T_link_frame @ matrix(shape.placement, values)
-        parts.append(Part(link, with_values(geometry, values), T_link_part, shape.color or color, file))
+        body = frames.index(shape.frame)
+        T_body_part = matrix(shape.placement, values)
+        color_of_part = shape.color or color
+        parts.append(Part(link, with_values(geometry, values), T_body_part, color_of_part, file, body, poses[body]))
     return parts
 
 

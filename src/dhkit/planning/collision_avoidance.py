@@ -20,6 +20,7 @@ from dhkit.planning.constraints import Constraint
 from dhkit.planning.joint_limits import joint_limits
 from dhkit.planning.obstacles import (
     Floor,
+    LinkBody,
     Obstacle,
     Pair,
     Scene,
@@ -28,7 +29,6 @@ from dhkit.planning.obstacles import (
     checked_pairs,
     distance,
     link_capsules,
-    link_name,
     link_pairs,
     not_checked,
     pair_distances,
@@ -72,12 +72,12 @@ class ReducedClearance:
 class LinkClearance:
     """Two links that are measured by their shapes, and the distance that they keep during a whole motion."""
 
-    links: tuple[int, int]
+    bodies: tuple[LinkBody, LinkBody]
     kept: float
     """Distance to keep, m: the clearance, or less where the links are nearer at the start or the goal."""
 
     def __str__(self) -> str:
-        first, second = (link_name(link) for link in self.links)
+        first, second = (body.name for body in self.bodies)
         return f"{1000 * self.kept:.3g} mm between {first} and {second}"
 
 
@@ -164,9 +164,9 @@ class CollisionAvoidance:
             reduced.append(ReducedClearance(pair, names, *(KEPT_SHARE * ends[:, p]).tolist()))
         at_ends = np.stack([start, goal])
         by_shapes = []
-        for links in link_pairs(description).shapes if self.self_collision else ():
-            gap = float(shape_distances(description, at_ends, links).min())
-            by_shapes.append(LinkClearance(links, self.clearance if gap >= self.clearance else KEPT_SHARE * gap))
+        for bodies in link_pairs(description).shapes if self.self_collision else ():
+            gap = float(shape_distances(description, at_ends, bodies).min())
+            by_shapes.append(LinkClearance(bodies, self.clearance if gap >= self.clearance else KEPT_SHARE * gap))
         return replace(self, reduced=tuple(reduced), by_shapes=tuple(by_shapes), ends=at_ends)
 
     def claims(self, description: Description) -> tuple[Claim, ...]:
@@ -187,7 +187,8 @@ class CollisionAvoidance:
                 place = min(link, other), max(link, other)
                 with_link[place] = min(gap, with_link.get(place, gap))
         for pair in self.by_shapes:
-            with_link[pair.links] = min(pair.kept, with_link.get(pair.links, pair.kept))
+            links = pair.bodies[0].link, pair.bodies[1].link
+            with_link[links] = min(pair.kept, with_link.get(links, pair.kept))
 
         claims = []
         for k, obstacle in enumerate(self.obstacles):
@@ -199,7 +200,8 @@ class CollisionAvoidance:
             ]
         if self.self_collision:
             pairs = link_pairs(description)
-            named = {*pairs.unchecked, *((a, b) for a, b, gap in pairs.steady if gap < self.clearance)}
+            named = {(a.link, b.link) for a, b in pairs.unchecked}
+            named |= {(a.link, b.link) for a, b, gap in pairs.steady if gap < self.clearance}
             claims += [
                 Claim(b, a, with_link.get((a, b), self.clearance))
                 for a, b in combinations(range(description.n + 1), 2)
@@ -285,7 +287,7 @@ class CollisionAvoidance:
 
         They are lower bounds where links are farther apart than they must be by ``more``, m.
         """
-        gaps = [shape_distances(description, q, pair.links, pair.kept + more) for pair in self.by_shapes]
+        gaps = [shape_distances(description, q, pair.bodies, pair.kept + more) for pair in self.by_shapes]
         return np.stack(gaps, axis=1) if gaps else np.zeros((len(q), 0))
 
     def keeps_shapes_apart(self, description: Description, q: Array) -> NDArray[np.bool_]:

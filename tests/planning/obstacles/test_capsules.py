@@ -111,8 +111,9 @@ def test_every_two_links_that_no_joint_connects_are_checked_or_named(name):
     assert not set(pairs.shapes) & set(pairs.unchecked)
     axes = world_axes(arm, np.random.default_rng(1).uniform(-np.pi, np.pi, (300, arm.n)))
     for i, j in combinations(range(len(capsules)), 2):
-        links = capsules[i].link, capsules[j].link
-        if links[1] - links[0] <= 1 or links in {*pairs.shapes, *pairs.unchecked} or (i, j) in pairs.capsules:
+        bodies = capsules[i].body, capsules[j].body
+        are_connected = bodies[1].link - bodies[0].link <= 1
+        if are_connected or bodies in {*pairs.shapes, *pairs.unchecked} or (i, j) in pairs.capsules:
             continue
         gaps = capsule_distances((capsules[i].radius, capsules[j].radius), axes[:, i], axes[:, j])
         assert gaps.min() > 0 and np.ptp(gaps) < 1.1e-3

@@ -9,7 +9,7 @@ from dhkit.description import Box, Capsule, Cylinder, Sphere, library_robot
 from dhkit.description.table_rows import from_dh
 from dhkit.model.mesh_reader import read_part
 from dhkit.model.shapes import link_parts, links_without_shapes
-from dhkit.planning.obstacles import distance, link_pairs, shape_distances
+from dhkit.planning.obstacles import LinkBody, distance, link_pairs, shape_distances
 from dhkit.planning.obstacles.solids import distance_request, signed_distance
 
 COAL = 1e-6
@@ -47,7 +47,8 @@ def test_shapes_are_as_far_apart_as_coal_says_at_pinocchios_poses(name, links):
     rng = np.random.default_rng(0)
     lower, upper = arm.limits.lower.clip(-np.pi), arm.limits.upper.clip(None, np.pi)
     q = rng.uniform(lower, upper, (20, arm.n))
-    found = shape_distances(arm.description, q, links)
+    bodies = tuple(LinkBody(link) for link in links)
+    found = shape_distances(arm.description, q, bodies)
     parts = link_parts(arm.description)
     for k, state in enumerate(q):
         frames, least = pinocchios_frames(arm, state), np.inf
@@ -67,7 +68,7 @@ def test_a_depth_that_coal_does_not_find_is_a_penetration():
     """al5d's base and upper arm are so placed at times."""
     arm = library_robot("al5d")
     q = np.random.default_rng(0).uniform(-1.5, 1.5, (200, 4))
-    found = shape_distances(arm, q, (0, 2))
+    found = shape_distances(arm, q, (LinkBody(0), LinkBody(2)))
     assert np.isfinite(found).all() and found.min() > -1.0
     one = coal.Cylinder(0.1, 0.2)
     place = coal.Transform3s()

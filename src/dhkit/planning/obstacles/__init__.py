@@ -1,6 +1,6 @@
 """Obstacles: scenes, capsules around links, exact distances, separating planes, and sampled paths."""
 
-from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, link_name, world_axes
+from dhkit.planning.obstacles.capsules import LinkBody, LinkCapsule, link_capsules, link_name, world_axes
 from dhkit.planning.obstacles.clearance import Distances, distance, not_checked, pair_distances, smallest_distances
 from dhkit.planning.obstacles.link_shapes import shape_distances
 from dhkit.planning.obstacles.pairs import CheckedPairs, LinkPairs, Pair, checked_pairs, link_pairs, standing
@@ -13,6 +13,7 @@ __all__ = [
     "Distances",
     "Floor",
     "Gaps",
+    "LinkBody",
     "LinkCapsule",
     "LinkPairs",
     "Obstacle",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,23 +23,42 @@ RIM_CORNERS = 24
 """Number of corners of the polygon around a cylinder's rim, which is 0.9 % wider than the rim."""
 
 
+class LinkBody(NamedTuple):
+    """A rigid body of a link; a link is one body, but links that were locked together are several."""
+
+    link: int
+    """Index of the link, 0 (the base) to n."""
+    number: int = 0
+    """Number of the body in the link, from 0, along the chain."""
+
+    @property
+    def name(self) -> str:
+        """Name of its link."""
+        return link_name(self.link)
+
+
 @dataclass(frozen=True, eq=False)
 class LinkCapsule:
     """A cylinder with half balls on its ends that moves with a link; a ball if start and end coincide."""
 
-    link: int
-    """Index of the DH frame it is fixed to: 0 (the base) to n."""
+    body: LinkBody
+    """The body around which it lies."""
     start: Array
-    """Centre of the half ball at one end, in that frame, shape (3,), m."""
+    """Centre of the half ball at one end, in the link's DH frame, shape (3,), m."""
     end: Array
     """Centre of the half ball at the other end, likewise."""
     radius: float
     """Radius, m."""
 
     @property
+    def link(self) -> int:
+        """Index of the link, whose DH frame it is fixed to: 0 (the base) to n."""
+        return self.body.link
+
+    @property
     def name(self) -> str:
         """Name of its link."""
-        return link_name(self.link)
+        return self.body.name
 
     @property
     def length(self) -> float:
@@ -52,10 +72,11 @@ def link_name(link: int) -> str:
 
 
 def link_capsules(description: Description) -> tuple[LinkCapsule, ...]:
-    """Return capsules that contain all that :func:`dhkit.model.shapes.link_parts` draws, at most two a link.
+    """Return capsules that contain all that :func:`dhkit.model.shapes.link_parts` draws, at most two a body.
 
-    The solids of a link are merged into two groups, beginning with the pair whose common capsule is least larger than
-    their own; into one group if its capsule is hardly larger.
+    A link is one body; links that were locked together are several. The solids of a body are merged into two groups,
+    beginning with the pair whose common capsule is least larger than their own; into one group if its capsule is
+    hardly larger.
 
     Raises
     ------
@@ -94,16 +115,19 @@ def world_axes(description: Description, q: ArrayLike) -> Array:
 
 @lru_cache(maxsize=64)
 def _link_capsules(description: Description, meshes: MeshVersions) -> tuple[LinkCapsule, ...]:
-    parts: dict[int, list[Balls]] = {}
+    bodies: dict[LinkBody, list[Part]] = {}
     for part in link_parts(description):
-        parts.setdefault(part.link, []).append(_balls(part))
+        bodies.setdefault(LinkBody(part.link, part.body), []).append(part)
     capsules = []
-    for link, groups in sorted(parts.items()):
-        for group in _merge_groups(groups):
+    for body, parts in sorted(bodies.items()):
+        T = parts[0].T_link_body
+        for group in _merge_groups([_balls(part) for part in parts]):
+            # In the body's own frame, so that the capsules of a link stay the same when it is locked to another.
             fit = refine(group)
-            for end in (fit.start, fit.end):
-                end.setflags(write=False)
-            capsules.append(LinkCapsule(link, fit.start, fit.end, fit.radius))
+            start, end = (T[:3, :3] @ point + T[:3, 3] for point in (fit.start, fit.end))
+            for point in (start, end):
+                point.setflags(write=False)
+            capsules.append(LinkCapsule(body, start, end, fit.radius))
     return tuple(capsules)
 
 
@@ -134,7 +158,7 @@ def _merge(groups: list[Balls], members: frozenset[int]) -> Balls:
 
 
 def _balls(part: Part) -> Balls:
-    """Return balls in the link's frame whose convex hull contains a part."""
+    """Return balls in the body's frame whose convex hull contains a part."""
     match part.geometry:
         case Sphere(radius):
             local, radii = np.zeros((1, 3)), float(radius)
@@ -147,7 +171,7 @@ def _balls(part: Part) -> Balls:
             local, radii = corners * [float(edge) for edge in size], 0.0
         case _:
             local, radii = convex_hull(part)[0], 0.0
-    R, t = part.T_link_part[:3, :3], part.T_link_part[:3, 3]
+    R, t = part.T_body_part[:3, :3], part.T_body_part[:3, 3]
     return Balls(local @ R.T + t, np.full(len(local), radii))
 
 

@@ -13,7 +13,7 @@ from dhkit.display import counted, repr_line
 from dhkit.model.shapes import links_without_shapes
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, link_name, world_axes
 from dhkit.planning.obstacles.link_shapes import shape_distances
-from dhkit.planning.obstacles.pairs import Pair, capsules_beside, ends_above, link_pairs, standing
+from dhkit.planning.obstacles.pairs import Pair, capsules_beside, ends_above, link_pairs, pair_text, standing
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
 from dhkit.planning.obstacles.segments import Bounds, axis_bounds, segment_distances
 from dhkit.planning.obstacles.solid_arrays import Solids
@@ -107,7 +107,7 @@ def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self
         for a, b in pairs.shapes:
             gaps = shape_distances(description, rows[finite], (a, b))
             found.append((gaps, np.zeros(len(gaps), dtype=int)))
-            names.append([(link_name(a), link_name(b))])
+            names.append([(a.name, b.name)])
         itself = np.min([gaps for gaps, _ in found[len(obstacles) :]], axis=0)
     every = np.stack([gaps for gaps, _ in found], axis=-1) if found else np.full((len(axes), 1), np.inf)
 
@@ -154,7 +154,7 @@ def not_checked(
                 words.append(f"part of {link_name(link)} and {obstacle.name}, {state} configurations")
     for a, b, gap in link_pairs(description).steady if self_collision else ():
         if gap < nearer_than:
-            words.append(f"parts of {link_name(a)} and {link_name(b)}, {1000 * gap:.3g} mm apart in all configurations")
+            words.append(f"parts of {pair_text(a, b)}, {1000 * gap:.3g} mm apart in all configurations")
     if self_collision and (overlapping := link_pairs(description).unchecked_text):
         words.append(f"{overlapping}, which overlap in all sampled configurations")
     return tuple(words)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array, Box, Capsule, Cylinder, Description, Sphere, world_to_frames
 from dhkit.model.shapes import MeshVersions, Part, link_parts, mesh_versions
-from dhkit.planning.obstacles.capsules import convex_hull
+from dhkit.planning.obstacles.capsules import LinkBody, convex_hull
 from dhkit.planning.obstacles.solids import coal_module, distance_request, signed_distance
 
 SHORT = 1e-12
@@ -32,8 +32,10 @@ class _Solid:
     """Support function: the largest n . x of its points x, m, for unit vectors n in its frame, shape (..., 3)."""
 
 
-def shape_distances(description: Description, q: Array, links: tuple[int, int], enough: float = np.inf) -> Array:
-    """Return the signed distances between the shapes of two links, shape (N,), m; inf if one of them has none.
+def shape_distances(
+    description: Description, q: Array, bodies: tuple[LinkBody, LinkBody], enough: float = np.inf
+) -> Array:
+    """Return the signed distances between the shapes of two bodies of links, shape (N,), m; inf if one has none.
 
     Boxes, spheres, cylinders and capsules are exact; a mesh counts as its convex hull.
 
@@ -41,8 +43,8 @@ def shape_distances(description: Description, q: Array, links: tuple[int, int], 
     ----------
     q
         Joint values, shape (N, n), rad and m.
-    links
-        Indices of the two links, 0 (the base) to n.
+    bodies
+        The two bodies.
     enough
         Distance, m, from which a lower bound of the distance is returned in its place: it takes 2 µs a state, and the
         distance itself 50 µs.
@@ -57,9 +59,9 @@ def shape_distances(description: Description, q: Array, links: tuple[int, int], 
     least = np.full(len(q), np.inf)
     coal = coal_module()
     request, result = distance_request(), coal.DistanceResult()
-    for first, second in product(*(solids.get(link, ()) for link in links)):
-        T1 = frames[:, links[0]] @ first.T_link_solid
-        T2 = frames[:, links[1]] @ second.T_link_solid
+    for first, second in product(*(solids.get(body, ()) for body in bodies)):
+        T1 = frames[:, bodies[0].link] @ first.T_link_solid
+        T2 = frames[:, bodies[1].link] @ second.T_link_solid
         bound = _separation(first, T1, second, T2)
         decided = bound >= np.minimum(least, enough)
         least[decided] = np.minimum(least, bound)[decided]
@@ -105,11 +107,12 @@ def _separation(first: _Solid, T1: Array, second: _Solid, T2: Array) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _solids(description: Description, meshes: MeshVersions) -> dict[int, tuple[_Solid, ...]]:
-    """Return the solids of each link that has any."""
-    found: dict[int, tuple[_Solid, ...]] = {}
+def _solids(description: Description, meshes: MeshVersions) -> dict[LinkBody, tuple[_Solid, ...]]:
+    """Return the solids of each body that has any."""
+    found: dict[LinkBody, tuple[_Solid, ...]] = {}
     for part in link_parts(description):
-        found[part.link] = (*found.get(part.link, ()), _solid(part))
+        body = LinkBody(part.link, part.body)
+        found[body] = (*found.get(body, ()), _solid(part))
     return found
 
 

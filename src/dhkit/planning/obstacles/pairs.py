@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dhkit.description import Array, Description, world_to_frames
+from dhkit.description import Array, Convention, Description, world_to_frames
 from dhkit.description.frames import carrying
-from dhkit.model.shapes import MeshVersions, mesh_versions
-from dhkit.planning.obstacles.capsules import link_capsules, link_name, world_axes
+from dhkit.model.shapes import MeshVersions, link_parts, mesh_versions
+from dhkit.planning.obstacles.capsules import LinkBody, link_capsules, world_axes
 from dhkit.planning.obstacles.link_shapes import shape_distances
 from dhkit.planning.obstacles.scene import Floor, Obstacle
 from dhkit.planning.obstacles.segments import segment_distances
@@ -37,6 +37,8 @@ STILL = 1e-9
 """Largest travel, as a share of the size of the space in which the links move, that is rounding."""
 STANDING_SAMPLES = 400
 """Number of configurations in which an arm that stands in an obstacle overlaps it."""
+FOOT = LinkBody(0)
+"""The base itself, without links that were locked to it."""
 MAX_OBSTACLES = 65_536
 """Number of obstacles whose capsules are remembered; of more, every call would find them anew."""
 
@@ -47,6 +49,7 @@ class CheckedPairs:
 
     - Obstacles: capsules with an end that moves; so never the base's, nor a shoulder's that turns about its own axis.
     - Floor: ends whose height changes.
+    - Links that were locked to the base move as if their joints still turned.
 
     Determined from 4,000 random configurations within the limits (unlimited joints: pi, or the reach, each way).
     """
@@ -60,10 +63,10 @@ class CheckedPairs:
 
 
 class SteadyPair(NamedTuple):
-    """Two links, and the smallest distance of capsules of theirs that no motion changes, m."""
+    """Two bodies of links, and the smallest distance of capsules of theirs that no motion changes, m."""
 
-    first: int
-    second: int
+    first: LinkBody
+    second: LinkBody
     distance: float
 
 
@@ -79,13 +82,14 @@ class LinkPairs:
       configurations, they are checked like the others.
     - Other links whose shapes overlap in all of these 200 are not checked, such as those of a spherical wrist whose
       drums are drawn about one point. Reports name them.
+    - Links that were locked together count as links of their own.
     """
 
     capsules: tuple[tuple[int, int], ...]
     """Pairs of capsules that are checked against each other."""
-    shapes: tuple[tuple[int, int], ...]
+    shapes: tuple[tuple[LinkBody, LinkBody], ...]
     """Pairs of links whose shapes are checked against each other."""
-    unchecked: tuple[tuple[int, int], ...]
+    unchecked: tuple[tuple[LinkBody, LinkBody], ...]
     """Pairs of links whose shapes overlap in all sampled configurations."""
     steady: tuple[SteadyPair, ...] = ()
     """Pairs of links, connected by no joint, with capsules whose distance no motion changes: they are not checked."""
@@ -93,7 +97,14 @@ class LinkPairs:
     @property
     def unchecked_text(self) -> str:
         """The links that are not checked, as text; empty if all are."""
-        return ", ".join(f"{link_name(a)} and {link_name(b)}" for a, b in self.unchecked)
+        return ", ".join(dict.fromkeys(pair_text(a, b) for a, b in self.unchecked))
+
+
+def pair_text(first: LinkBody, second: LinkBody) -> str:
+    """Return two bodies of links, as text."""
+    if first.link == second.link:
+        return f"links that are locked together as {first.name}"
+    return f"{first.name} and {second.name}"
 
 
 class Pair(NamedTuple):
@@ -115,7 +126,7 @@ def checked_pairs(description: Description) -> CheckedPairs:
 
 @lru_cache(maxsize=64)
 def _checked_pairs(description: Description, meshes: MeshVersions) -> CheckedPairs:
-    axes = world_axes(description, _configurations(description))
+    axes = _sampled_axes(description)
     if not axes.shape[1]:
         return CheckedPairs((), (), 0.0)
     size = float(np.ptp(axes.reshape(-1, 3), axis=0).max())
@@ -144,19 +155,21 @@ def _link_pairs(description: Description, meshes: MeshVersions) -> LinkPairs:
     capsules = link_capsules(description)
     q = _configurations(description)
     axes = world_axes(description, q)
-    of_link: dict[int, list[int]] = {}
+    of_body: dict[LinkBody, list[int]] = {}
     for i, capsule in enumerate(capsules):
-        of_link.setdefault(capsule.link, []).append(i)
+        of_body.setdefault(capsule.body, []).append(i)
+    order = _chain_order(description)
 
     checked: list[tuple[int, int]] = []
-    shapes: list[tuple[int, int]] = []
-    unchecked: list[tuple[int, int]] = []
+    shapes: list[tuple[LinkBody, LinkBody]] = []
+    unchecked: list[tuple[LinkBody, LinkBody]] = []
     steady: list[SteadyPair] = []
-    for a, b in combinations(sorted(of_link), 2):
+    for a, b in combinations(sorted(of_body), 2):
+        are_connected = order[b] - order[a] == 1
         narrow: list[tuple[int, int]] = []
         has_wide = False
         same = np.inf
-        for i, j in product(of_link[a], of_link[b]):
+        for i, j in product(of_body[a], of_body[b]):
             gap = segment_distances(axes[:, i], axes[:, j]) - capsules[i].radius - capsules[j].radius
             if np.mean(gap < 0) > OVERLAP_SHARE:
                 has_wide = True
@@ -165,17 +178,50 @@ def _link_pairs(description: Description, meshes: MeshVersions) -> LinkPairs:
             else:
                 same = min(same, float(gap.min()))
         overlaps = has_wide and bool((shape_distances(description, q[:SHAPE_SAMPLES], (a, b), enough=0.0) < 0).all())
-        touches_by_construction = overlaps and b - a == 1
+        touches_by_construction = overlaps and are_connected
         if touches_by_construction:
             continue
         checked += narrow
-        if b - a > 1 and np.isfinite(same):
+        if not are_connected and np.isfinite(same):
             steady.append(SteadyPair(a, b, same))
         if overlaps:
             unchecked.append((a, b))
         elif has_wide:
             shapes.append((a, b))
     return LinkPairs(tuple(checked), tuple(shapes), tuple(unchecked), tuple(steady))
+
+
+def _chain_order(description: Description) -> dict[LinkBody, int]:
+    """Return the place of each body along the chain, from 0: a joint, moving or locked, connects neighbours."""
+    numbers: dict[int, int] = {}
+    for capsule in link_capsules(description):
+        numbers[capsule.link] = max(capsule.body.number, numbers.get(capsule.link, 0))
+    bodies = [LinkBody(link, k) for link in range(description.n + 1) for k in range(numbers.get(link, 0) + 1)]
+    return {body: place for place, body in enumerate(bodies)}
+
+
+def _sampled_axes(description: Description, count: int = SAMPLES) -> Array:
+    """Return the axes of capsules in random configurations, shape (count, m, 2, 3), m.
+
+    Joints that were locked to the base turn too, and count as joints that turn if they slid: so what moves beside an
+    obstacle is the same in a locked arm and in the whole arm.
+    """
+    from scipy.spatial.transform import Rotation
+
+    axes = world_axes(description, _configurations(description)[:count]).copy()
+    T_world_base = description.numbers.T_world_base
+    frames = {part.body: T_world_base @ part.T_link_body for part in link_parts(description) if part.link == 0}
+    bodies = [capsule.body for capsule in link_capsules(description)]
+    rng = np.random.default_rng(SEED)
+    for joint in range(max(frames, default=0), 0, -1):
+        # Joint k turns about z of frame k - 1, in the modified convention about z of frame k.
+        T = frames.get(joint - 1 if description.convention is Convention.STANDARD else joint)
+        if T is not None:
+            carried = [i for i, body in enumerate(bodies) if body.link > 0 or body.number >= joint]
+            turns = rng.uniform(-np.pi, np.pi, len(axes))
+            R = Rotation.from_rotvec(np.outer(turns, T[:3, 2])).as_matrix()
+            axes[:, carried] = (axes[:, carried] - T[:3, 3]) @ np.swapaxes(R, -1, -2)[:, None] + T[:3, 3]
+    return axes
 
 
 def _always_apart(description: Description, i: int, j: int) -> bool:
@@ -192,6 +238,8 @@ def _always_apart(description: Description, i: int, j: int) -> bool:
     inner, outer = capsules[i].link, capsules[j].link
     numbers = description.numbers
     joints = range(inner, outer)
+    if not joints:
+        return True  # locked together: not even one configuration differs from another
     if len(joints) > MOST_JOINTS or numbers.prismatic[inner:outer].any():
         return False
     values = np.linspace(-np.pi, np.pi, GRID, endpoint=False)
@@ -220,7 +268,7 @@ def capsules_beside(description: Description, obstacle: Obstacle) -> tuple[int, 
 @lru_cache(maxsize=MAX_OBSTACLES)
 def _capsules_beside(description: Description, meshes: MeshVersions, obstacle: Obstacle) -> tuple[int, ...]:
     capsules = link_capsules(description)
-    axes = world_axes(description, _configurations(description)[:STANDING_SAMPLES])
+    axes = _sampled_axes(description, STANDING_SAMPLES)
 
     def stands_in(i: int) -> bool:
         radius = capsules[i].radius
@@ -246,7 +294,7 @@ def ends_above(description: Description, height: float) -> tuple[tuple[int, int]
 @lru_cache(maxsize=256)
 def _ends_above(description: Description, meshes: MeshVersions, height: float) -> tuple[tuple[int, int], ...]:
     capsules = link_capsules(description)
-    axes = world_axes(description, _configurations(description)[:STANDING_SAMPLES])
+    axes = _sampled_axes(description, STANDING_SAMPLES)
 
     def stands_in(i: int, end: int) -> bool:
         radius, lowest = capsules[i].radius, axes[:, i, end, 2]
@@ -289,7 +337,7 @@ def _standing(description: Description, meshes: MeshVersions, obstacle: Obstacle
     else:
         beside = capsules_beside(description, obstacle)
         for i, capsule in enumerate(capsules):
-            if capsule.link and i not in beside:
+            if capsule.body != FOOT and i not in beside:
                 gap = float(obstacle_distances(capsule.radius, axes[:, i], obstacle).max())
                 found[capsule.link] = min(gap, found.get(capsule.link, gap))
     return tuple(Standing(link, gap) for link, gap in sorted(found.items()))
