@@ -389,7 +389,7 @@ def _points_of_turns(description: Description, motion: Trajectory) -> int:
     _, rates = motion.pieces.differentiated(1).inside(POINTS)
     turns = np.abs(rates).mean(axis=1) * np.diff(motion.breaks)[:, None]
     most = float(turns[:, ~description.numbers.prismatic].max(initial=0.0))
-    return min(int(most / LARGEST_TURN) + 2, MAX_POINTS)
+    return int(min(most / LARGEST_TURN + 2, MAX_POINTS))
 
 
 def _proved_check(motion: Trajectory, limits: Limits, kind: Limit) -> Check:
@@ -400,14 +400,14 @@ def _proved_check(motion: Trajectory, limits: Limits, kind: Limit) -> Check:
     else:
         upper = size = getattr(limits, kind.what)
         lower = -upper
-    highest, at_highest = pieces.largest(PROVED * size)
-    lowest, at_lowest = replace(pieces, coefficients=-pieces.coefficients).largest(PROVED * size)
+    found = pieces.bounds(PROVED * size)
     unit = np.where(np.isfinite(size), size, 1.0)  # joints without a limit: -inf
-    above, below = (highest - upper) / unit, (lowest + lower) / unit
+    above = (found.highest - upper) / unit
+    below = (lower - found.lowest) / unit
     excess = np.maximum(above, below)
     excess = np.where(np.isnan(excess), np.inf, excess)  # of polynomials that overflow: not kept
     i = int(np.argmax(excess))
-    time = at_highest[i] if above[i] >= below[i] else at_lowest[i]
+    time = found.at_highest[i] if above[i] >= below[i] else found.at_lowest[i]
     return Check(kind.what, float(excess[i]), i, float(time), limit=kind)
 
 

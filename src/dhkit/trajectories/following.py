@@ -14,7 +14,7 @@ from dhkit.errors import PlanningError
 from dhkit.kinematics import classify, freedoms, inverse_kinematics, jacobian, jacobian_dot, solve_numerically
 from dhkit.kinematics.newton import Newton
 from dhkit.trajectories.interpolation import quintic_hermite
-from dhkit.trajectories.limits import Limits
+from dhkit.trajectories.limits import Limits, farthest_outside
 from dhkit.trajectories.paths import JointPath
 from dhkit.trajectories.pieces import Pieces
 from dhkit.trajectories.timing import configuration
@@ -265,20 +265,17 @@ def _aims_position(description: Description) -> bool:
 
 
 def _require_inside(path: JointPath, limits: Limits) -> None:
-    s, q = path.pieces.extremes()
-    s, q = s.reshape(-1, q.shape[-1]), q.reshape(-1, q.shape[-1])
-    excess = np.maximum(limits.lower - q, q - limits.upper)
-    if excess.max() <= LIMIT_SLACK:
+    farthest = farthest_outside(limits, path.pieces)
+    if farthest.excess <= LIMIT_SLACK:
         return
-    i = int(np.argmax(excess.max(axis=0)))
-    row = int(np.argmax(excess[:, i]))
-    limit = limits.lower[i] if q[row, i] < limits.lower[i] else limits.upper[i]
+    i, q = farthest.joint, farthest.value
+    limit = limits.lower[i] if farthest.is_below else limits.upper[i]
     name = path.description.joints[i].name
     slides = bool(path.description.numbers.prismatic[i])
-    bound, found = joint_text(limit, slides=slides), joint_text(q[row, i], slides=slides)
+    bound, found = joint_text(limit, slides=slides), joint_text(q, slides=slides)
     raise PlanningError(
         f"{name} leaves its limit, {bound}, along the path: it comes to {found}"
-        f"{degrees_hint(q[row, i], slides=slides)} at s = {s[row, i]:.4g}"
+        f"{degrees_hint(q, slides=slides)} at s = {farthest.place:.4g}"
     )
 
 

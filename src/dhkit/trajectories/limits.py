@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,10 @@ from dhkit.description import Array, Robot, description_of
 from dhkit.description.arrays import number_array
 from dhkit.description.frames import one_each
 from dhkit.display import counted, html_table, repr_line
+from dhkit.trajectories.pieces import Pieces
+
+POSITION_ROUNDING = 1e-10
+"""Distance of a proved bound of joint values from values that are reached, rad and m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,3 +157,28 @@ class Limits:
 
 def _limit_text(limit: float) -> str:
     return f"{limit:.4g}" if np.isfinite(limit) else "unlimited"
+
+
+class Farthest(NamedTuple):
+    """The joint value of a motion or a path that is farthest outside its limits, or nearest to them."""
+
+    joint: int
+    excess: float
+    """Distance from the limit, rad or m; negative inside."""
+    is_below: bool
+    """Whether the limit is the lower one."""
+    value: float
+    """The joint value, rad or m."""
+    place: float
+    """Its time, s, or its place on a path."""
+
+
+def farthest_outside(limits: Limits, q: Pieces) -> Farthest:
+    """Return the joint value that is farthest outside its limits, of joint values as polynomials of n columns."""
+    found = q.bounds(POSITION_ROUNDING)
+    below = limits.lower - found.lowest
+    above = found.highest - limits.upper
+    i = int(np.argmax(np.maximum(below, above)))
+    if below[i] > above[i]:
+        return Farthest(i, float(below[i]), True, float(found.lowest[i]), float(found.at_lowest[i]))
+    return Farthest(i, float(above[i]), False, float(found.highest[i]), float(found.at_highest[i]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,8 +18,15 @@ Side: TypeAlias = Literal["right", "left"]
 """The piece that is evaluated at a break: the one that begins there (right) or ends there (left)."""
 MAX_HALVINGS = 60
 """Number of times that a piece is halved for a bound: from 2^-26 of a piece on, hulls are exact to rounding."""
-REFINEMENTS = 6
-"""Number of Newton steps to an extreme; from a twentieth of a piece away, four reach rounding."""
+
+
+class Bounds(NamedTuple):
+    """Proved bounds of functions, and where they are nearly reached, shape (m,) each."""
+
+    lowest: Array
+    at_lowest: Array
+    highest: Array
+    at_highest: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,13 +127,17 @@ class Pieces:
         matrix = np.array([[comb(i, j) / comb(p, j) for j in range(p + 1)] for i in range(p + 1)])
         return np.asarray(np.einsum("ij,kj,kjm->kim", matrix, powers, self.coefficients))
 
-    def largest(self, tolerance: Array) -> tuple[Array, Array]:
-        """Return upper bounds of the largest value of each column, shape (m,), and where it is nearly reached, (m,).
+    def bounds(self, tolerance: ArrayLike) -> Bounds:
+        """Return bounds of the values of each column.
 
-        The bounds are proved: the largest Bernstein coefficients of pieces that are halved until these exceed values
-        of the function by no more than ``tolerance``, shape (m,).
+        They are proved: the smallest and largest Bernstein coefficients of pieces that are halved until these are
+        within ``tolerance``, shape () or (m,), of values of the function.
         """
-        b, begin, width = self.bernstein, self.breaks[:-1], np.diff(self.breaks)
+        # The largest of f and of -f.
+        both = self.bernstein
+        b = np.concatenate([both, -both], axis=2)
+        allowed = np.tile(np.broadcast_to(tolerance, both.shape[2]), 2)
+        begin, width = self.breaks[:-1], np.diff(self.breaks)
         reached = np.full(b.shape[2], -np.inf)
         places = np.zeros(b.shape[2])
         bound = np.full(b.shape[2], -np.inf)
@@ -137,7 +148,7 @@ class Pieces:
                 places = np.where(highest > reached, at[k], places)
                 reached = np.maximum(reached, highest)
             hulls = b.max(axis=1)
-            is_open = (hulls > reached + tolerance).any(axis=1)
+            is_open = (hulls > reached + allowed).any(axis=1)
             bound = np.maximum(bound, hulls[~is_open].max(axis=0, initial=-np.inf))
             if not is_open.any():
                 break
@@ -146,7 +157,9 @@ class Pieces:
             begin, width = np.concatenate([begin, begin + width]), np.concatenate([width, width])
         else:
             bound = np.maximum(bound, b.max(axis=(0, 1)))
-        return bound, places
+        highest, negated = np.split(bound, 2)
+        at_highest, at_lowest = np.split(places, 2)
+        return Bounds(-negated, at_lowest, highest, at_highest)
 
     def inside(self, points: int) -> tuple[Array, Array]:
         """Return times (K, points) evenly spread over each piece, both its ends included, and values (K, points, m)."""
@@ -161,24 +174,6 @@ class Pieces:
         for power in range(self.coefficients.shape[1] - 2, -1, -1):
             value = value * u + self.coefficients[:, None, power]
         return value
-
-    def extremes(self, points: int = 20) -> tuple[Array, Array]:
-        """Return candidates for the extremes of each column: u and values (K, P, m), with each piece's ends.
-
-        Local extremes are refined by Newton's method from evenly spread points; two in one cell may be missed.
-        """
-        width = np.diff(self.breaks)[:, None, None]
-        grid = width * np.linspace(0.0, 1.0, points)[:, None]
-        low, high = np.maximum(grid - width / (points - 1), 0.0), np.minimum(grid + width / (points - 1), width)
-        first, second = self.derivative, self.derivative.derivative
-        u = np.broadcast_to(grid, (len(width), points, self.coefficients.shape[2]))
-        start = u
-        for _ in range(REFINEMENTS):
-            slope, bend = first.at(u), second.at(u)
-            step = np.divide(slope, bend, out=np.zeros_like(slope), where=bend != 0.0)
-            u = np.clip(u - step, low, high)
-        u = np.concatenate([start, u], axis=1)
-        return self.breaks[:-1, None, None] + u, self.at(u)
 
     def __repr__(self) -> str:
         pieces, powers, columns = self.coefficients.shape

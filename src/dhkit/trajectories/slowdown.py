@@ -14,7 +14,7 @@ from dhkit.description import Array, Description
 from dhkit.description.joint_text import degrees_hint, joint_text
 from dhkit.dynamics import gravity_torque, inverse_dynamics
 from dhkit.errors import PlanningError
-from dhkit.trajectories.limits import Limits
+from dhkit.trajectories.limits import Limits, farthest_outside
 from dhkit.trajectories.torque_peaks import torque_peaks
 from dhkit.trajectories.trajectory import Trajectory
 
@@ -25,6 +25,8 @@ ROUNDING = 1e-12
 """Differences of torque below this share of the largest torque are rounding and limit nothing."""
 MIN_JUMP = 1e-6
 """A velocity or acceleration jumps at a break if it changes by more than this share of its largest value."""
+PROVED = 1e-12
+"""Distance of a derivative's proved bound from values that are reached, as a share of its size."""
 LIMIT_SLACK = 1e-9
 """Distance by which rounding may exceed joint limits, rad and m."""
 REFINEMENTS, TIGHTEST_SAMPLES = 2, 3
@@ -146,20 +148,16 @@ def require_inside(trajectory: Trajectory, limits: Limits) -> None:
         The limits are of another number of joints.
     """
     _check_joints(trajectory, limits)
-    t, q = trajectory.pieces.extremes()
-    n = trajectory.n
-    t, q = t.reshape(-1, n), q.reshape(-1, n)
-    excess = np.maximum(limits.lower - q, q - limits.upper)
-    if excess.max() <= LIMIT_SLACK:
+    farthest = farthest_outside(limits, trajectory.pieces)
+    if farthest.excess <= LIMIT_SLACK:
         return
-    row, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
-    below = q[row, i] < limits.lower[i]
-    side, limit = ("lower", limits.lower[i]) if below else ("upper", limits.upper[i])
+    i, q = farthest.joint, farthest.value
+    side, limit = ("lower", limits.lower[i]) if farthest.is_below else ("upper", limits.upper[i])
     slides = bool(trajectory.description.numbers.prismatic[i])
-    bound, found = joint_text(limit, slides=slides), joint_text(q[row, i], slides=slides)
+    bound, found = joint_text(limit, slides=slides), joint_text(q, slides=slides)
     raise PlanningError(
         f"{trajectory.description.joints[i].name} leaves its {side} limit, {bound}: it comes to {found}"
-        f"{degrees_hint(q[row, i], slides=slides)} at {t[row, i]:.4g} s"
+        f"{degrees_hint(q, slides=slides)} at {farthest.place:.4g} s"
     )
 
 
@@ -175,8 +173,10 @@ def _by_derivatives(trajectory: Trajectory, limits: Limits) -> float:
         if np.isinf(limit).all():
             continue
         _refuse_jumps(trajectory, order - 1, name, limit)
-        _, values = trajectory.pieces.differentiated(order).extremes()
-        slowest = max(slowest, float((np.abs(values).max(axis=(0, 1)) / limit).max() ** (1 / order)))
+        values = trajectory.pieces.differentiated(order)
+        found = values.bounds(PROVED * np.abs(values.bernstein).max(axis=(0, 1)))
+        largest = np.maximum(found.highest, -found.lowest)
+        slowest = max(slowest, float((largest / limit).max() ** (1 / order)))
     return slowest
 
 

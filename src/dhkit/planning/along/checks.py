@@ -12,6 +12,7 @@ from dhkit.planning.joint_limits import Limit
 from dhkit.planning.loaded import LoadedArm
 from dhkit.planning.states import States
 from dhkit.trajectories import JointPath, Limits
+from dhkit.trajectories.limits import farthest_outside
 
 REGULAR_POINTS = 8
 """Number of points of each piece of a path at which its derivative is examined."""
@@ -29,9 +30,8 @@ def require_path(description: LoadedArm, path: JointPath, limits: Limits) -> Non
         The path leaves the joint limits, has a corner (or a jump of curvature, if jerk is limited), stands still or is
         singular, or the arm cannot hold itself at one of its ends.
     """
-    s, q = (array.reshape(-1, description.n) for array in path.pieces.extremes())
-    k, i = np.unravel_index(int(np.argmax(np.maximum(limits.lower - q, q - limits.upper))), q.shape)
-    require_inside_limits(description, limits, q[k], f"the path at s = {s[k, i]:.4g}")
+    s = farthest_outside(limits, path.pieces).place
+    require_inside_limits(description, limits, path.q(s), f"the path at s = {s:.4g}")
     _require_no_jump(path, 1, "the path has a corner", "turns suddenly: plan to it and on from it")
     if np.isfinite(limits.jerk).any():
         _require_no_jump(path, 2, "the path's curvature jumps", "would need infinite jerk, which is limited")
