@@ -74,7 +74,8 @@ class Arm:
             A URDF that is refused, or has no such chain, or several and no tip was given.
         """
         text = str(name)
-        if text.startswith("example:") or text.lower().endswith(".urdf") or ".urdf#" in text.lower():
+        is_file = text.lower().endswith((".urdf", ".xacro"))
+        if text.startswith("example:") or is_file or ".urdf#" in text.lower():
             return cls.from_urdf(name, base=base, tip=tip)
         if base is not None or tip is not None:
             raise DescriptionError(

@@ -58,7 +58,7 @@ REFUSED = {
     "text": ("a robot", "not well-formed XML"),
     "xacro left in": (arm(origin='<origin xyz="${x} 0 0"/>'), "joint 'j': <origin xyz>: found '${x}'"),
     "another format": ('<sdf version="1.6"/>', "found <sdf>; expected <robot>"),
-    "a namespace": ('<robot xmlns="urn:x"><link name="a"/></robot>', "found <{urn:x}robot>"),
+    "xacro": ('<robot xmlns:xacro="x"><xacro:macro name="m"/></robot>', "has elements of xacro; run xacro on it first"),
     "too large": ("<robot>" + " " * MAX_BYTES + "</robot>", "more than 5 MB"),
     "many elements": ("<robot>" + "<a/>" * 150_000 + "</robot>", "more than 100000 elements"),
     "a long attribute": (f'<robot name="{"x" * 2000}"/>', "<robot name> has 2000 characters"),
@@ -81,7 +81,6 @@ REFUSED = {
         '<child link="a"/></joint></robot>',
         "links a go round in a circle",
     ),
-    "not connected": (arm(more='<link name="z"/>'), "not connected: a, z have no parent; expected one root"),
     "two parents": (
         arm(more='<joint name="k" type="fixed"><parent link="a"/><child link="c"/></joint>'),
         "link 'c' has two parents, by joints 'j' and 'k'",
@@ -150,6 +149,15 @@ def test_what_is_no_file_is_not_read(path, tmp_path):
 
 
 READ = {
+    "a second root": (arm(more='<link name="z"/>'), "links that no joint connects with 'a' left out: z"),
+    "effort -1": (arm(limit='<limit lower="-1" upper="1" effort="-1" velocity="1"/>'), "effort -1; read as unlimited"),
+    "a finger with reversed limits": (
+        arm(
+            more='<link name="d"/><joint name="k" type="revolute"><parent link="c"/><child link="d"/>'
+            '<axis xyz="0 0 1"/><limit lower="1" upper="-1"/><mimic joint="i"/></joint>'
+        ),
+        "limits [1, -1] are the wrong way round; the chain does not use it",
+    ),
     "no limits": (arm(limit=""), "joint 'j': no limits; read as unlimited"),
     "an empty range": (
         arm(limit='<limit lower="0" upper="0" effort="1" velocity="1"/>'),
@@ -185,6 +193,64 @@ def test_what_is_read_by_a_rule_is_said(name, tmp_path):
     assert any(note in one for one in extraction.notes)
     assert note in extraction.description.notes
     assert extraction.residual.largest < 5e-10
+
+
+def test_a_link_that_the_chain_does_not_use_may_be_wrong(tmp_path):
+    """With side="drop" it is left out; carried along, its mass counts."""
+    finger = (
+        '<link name="d"><inertial><mass value="nan"/></inertial></link><joint name="k" type="revolute">'
+        f'<parent link="c"/><child link="d"/><axis xyz="0 0 1"/>{LIMIT}</joint>'
+    )
+    (tmp_path / "odd.urdf").write_text(arm(more=finger))
+    dropped = extract_dh(tmp_path / "odd.urdf", tip="c", side="drop")
+    assert any("<mass value>: found 'nan'" in note and "does not use it" in note for note in dropped.notes)
+    with pytest.raises(ModelError, match="link 'd': <mass value>: found 'nan'"):
+        extract_dh(tmp_path / "odd.urdf", tip="c")
+
+
+def test_the_largest_tree_is_read(tmp_path):
+    links = "".join(f'<link name="x{k}"/>' for k in range(5))
+    joints = "".join(
+        f'<joint name="y{k}" type="revolute"><parent link="x{k}"/><child link="x{k + 1}"/>{LIMIT}</joint>'
+        for k in range(4)
+    )
+    (tmp_path / "two.urdf").write_text(arm(more=links + joints))
+    found = extract_dh(tmp_path / "two.urdf")
+    assert found.description.n == 4
+    assert "links that no joint connects with 'x0' left out: a, b, c" in found.notes
+
+
+ENCODED = {
+    "blank lines before the header": ("\n  \n" + '<?xml version="1.0"?>' + arm()).encode(),
+    "utf-16": ('<?xml version="1.0" encoding="utf-16"?>' + arm()).encode("utf-16"),
+    "utf-16 without a mark": ('<?xml version="1.0" encoding="utf-16"?>' + arm()).encode("utf-16-le"),
+    "utf-8 that says utf-16": ('<?xml version="1.0" encoding="utf-16"?>' + arm()).encode(),
+    "latin-1": ('<?xml version="1.0" encoding="ISO-8859-1"?><!-- \u00fc -->' + arm()).encode("latin-1"),
+    "gb2312": ('<?xml version="1.0" encoding="gb2312"?><!-- \u673a -->' + arm()).encode("gb2312"),
+    "undeclared prefixes": arm(more='<sensor:camera a:b="c"><gazebo:x/></sensor:camera>').encode(),
+    "a namespace": arm().replace("<robot ", '<robot xmlns="urn:x" xmlns:s="urn:s" ').encode(),
+}
+
+
+@pytest.mark.parametrize("name", ENCODED)
+def test_what_other_readers_take_is_read(name, tmp_path):
+    (tmp_path / "arm.urdf").write_bytes(ENCODED[name])
+    extraction = extract_dh(tmp_path / "arm.urdf")
+    assert extraction.description.n == 2
+    assert extraction.residual.largest < 1e-12
+
+
+@pytest.mark.parametrize("encoding", ["idna", "punycode", "zlib", "rot13", "nonsense"])
+def test_encodings_that_are_none_are_refused(encoding, tmp_path):
+    (tmp_path / "arm.urdf").write_bytes(f'<?xml version="1.0" encoding="{encoding}"?>'.encode() + b"\xff" * 1000)
+    with pytest.raises(ModelError, match="not UTF-8 text, and"):
+        read_chain(tmp_path / "arm.urdf")
+
+
+def test_a_xacro_file_is_sent_to_xacro(tmp_path):
+    (tmp_path / "arm.urdf.xacro").write_text(REFUSED["xacro"][0])
+    with pytest.raises(ModelError, match="run xacro on it first, and give its output"):
+        Arm.load(str(tmp_path / "arm.urdf.xacro"))
 
 
 def test_rules_for_limits(tmp_path):

@@ -16,7 +16,7 @@ from dhkit.description import Array
 from dhkit.errors import ModelError
 from dhkit.model.reference import PinocchioModel, import_pinocchio
 from dhkit.model.urdf_reader import read_urdf
-from dhkit.model.urdf_tree import JointKind, UrdfJoint, UrdfTree
+from dhkit.model.urdf_tree import JointKind, UrdfJoint, UrdfLink, UrdfTree
 from dhkit.model.urdf_xml import Element, child_name
 
 Side: TypeAlias = Literal["freeze", "drop"]
@@ -149,6 +149,7 @@ def chain_of(tree: UrdfTree, base: str | None = None, tip: str | None = None, *,
     except ModelError as error:
         raise ModelError(f"{tree.path}: {error}") from None
     groups, dropped = _groups(tree, first, joints, side)
+    _require_no_fault(tree, joints, groups)
     poses = tree.zero_poses()
     to_base = np.linalg.inv(poses[first])
     return Chain(
@@ -162,6 +163,15 @@ def chain_of(tree: UrdfTree, base: str | None = None, tip: str | None = None, *,
         zero_poses={link: to_base @ T for link, T in poses.items()},
         notes=tuple(_notes(tree, first, joints, groups, dropped, side)),
     )
+
+
+def _require_no_fault(tree: UrdfTree, joints: Sequence[UrdfJoint], groups: Sequence[Sequence[str]]) -> None:
+    """Refuse a chain with a joint or a link that could not be read."""
+    links = [tree.links[link] for group in groups for link in group]
+    parts: list[UrdfJoint | UrdfLink] = [*joints, *links]
+    for part in parts:
+        if part.fault is not None:
+            raise ModelError(f"{tree.path}: {part.fault}")
 
 
 def _names(joints: Iterator[UrdfJoint] | Sequence[UrdfJoint]) -> JointNames:
@@ -307,6 +317,11 @@ def _notes(
     if len(notes) > MAX_NOTES:
         notes = [*notes[:MAX_NOTES], f"and {len(notes) - MAX_NOTES} more notes of this kind"]
     others = [joint for joint in tree.joints.values() if joint.name not in names]
+    outside: list[UrdfJoint | UrdfLink] = [*others]
+    outside += [tree.links[link] for link in tree.links if link not in links]
+    notes += [f"{part.fault}; the chain does not use it" for part in outside if part.fault is not None][:MAX_NOTES]
+    if tree.unconnected:
+        notes.append(f"links that no joint connects with {tree.root!r} left out: {_shortened(tree.unconnected, 300)}")
     beside = [
         joint.name
         for joint in others
@@ -361,8 +376,10 @@ def chain_text(chain: Chain) -> str:
     robot = copy.deepcopy(chain.tree.element)
     robot.attrib.setdefault("name", "robot")
     _remove_all(robot, "material", "gazebo", "transmission")
+    _remove_prefixed(robot)
+    left_out = {*chain.dropped, *chain.tree.unconnected}
     for joint in robot.findall("joint"):
-        if child_name(joint, "child") in chain.dropped:
+        if child_name(joint, "child") in left_out:
             robot.remove(joint)
         elif joint.get("name") in chain.names:
             _make_movable(joint, chain.tree.joints[joint.get("name", "")].axis)
@@ -370,7 +387,7 @@ def chain_text(chain: Chain) -> str:
             joint.set("type", JointKind.FIXED)
             _remove_all(joint, "axis", "limit", "mimic", "dynamics", "safety_controller", "calibration")
     for link in robot.findall("link"):
-        if link.get("name") in chain.dropped:
+        if link.get("name") in left_out:
             robot.remove(link)
         _remove_all(link, "visual", "collision")
     for frame, link_name in ((BASE_FRAME, chain.base), (TIP_FRAME, chain.tip)):
@@ -384,6 +401,17 @@ def chain_text(chain: Chain) -> str:
 def _remove_all(parent: Element, *tags: str) -> None:
     for element in [element for tag in tags for element in parent.findall(tag)]:
         parent.remove(element)
+
+
+def _remove_prefixed(element: Element) -> None:
+    """Remove elements and attributes with the prefix of a namespace, which other readers want declared."""
+    for key in [key for key in element.attrib if ":" in key]:
+        del element.attrib[key]
+    for child in list(element):
+        if ":" in child.tag:
+            element.remove(child)
+        else:
+            _remove_prefixed(child)
 
 
 def _make_movable(joint: Element, axis: Array) -> None:

@@ -41,6 +41,8 @@ QUATERNION_TOLERANCE = 1e-4
 """Largest difference of a quaternion's length from 1; it is normalized."""
 MAX_SHAPE_DISTANCE = 1e6
 """Largest size and distance of a shape, m."""
+NO_LIMIT = -1
+"""Speed or effort that stands for "no limit" in files of some exporters, as 0 does."""
 OWN_PREFIX = "dhkit:"
 """Beginning of the names that dhkit adds for other readers."""
 MIN_DIGITS = 3
@@ -89,7 +91,12 @@ class _Reader:
         """Return the checked tree."""
         link_elements, joint_elements = _by_name(robot, "link"), _by_name(robot, "joint")
         parents = _parent_joints(link_elements, joint_elements)
-        root = _root(link_elements, joint_elements, parents)
+        root, members = _largest_tree(link_elements, joint_elements, parents)
+        left_out = tuple(name for name in link_elements if name not in members)
+        link_elements = {name: element for name, element in link_elements.items() if name in members}
+        joint_elements = {
+            name: element for name, element in joint_elements.items() if child_name(element, "child") in members
+        }
         colors = {
             name: color
             for material in robot.findall("material")
@@ -108,7 +115,8 @@ class _Reader:
             element=robot,
             links=links,
             joints=joints,
-            parent_joint={link: joints[name] for link, name in parents.items()},
+            parent_joint={link: joints[name] for link, name in parents.items() if link in members},
+            unconnected=left_out,
             root=root,
             warnings=tuple(dict.fromkeys(self.warnings)),
             changes=tuple(self.changes),
@@ -121,14 +129,18 @@ class _Reader:
         if joint.get("type", "") not in list(JointKind):
             raise ModelError(f"{name} is {joint.get('type', '')[:40]!r}; expected one of {', '.join(JointKind)}")
         kind = JointKind(joint.get("type", ""))
-        mimic, dynamics = joint.find("mimic"), joint.find("dynamics")
+        mimic = joint.find("mimic")
         has_axis = kind in AXIS_KINDS
-        damping, friction = (
-            (number(str(name), dynamics, key) or 0.0) if has_axis else 0.0 for key in ("damping", "friction")
-        )
-        if damping < 0 or friction < 0:
-            raise ModelError(f"{name}: damping {damping:g}, friction {friction:g}; expected none below 0")
-        velocity, effort = (self._largest(name, joint, key) if has_axis else None for key in ("velocity", "effort"))
+        limits: tuple[float, float] | None = None
+        velocity = effort = fault = None
+        damping = friction = 0.0
+        try:
+            if has_axis:
+                damping, friction = _dynamics(name, joint)
+                velocity, effort = (self._largest(name, joint, key) for key in ("velocity", "effort"))
+                limits = self._limits(name, joint)
+        except ModelError as error:
+            fault = str(error)
         return UrdfJoint(
             name=name.name,
             kind=kind,
@@ -136,12 +148,13 @@ class _Reader:
             child=child_name(joint, "child"),
             T_parent_joint=self._origin(str(name), joint.find("origin")),
             axis=self._axis(name, joint) if has_axis else np.array([1.0, 0.0, 0.0]),
-            limits=self._limits(name, joint) if has_axis else None,
+            limits=limits,
             velocity=velocity,
             effort=effort,
             damping=damping,
             friction=friction,
             mimics=None if mimic is None else mimic.get("joint", ""),
+            fault=fault,
         )
 
     def _origin(self, where: str, origin: Element | None) -> Array:
@@ -201,15 +214,21 @@ class _Reader:
             self._warn(name, f": {key} {limit.get(key)}; read as unlimited")
             return None
         value = number(str(name), limit, key)
+        if value in (0, NO_LIMIT):
+            self._warn(name, f": {key} {value:g}; read as unlimited")
+            return None
         if value is not None and value < 0:
             raise ModelError(f"{name}: {key} is {value:g}; expected none below 0")
-        if value == 0:
-            self._warn(name, f": {key} 0; read as unlimited")
-        return value or None
+        return value
 
     def _link(self, name: ElementName, link: Element, colors: Mapping[str, str]) -> UrdfLink:
-        visuals, collisions = (tuple(self._shapes(name, link.findall(tag), colors)) for tag in ("visual", "collision"))
-        return UrdfLink(name.name, self._inertial(name, link.find("inertial")), visuals, collisions)
+        try:
+            visuals, collisions = (
+                tuple(self._shapes(name, link.findall(tag), colors)) for tag in ("visual", "collision")
+            )
+            return UrdfLink(name.name, self._inertial(name, link.find("inertial")), visuals, collisions)
+        except ModelError as error:
+            return UrdfLink(name.name, None, (), (), fault=str(error))
 
     def _inertial(self, name: ElementName, inertial: Element | None) -> Inertial | None:
         if inertial is None:
@@ -305,20 +324,33 @@ def _parent_joints(links: Mapping[str, Element], joints: Mapping[str, Element]) 
     return parents
 
 
-def _root(links: Mapping[str, Element], joints: Mapping[str, Element], parents: Mapping[str, str]) -> str:
-    """Return the link without a parent; refuse none, several, and links that form a circle."""
-    roots = [link for link in links if link not in parents]
-    if len(roots) > 1:
-        raise ModelError(f"not connected: {', '.join(roots)[:200]} have no parent; expected one root")
+def _largest_tree(
+    links: Mapping[str, Element], joints: Mapping[str, Element], parents: Mapping[str, str]
+) -> tuple[str, set[str]]:
+    """Return the root of the largest tree, the first of equal ones, and its links; refuse links in a circle."""
     children: dict[str, list[str]] = {}
     for child, name in parents.items():
         children.setdefault(child_name(joints[name], "parent"), []).append(child)
-    reached = list(roots)
-    for link in reached:  # grows while it is traversed
-        reached += children.get(link, ())
-    if unreached := [link for link in links if link not in reached]:
-        raise ModelError(f"links {', '.join(unreached)[:200]} go round in a circle; expected a tree")
-    return roots[0]
+    trees: dict[str, set[str]] = {}
+    for root in (link for link in links if link not in parents):
+        reached = [root]
+        for link in reached:  # grows while it is traversed
+            reached += children.get(link, ())
+        trees[root] = set(reached)
+    in_a_tree = {link for tree in trees.values() for link in tree}
+    if in_a_circle := [link for link in links if link not in in_a_tree]:
+        raise ModelError(f"links {', '.join(in_a_circle)[:200]} go round in a circle; expected a tree")
+    root = max(trees, key=lambda link: len(trees[link]))
+    return root, trees[root]
+
+
+def _dynamics(name: ElementName, joint: Element) -> tuple[float, float]:
+    """Return damping, N m s/rad or N s/m, and friction, N m or N; 0 where they are missing."""
+    dynamics = joint.find("dynamics")
+    damping, friction = (number(str(name), dynamics, key) or 0.0 for key in ("damping", "friction"))
+    if damping < 0 or friction < 0:
+        raise ModelError(f"{name}: damping {damping:g}, friction {friction:g}; expected none below 0")
+    return damping, friction
 
 
 def _color(material: Element) -> str | None:

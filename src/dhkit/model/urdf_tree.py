@@ -78,12 +78,16 @@ class UrdfShape:
 
 @dataclass(frozen=True, eq=False)
 class UrdfLink:
-    """A link: its inertial, visual and collision elements."""
+    """A link: its inertial, visual and collision elements.
+
+    ``fault`` is what is wrong with them; they are left out, and a chain with the link is refused.
+    """
 
     name: str
     inertial: Inertial | None
     visuals: tuple[UrdfShape, ...]
     collisions: tuple[UrdfShape, ...]
+    fault: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +108,8 @@ class UrdfJoint:
         Viscous damping, N m s/rad or N s/m, and Coulomb friction, N m or N.
     mimics
         The joint that this one follows, or None.
+    fault
+        What is wrong with its limits or its dynamics, which are left out; a chain with it is refused.
     """
 
     name: str
@@ -118,6 +124,7 @@ class UrdfJoint:
     damping: float
     friction: float
     mimics: str | None
+    fault: str | None
 
     @property
     def is_fixed(self) -> bool:
@@ -155,6 +162,8 @@ class UrdfTree:
         Unusual elements, and how they were read.
     changes
         Numbers that :func:`read_urdf` rounded to their intended values (``as_designed=True``), one sentence each.
+    unconnected
+        Names of links that no joint connects with the root; they are left out.
     """
 
     path: Path
@@ -166,6 +175,7 @@ class UrdfTree:
     root: str
     warnings: tuple[UrdfWarning, ...]
     changes: tuple[str, ...]
+    unconnected: tuple[str, ...] = ()
 
     def joints_to(self, link: str, base: str | None = None) -> tuple[UrdfJoint, ...] | None:
         """Return the joints from a base (the root if not given) to a link; None if the base is not on that path."""

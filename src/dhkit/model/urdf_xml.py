@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import io
+import codecs
 import math
 import re
 import stat
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 from dhkit.description.files import error_reason
 from dhkit.errors import ModelError
@@ -22,10 +23,16 @@ MAX_ELEMENTS = 100_000
 MAX_ATTRIBUTE_LENGTH = 1_000
 """Longest attribute, in characters: a name, a path or a list of numbers."""
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?", re.ASCII)
+RUN_XACRO = "run xacro on it first, and give its output"
+DECLARED_ENCODING = re.compile(rb"\s*<\?xml[^>]{0,100}?encoding\s*=\s*[\"']([A-Za-z0-9_.\-]{1,40})[\"']")
+REFUSED_ENCODINGS = {"idna", "punycode"}
+"""Encodings of names, not of texts: long ones take quadratic time."""
 
 
 def parse_urdf(path: Path) -> Element:
-    """Return the root of a URDF, read as UTF-8 without entities, bounded in size and depth.
+    """Return the root of a URDF without entities, bounded in size and depth.
+
+    Prefixes of namespaces stay part of the names: the parts of a URDF have none, and files do not always declare them.
 
     Raises
     ------
@@ -42,49 +49,73 @@ def parse_urdf(path: Path) -> Element:
         raise ModelError(error_reason(error)) from None
     if len(content) > MAX_BYTES:
         raise ModelError(f"more than {MAX_BYTES // 1_000_000} MB; expected a URDF")
+    text = _decoded(content).lstrip()  # blank lines before <?xml, which other readers skip
     try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise ModelError("not UTF-8 text; expected a URDF") from None
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise ModelError("has a document type or entities, which a URDF does not need and dhkit does not read")
-    try:
-        _check_size(text)
-        robot = ElementTree.fromstring(text.encode())  # noqa: S314 - no entities, bounded
-    except (ElementTree.ParseError, LookupError, ValueError) as error:
-        raise ModelError(
-            f"not well-formed XML: {error}{_cause(text, is_unbound='unbound prefix' in str(error))}"
-        ) from None
+        robot = _BoundedTree().read(text)
+    except expat.ExpatError as error:
+        hint = f"; {RUN_XACRO}" if "xacro:" in text else ""
+        raise ModelError(f"not well-formed XML: {error}{hint}") from None
+    if any(element.tag.startswith("xacro:") for element in robot.iter()):
+        raise ModelError(f"has elements of xacro; {RUN_XACRO}")
     if robot.tag != "robot":
         raise ModelError(f"found <{robot.tag[:40]}>; expected <robot>")
     return robot
 
 
-def _cause(text: str, *, is_unbound: bool) -> str:
-    """Return the usual cause of an error of the XML parser, such as an unbound namespace prefix."""
-    if is_unbound:
-        declared = {"xml", *re.findall(r"xmlns:(\w+)", text)}
-        prefix = next((name for name in re.findall(r"</?(\w+):", text) if name not in declared), None)
-        return f"; no xmlns declares {prefix}:" if prefix else ""
-    return "; expected the output of xacro" if "xacro:" in text else ""
-
-
-def _check_size(text: str) -> None:
-    """Refuse XML that is deep or has many elements before a tree of it is built."""
-    depth = count = 0
-    for event, element in ElementTree.iterparse(io.BytesIO(text.encode()), events=("start", "end")):  # noqa: S314
-        if event == "end":
-            depth -= 1
-            element.clear()
+def _decoded(content: bytes) -> str:
+    """Return the text of an XML file: by its byte order mark, as UTF-8, or in the encoding that it declares."""
+    begins = {codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16", b"<\0": "utf-16-le", b"\0<": "utf-16-be"}
+    declared = DECLARED_ENCODING.match(content)
+    encodings = [name for begin, name in begins.items() if content.startswith(begin)] or ["utf-8-sig"]
+    if declared and declared[1].decode().lower() not in REFUSED_ENCODINGS:
+        encodings.append(declared[1].decode())
+    for encoding in encodings:
+        try:
+            return content.decode(encoding)
+        except (UnicodeError, LookupError):
             continue
-        depth, count = depth + 1, count + 1
-        if depth > MAX_DEPTH:
+    said = f"the encoding that it declares is {encodings[-1][:40]}" if declared else "it declares no other encoding"
+    raise ModelError(f"not UTF-8 text, and {said}; expected a URDF")
+
+
+class _BoundedTree:
+    """Builds the tree of an XML text, and refuses what is deep, large or has a document type while it is read."""
+
+    def __init__(self) -> None:
+        self._builder = ElementTree.TreeBuilder()
+        self._depth = 0
+        self._count = 0
+        # The text is given as UTF-8, whatever it declares.
+        self._parser = expat.ParserCreate("utf-8")
+        self._parser.buffer_text = True
+        self._parser.StartDoctypeDeclHandler = self._refuse_document_type
+        self._parser.StartElementHandler = self._start
+        self._parser.EndElementHandler = self._end
+        self._parser.CharacterDataHandler = self._builder.data
+
+    def read(self, text: str) -> Element:
+        """Return the root of the tree."""
+        self._parser.Parse(text.encode(errors="replace"), True)
+        return self._builder.close()
+
+    def _refuse_document_type(self, *_: object) -> None:
+        raise ModelError("has a document type or entities, which a URDF does not need and dhkit does not read")
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        self._depth += 1
+        self._count += 1
+        if self._depth > MAX_DEPTH:
             raise ModelError(f"elements nested more than {MAX_DEPTH} deep")
-        if count > MAX_ELEMENTS:
+        if self._count > MAX_ELEMENTS:
             raise ModelError(f"more than {MAX_ELEMENTS} elements; expected a URDF")
-        for key, value in element.attrib.items():
+        for key, value in attributes.items():
             if len(value) > MAX_ATTRIBUTE_LENGTH:
-                raise ModelError(f"<{element.tag[:40]} {key[:40]}> has {len(value)} characters; expected fewer")
+                raise ModelError(f"<{tag[:40]} {key[:40]}> has {len(value)} characters; expected fewer")
+        self._builder.start(tag, attributes)
+
+    def _end(self, tag: str) -> None:
+        self._depth -= 1
+        self._builder.end(tag)
 
 
 def child_name(joint: Element, tag: str) -> str:

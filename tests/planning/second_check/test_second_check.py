@@ -9,10 +9,14 @@ import numpy as np
 import pytest
 
 from dhkit import Arm, Friction, Limits, Obstacle, Payload, Trajectory
+from dhkit.errors import PlanningError
 from dhkit.planning.collision_avoidance import CollisionAvoidance
 from dhkit.planning.obstacles import Floor
 from dhkit.planning.second_check import Claim, recheck
-from planning.second_check.random_motions import KINDS, random_case
+from planning.second_check.random_motions import KINDS, has_bodies, random_arm, random_case, random_scene, ranges
+
+PLANNED = ("library", "locked", "table", "urdf")
+"""Kinds of arms of planned motions."""
 
 
 def test_no_certificate_is_refuted(law, tmp_path):
@@ -26,6 +30,35 @@ def test_no_certificate_is_refuted(law, tmp_path):
             second = case.certify(independent=True).independent
             law.holds("refuted certificates", len(second.refutations), 0, (k, case, second.refutations))
     assert certified >= 0.9 * count
+
+
+def test_no_planned_motion_is_refuted(law, tmp_path):
+    """Of arms between random configurations, among random solids."""
+    found = 0
+    count = law.samples(100, least=3)
+    for k in range(count):
+        rng = np.random.default_rng(1000 + k)
+        arm = random_arm(rng, PLANNED[k % len(PLANNED)], tmp_path)
+        if not has_bodies(arm):
+            arm = arm.with_limits(velocity=1.0)
+        lower, upper = ranges(arm)
+        ends = rng.uniform(lower, upper, (2, arm.n))
+        scene = random_scene(rng, arm, ends)
+        itself = bool(rng.random() < 0.5)
+        gaps = arm.distance(ends, scene, self_collision=True)
+        scene = [item for item, gap in zip(scene, gaps.per_obstacle.T, strict=True) if gap.min() > 0]
+        itself = itself and bool(gaps.itself.min() > 0)
+        options = {"obstacles": scene, "clearance": 0.005, "self_collision": itself}
+        try:
+            motion = arm.plan(*ends, **options, intervals=12, max_iterations=300, compare=False)
+        except PlanningError:
+            continue
+        found += 1
+        certificate = arm.certify(motion, **options, independent=True)
+        assert certificate.ok, (k, certificate)
+        refuted = certificate.independent.refutations
+        law.holds("refuted certificates", len(refuted), 0, (k, arm, refuted))
+    assert found >= count / 2
 
 
 @pytest.fixture(scope="module")
