@@ -147,7 +147,9 @@ class _Reader:
             parent=child_name(joint, "parent"),
             child=child_name(joint, "child"),
             T_parent_joint=self._origin(str(name), joint.find("origin")),
+            rounding=self._rounding(joint.find("origin"), "rpy"),
             axis=self._axis(name, joint) if has_axis else np.array([1.0, 0.0, 0.0]),
+            axis_rounding=self._rounding(joint.find("axis"), "xyz"),
             limits=limits,
             velocity=velocity,
             effort=effort,
@@ -173,6 +175,12 @@ class _Reader:
                 if rpy[i] != value:
                     self.changes.append(f"{where}: rpy {word} read as {math.degrees(rpy[i]):.6g} degrees")
         return pose(xyz, euler=rpy, order="xyz")
+
+    def _rounding(self, element: Element | None, key: str) -> float:
+        """Return the sum of the roundings of an attribute's numbers; 0 where they are read as designed."""
+        if element is None or self.as_designed:
+            return 0.0
+        return sum(_decimal_rounding(word) for word in element.get(key, "").split())
 
     def _axis(self, name: ElementName, joint: Element) -> Array:
         entries = numbers(str(name), joint.find("axis"), "xyz", 3) or [1.0, 0.0, 0.0]
@@ -378,6 +386,22 @@ def _designed_angle(word: str, value: float) -> float:
     unit = Decimal(1).scaleb(exponent)
     roundings = (Decimal(multiple).quantize(unit, rounding) for rounding in (ROUND_HALF_EVEN, ROUND_DOWN))
     return multiple if decimal in roundings and multiple else value
+
+
+def _decimal_rounding(word: str) -> float:
+    """Return by how much a decimal may be off: a unit of its last place, if it has three digits at least.
+
+    The difference of a right angle and its decimal, such as 3.6732e-06, is off by itself.
+    """
+    value = abs(float(word))
+    if value < 1e-12:
+        return 0.0
+    if _is_rounding_of_zero(value):
+        return value
+    decimal = Decimal(word).as_tuple()
+    if len(decimal.digits) < MIN_DIGITS or not isinstance(decimal.exponent, int) or decimal.exponent >= 0:
+        return 0.0
+    return float(10.0**decimal.exponent)
 
 
 def _is_rounding_of_zero(value: float) -> bool:

@@ -98,6 +98,8 @@ class UrdfJoint:
     ----------
     T_parent_joint
         Shape (4, 4), m: the pose of the joint, and of the child link with the joint at zero, in the parent link.
+    rounding, axis_rounding
+        By how much its orientation and its axis may be off, rad: a unit in the last decimal of each number.
     axis
         Unit vector in the joint's frame, shape (3,); without meaning for fixed, floating and planar joints.
     limits
@@ -117,7 +119,9 @@ class UrdfJoint:
     parent: str
     child: str
     T_parent_joint: Array
+    rounding: float
     axis: Array
+    axis_rounding: float
     limits: tuple[float, float] | None
     velocity: float | None
     effort: float | None

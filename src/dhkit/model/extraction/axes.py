@@ -26,6 +26,9 @@ ENTRY_COST = 1000.0
 """Cost of an entry that is not zero: more than all other preferences of a table together."""
 OBLIQUE_COST, STRAIGHT_COST, NEGATIVE_COST = 20.0, 2.0, 1.0
 """Extra costs of an angle that is no multiple of 90 degrees, of one of 180 degrees, and of a negative number."""
+LONG, TOO_LONG_COST = 2.0, 1e5
+"""Length, in units of the longest step, from which an entry is too long, and the cost of each unit beyond it: no entry
+that is saved is worth a long one."""
 EARLY_COST = 0.1
 """Extra cost of an offset d for each row after it, so that the last of parallel axes has the whole offset."""
 ON_AXIS_DISTANCE = 1e-9
@@ -42,7 +45,8 @@ MAX_PARTIAL_TABLES = 336
 class Axes:
     """The axes of n joints in the base, with every joint at zero.
 
-    Lengths are in units of about the arm's size, by which :func:`~dhkit.model.extraction.table.tidiest_table` divides.
+    Lengths are in units of about the arm's longest step from joint to joint, by which
+    :func:`~dhkit.model.extraction.table.tidiest_table` divides.
 
     Attributes
     ----------
@@ -153,8 +157,10 @@ class Path:
 
 
 def length_costs(lengths: Array) -> Array:
-    """Return the costs of entries with these lengths, any shape, in units of about the arm's size; same shape."""
-    return np.where(np.abs(lengths) <= ZERO, 0.0, ENTRY_COST + NEGATIVE_COST * (lengths < 0))
+    """Return the costs of entries with these lengths, any shape, in units of about the longest step; same shape."""
+    size = np.abs(lengths)
+    too_long = TOO_LONG_COST * np.maximum(size - LONG, 0.0)
+    return np.where(size <= ZERO, 0.0, ENTRY_COST + NEGATIVE_COST * (lengths < 0) + too_long)
 
 
 def angle_costs(angles: Array) -> Array:

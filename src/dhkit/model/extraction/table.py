@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -78,14 +79,50 @@ def nearly_parallel(axes: Axes) -> list[tuple[int, float]]:
     return [(i, float(sine)) for i, sine in enumerate(sines, start=1) if low < sine < high]
 
 
+class MadeParallel(NamedTuple):
+    """Two neighbouring axes that a file's rounded angles leave a little from parallel."""
+
+    first: int
+    """Number of the first one's joint, from 1."""
+    angle: float
+    """Angle between them in the file, rad."""
+
+
+def with_parallel_axes(axes: Axes, roundings: Sequence[float]) -> tuple[Axes, tuple[MadeParallel, ...]]:
+    """Return the axes, those parallel that are parallel to within the rounding of a file's angles.
+
+    Parameters
+    ----------
+    axes
+        The axes of n joints.
+    roundings
+        By how much the angle between each axis and the next may be off, n - 1 numbers, rad.
+    """
+    directions = axes.directions.copy()
+    made: list[MadeParallel] = []
+    for i, rounding in enumerate(roundings):
+        sine = float(np.linalg.norm(np.cross(axes.directions[i], axes.directions[i + 1])))
+        if 0 < sine <= rounding:
+            directions[i + 1] = directions[i] * np.sign(axes.directions[i] @ axes.directions[i + 1])
+            if sine > NEARLY_PARALLEL_SINES[0]:
+                made.append(MadeParallel(i + 1, math.asin(sine)))
+    return replace(axes, directions=directions), tuple(made)
+
+
 def tidiest_table(axes: Axes, convention: Convention) -> Table:
     """Return the table with the fewest nonzero entries through these axes."""
-    extent = max(float(np.abs(axes.points).max()), float(np.abs(axes.T_base_tip[:3, 3]).max()))
-    # Costs are compared for an arm whose size is about 1; scaling by a power of two changes no digit.
-    unit = 2.0 ** round(math.log2(extent)) if extent > 0 else 1.0
+    # Costs are compared for an arm whose longest step is about 1; scaling by a power of two changes no digit.
+    longest = _longest_step(axes)
+    unit = 2.0 ** round(math.log2(longest)) if longest > 0 else 1.0
     tip = _with_lengths_times(1 / unit, axes.T_base_tip)
     table = _unit_table(replace(axes, points=axes.points / unit, feet=axes.feet / unit, T_base_tip=tip), convention)
     return Table(table.rows * [1.0, unit, unit, 1.0], _with_lengths_times(unit, table.T_base_first))
+
+
+def _longest_step(axes: Axes) -> float:
+    """Return the largest distance between the origins of two joints that follow each other, of base and tip too, m."""
+    origins = np.vstack([np.zeros((1, 3)), axes.points, axes.T_base_tip[None, :3, 3]])
+    return float(np.linalg.norm(np.diff(origins, axis=0), axis=1).max())
 
 
 def _with_lengths_times(factor: float, T: Array) -> Array:
