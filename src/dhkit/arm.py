@@ -53,7 +53,9 @@ class Arm:
     # Constructors
 
     @classmethod
-    def load(cls, name: str | Path, *, base: str | None = None, tip: str | None = None) -> Arm:
+    def load(
+        cls, name: str | Path, *, base: str | None = None, tip: str | None = None, as_designed: bool = False
+    ) -> Arm:
         """Return a robot of the library by name, or read a robot file (``.toml``) or a chain of a URDF by path.
 
         ``example:NAME`` is a robot of the package example-robot-data. After a URDF or an example, ``#TIP`` or
@@ -65,6 +67,8 @@ class Arm:
             Name or path.
         base, tip
             First and last link of the chain in a URDF; by default its root, and the end of its only chain.
+        as_designed
+            Read rounded angles of a URDF, such as 1.5708, as the right angles that they stand for.
 
         Raises
         ------
@@ -76,11 +80,10 @@ class Arm:
         text = str(name)
         is_file = text.lower().endswith((".urdf", ".xacro"))
         if text.startswith("example:") or is_file or ".urdf#" in text.lower():
-            return cls.from_urdf(name, base=base, tip=tip)
-        if base is not None or tip is not None:
-            raise DescriptionError(
-                f"{name}: base and tip cut a chain out of a URDF; expected a .urdf file or example:NAME"
-            )
+            return cls.from_urdf(name, base=base, tip=tip, as_designed=as_designed)
+        if base is not None or tip is not None or as_designed:
+            what = "as_designed is for rounded angles" if as_designed else "base and tip cut a chain out"
+            raise DescriptionError(f"{name}: {what} of a URDF; expected a .urdf file or example:NAME")
         if isinstance(name, str) and not name.endswith(".toml") and "/" not in name:
             return cls(describe.library_robot(name))
         return cls(describe.read_robot(name))
@@ -95,6 +98,7 @@ class Arm:
         convention: Literal["standard", "modified"] = "standard",
         side: Side = "freeze",
         as_designed: bool = False,
+        exact: bool = False,
         package_dirs: Sequence[str | Path] = (),
     ) -> Arm:
         """Return a chain of a URDF as an arm; see :func:`dhkit.model.extract_dh`, which also reports the steps.
@@ -116,6 +120,7 @@ class Arm:
             convention=convention,
             side=side,
             as_designed=as_designed,
+            exact=exact,
             package_dirs=package_dirs,
         )
         return cls(extraction.description)

@@ -16,6 +16,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from dhkit import __version__
 from dhkit.cli.exit_status import ExitStatus
+from dhkit.cli.options import AS_DESIGNED, as_designed_option
 from dhkit.cli.output import ReaderGone, say
 from dhkit.cli.streams import clean_streams
 from dhkit.description.joint_text import DEGREES
@@ -75,7 +76,10 @@ class LazyCommand(TyperCommand):
 def load_command(name: str) -> TyperCommand:
     """Import the module of a command, and return the command."""
     module = import_module(f"dhkit.cli.{COMMANDS[name]}")
-    return cast(TyperCommand, typer.main.get_group(module.app).commands[name])
+    command = cast(TyperCommand, typer.main.get_group(module.app).commands[name])
+    if any(parameter.name == "robot" for parameter in command.params):
+        command.params.append(as_designed_option())
+    return command
 
 
 class Commands(TyperGroup):
@@ -115,6 +119,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(format="dhkit: %(message)s", level=logging.WARNING)
     logging.getLogger("dhkit").setLevel(logging.INFO)  # messages about work that takes seconds, such as compiling
     degrees = DEGREES.set(False)
+    as_designed = AS_DESIGNED.set(False)
     try:
         status = app(args=None if arguments is None else list(arguments), standalone_mode=False)
     except (DhkitError, ValueError) as error:
@@ -133,6 +138,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         raise KeyboardInterrupt from None
     finally:
         DEGREES.reset(degrees)
+        AS_DESIGNED.reset(as_designed)
     if status == ExitStatus.INTERRUPTED:  # some versions of typer return it for Ctrl-C
         raise KeyboardInterrupt
     return status if isinstance(status, int) else ExitStatus.FINE

@@ -13,7 +13,7 @@ import typer
 from dhkit.arm import Arm
 from dhkit.bench import QUANTITIES, BenchReport, Ending, Requirement, run as run_bench
 from dhkit.cli.exit_status import ExitStatus
-from dhkit.cli.options import Json, Seed
+from dhkit.cli.options import Json, Seed, read_arm
 from dhkit.cli.output import print_json, say
 from dhkit.cli.streams import styled, visible
 from dhkit.description import write_atomically
@@ -41,7 +41,7 @@ def bench(
     Quantities: fk, ik, jacobian, inverse_dynamics, mass_matrix, forward_dynamics.
     """
     return run(
-        Arm.load(robot),
+        read_arm(robot),
         quantities or QUANTITIES,
         batch=batch,
         threads=threads,

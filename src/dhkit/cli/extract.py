@@ -17,6 +17,8 @@ from dhkit.errors import DescriptionError
 from dhkit.model import Extraction, example_chains, extract_dh, urdf_source
 from dhkit.model.robot_folder import write_robot_with_meshes
 
+TURNED = 4.0
+"""Largest difference, in sizes of the arm, for each radian by which axes were turned to be parallel."""
 TOLERANCE = 1e-9
 """Largest difference from the file, as a share of the reach, of a table that is the same robot."""
 
@@ -36,6 +38,9 @@ def extract(
     as_designed: Annotated[
         bool, typer.Option("--as-designed", help="Read 1.5708 as a right angle, and say what that changes.")
     ] = False,
+    exact: Annotated[
+        bool, typer.Option("--exact", help="Keep axes that rounded angles leave a little from parallel as they are.")
+    ] = False,
     drop: Annotated[
         bool, typer.Option("--drop-side", help="Leave out links behind joints beside the chain; else they are frozen.")
     ] = False,
@@ -47,7 +52,8 @@ def extract(
 ) -> ExitStatus:
     """Find the Denavit-Hartenberg table of a URDF's chain, with its bodies, limits and meshes.
 
-    Prints how far the table is from the file; exit status 1 where that is more than 1e-9.
+    Prints how far the table is from the file; exit status 1 where that is more than 1e-9, and more than the angles by
+    which axes were made parallel.
     """
     if output is not None and output.suffix.lower() != ".toml":
         raise DescriptionError(f"{output}: expected a robot file that ends in .toml")
@@ -59,6 +65,7 @@ def extract(
         convention="modified" if modified else "standard",
         side="drop" if drop else "freeze",
         as_designed=as_designed,
+        exact=exact,
         package_dirs=package_dir or (),
     )
     files = [] if output is None else write_robot_with_meshes(extraction.description, output)
@@ -69,7 +76,7 @@ def extract(
         if files:
             say(f"wrote {files[0]}" + (f" and {len(files) - 1} meshes" if len(files) > 1 else ""))
     size = max(1.0, extraction.description.reach)
-    agrees = extraction.changes or extraction.residual.largest <= TOLERANCE * size
+    agrees = extraction.changes or extraction.residual.largest <= (TOLERANCE + TURNED * extraction.turned) * size
     return ExitStatus.FINE if agrees else ExitStatus.NO
 
 

@@ -14,7 +14,7 @@ import typer
 from dhkit.arm import Arm
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.grade_output import FORMS, Graded, check_output, deliver
-from dhkit.cli.options import Json
+from dhkit.cli.options import Json, read_arm
 from dhkit.cli.output import say
 from dhkit.cli.streams import styled
 from dhkit.description import write_atomically
@@ -76,7 +76,7 @@ def grade(
     if template is not None:
         return write_template(template, output)
     if explain is not None:
-        return write_explanation(Arm.load(explain), form, output)
+        return write_explanation(read_arm(explain), form, output)
     if not sheets:
         raise DescriptionError("no answer sheet; expected files or folders, --template NAME or --explain NAME")
     options: dict[str, Any] = {"form": form, "feedback": feedback, "output": output, "json": json}
@@ -139,7 +139,7 @@ def grade_files(
         As :func:`run`, or there is no such robot, rubric or task.
     """
     read = None if task is None else read_task(task)
-    about = Arm.load(robot).description if robot is not None else None
+    about = read_arm(robot).description if robot is not None else None
     if about is None and read is not None and task is not None and read.robot:
         about = robot_of(read, task.parent)
     is_single = len(sheets) == 1 and sheets[0].suffix == ".toml" and sheets[0].is_file()
@@ -324,7 +324,7 @@ def _progress(total: int) -> Iterator[Callable[[int, int], None] | None]:
 
 def write_template(robot: str, output: Path | None) -> ExitStatus:
     """Print or write an empty answer sheet."""
-    description = Arm.load(robot).description
+    description = read_arm(robot).description
     # A sheet finds robot files only in its own folder.
     name = Path(robot).name if robot.endswith(".toml") else description.name
     return _deliver(empty_sheet(description, name), output)

@@ -12,7 +12,7 @@ import typer
 from dhkit.arm import Arm
 from dhkit.cli.arguments import joint_values
 from dhkit.cli.extract import list_examples
-from dhkit.cli.options import Degrees, Json, Robot
+from dhkit.cli.options import Degrees, Json, Robot, read_arm
 from dhkit.cli.output import print_json, print_table, say
 from dhkit.cli.units import angle_key, joint_entry
 from dhkit.description import Description, Joint, pose_parts, robots as library_names
@@ -48,7 +48,7 @@ def robots(
 @app.command()
 def info(robot: Robot, json: Json = False) -> None:
     """Show a robot: its DH table, limits, masses, configurations and what is odd about it."""
-    arm = Arm.load(robot)
+    arm = read_arm(robot)
     if json:
         print_json(_facts(arm))
         return
@@ -95,7 +95,7 @@ def fk(
     json: Json = False,
 ) -> None:
     """Print where the tool is for given joint values (rad and m)."""
-    arm = Arm.load(robot)
+    arm = read_arm(robot)
     values = joint_values(arm, q, degrees)
     T, link_frames = arm.fk(values), arm.frames(values)
     if json:

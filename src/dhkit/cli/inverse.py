@@ -13,7 +13,7 @@ import typer
 from dhkit.arm import Arm
 from dhkit.cli.arguments import OutsideLimits, option_values, target, with_long_options
 from dhkit.cli.exit_status import ExitStatus
-from dhkit.cli.options import Degrees, EulerAngles, EulerOrder, Json, Robot
+from dhkit.cli.options import Degrees, EulerAngles, EulerOrder, Json, Robot, read_arm
 from dhkit.cli.output import print_json, print_table, say
 from dhkit.cli.units import angle_key, joint_entry
 from dhkit.description import Array, pose_parts
@@ -133,7 +133,7 @@ def ik(
 
     Numbers may be expressions such as 17*inch or pi/2; joint values may be the name of a configuration.
     """
-    arm = Arm.load(robot)
+    arm = read_arm(robot)
     T = target(arm, xyz=xyz, euler=euler, order=order, matrix=matrix, like=like, degrees=degrees)
     near_q = None if near is None else option_values(arm, near, "--near", degrees, OutsideLimits.ALLOWED)
     solutions, method, note = _solve(arm, T, near_q, limits=limits, numeric=numeric)

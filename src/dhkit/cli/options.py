@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextvars import ContextVar
 from typing import Annotated, Any
 
 import typer
@@ -45,13 +46,46 @@ Seed = Annotated[int, typer.Option(min=0, help="Seed of the random states.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
+AS_DESIGNED: ContextVar[bool] = ContextVar("as_designed", default=False)
+"""Whether rounded angles of URDFs are read as right angles; set by the option that all commands with a robot have."""
+
+
+def as_designed_option() -> Any:
+    """Return the option ``--as-designed``, as typer makes it of a command's parameter."""
+
+    def use(value: bool) -> bool:
+        AS_DESIGNED.set(value)
+        return value
+
+    option = typer.Option(
+        "--as-designed",
+        callback=use,
+        help="Read rounded angles of a URDF, such as 1.5708, as the right angles that they stand for.",
+    )
+
+    def command(as_designed: Annotated[bool, option] = False) -> None:
+        """Have the option."""
+
+    command.__annotations__["as_designed"] = Annotated[bool, option]
+    app = typer.Typer()
+    app.command()(command)
+    parameter = next(each for each in typer.main.get_command(app).params if each.name == "as_designed")
+    parameter.expose_value = False
+    return parameter
+
+
+def read_arm(robot: str) -> Arm:
+    """Return a robot by name or file."""
+    return Arm.load(robot, as_designed=AS_DESIGNED.get())
+
+
 def load_arm(robot: str, uniform: bool = False) -> Arm:
     """Return a robot by name or file; ``uniform`` replaces its bodies by uniform rods.
 
     Warnings about a file are printed on stderr: a mesh that is missing is not free space. Those about robots of the
     library concern published data, and `dhkit info` prints them.
     """
-    arm = Arm.load(robot)
+    arm = read_arm(robot)
     if robot not in library_names():
         for warning in arm.description.warnings:
             sys.stderr.write(f"dhkit: warning: {warning}\n")

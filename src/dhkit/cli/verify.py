@@ -10,11 +10,10 @@ from typing import Annotated
 
 import typer
 
-from dhkit.arm import Arm
 from dhkit.cli.endings import end_in_order_on_signals
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.extract import chain_of
-from dhkit.cli.options import Json, Robot, Seed, Uniform, load_arm
+from dhkit.cli.options import Json, Robot, Seed, Uniform, load_arm, read_arm
 from dhkit.cli.output import finite, print_json, say
 from dhkit.description import write_atomically
 from dhkit.errors import DescriptionError
@@ -95,7 +94,7 @@ def check(
     """
     if not run and len(program) != 1:
         raise DescriptionError(f"{len(program)} files; expected one, or --run with a program and its arguments")
-    arm, source = Arm.load(robot), program if run else Path(program[0])
+    arm, source = read_arm(robot), program if run else Path(program[0])
     protect_from_children()
     end_in_order_on_signals()
     points = None if rubric is None else CheckRubric.read(rubric)

@@ -344,6 +344,23 @@ def _notes(
     return notes
 
 
+def tip_in_base(chain: Chain, q: Array) -> Array:
+    """Return the tip in the base at joint values q (n,), rad and m, as a product of the URDF's transforms, (4, 4)."""
+    from scipy.spatial.transform import Rotation
+
+    values = dict(zip(chain.names, q, strict=True))
+    T = np.eye(4)
+    for joint in chain.tree.joints_to(chain.tip, chain.base) or ():
+        motion = np.eye(4)
+        if (value := values.get(joint.name)) is not None:
+            if joint.is_prismatic:
+                motion[:3, 3] = value * joint.axis
+            else:
+                motion[:3, :3] = Rotation.from_rotvec(value * joint.axis).as_matrix()
+        T = T @ joint.T_parent_joint @ motion
+    return T
+
+
 def chain_model(chain: Chain) -> PinocchioModel:
     """Return a chain as a Pinocchio model of the original file; joint i of the chain is joint i of the model.
 

@@ -374,11 +374,14 @@ def _color(material: Element) -> str | None:
 def _designed_angle(word: str, value: float) -> float:
     """Return the multiple of 15 degrees that a decimal of at least three digits rounds or cuts, or the value itself.
 
-    The difference of a right angle and its decimal, such as 3.6732e-06, is read as 0.
+    The difference of a right angle and its decimal, such as 3.6732e-06, is read as 0, and that of half a turn and a
+    rounded right angle, such as 1.570796326589793 = pi - 1.570796327, as the right angle.
     """
     if _is_rounding_of_zero(value):
         return 0.0
     multiple = round(value * 12 / math.pi) * math.pi / 12
+    if multiple and _is_rounding_of_zero(value - multiple, rel_tol=1e-5):
+        return multiple
     decimal = Decimal(word)
     digits, exponent = decimal.as_tuple().digits, decimal.as_tuple().exponent
     if len(digits) < MIN_DIGITS or not isinstance(exponent, int) or abs(multiple) > math.tau + 1e-9 or exponent > 0:
@@ -404,9 +407,9 @@ def _decimal_rounding(word: str) -> float:
     return float(10.0**decimal.exponent)
 
 
-def _is_rounding_of_zero(value: float) -> bool:
+def _is_rounding_of_zero(value: float, rel_tol: float = 1e-3) -> bool:
     """Return whether a number is the difference of a right angle and its decimal: 1.5708 - pi/2 = 3.67e-6."""
-    return abs(value) < 1e-12 or any(math.isclose(abs(value), error, rel_tol=1e-3) for error in _rounding_errors())
+    return abs(value) < 1e-12 or any(math.isclose(abs(value), error, rel_tol=rel_tol) for error in _rounding_errors())
 
 
 @lru_cache(maxsize=1)

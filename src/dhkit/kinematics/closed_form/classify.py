@@ -82,7 +82,8 @@ def classify(description: Description) -> Classification:
     words = f"{kinds}: no closed form known"
     near = next(filter(None, (_first(Axes.of(description, tolerance)) for tolerance in NEAR_MISSES)), None)
     if near is not None:
-        words += f" (nearly one of {kinds} with {near[1].geometry}, but not to {TOLERANCE:g}: are its angles rounded?)"
+        words += f" (nearly one of {kinds} with {near[1].geometry}, but not to {TOLERANCE:g}: are its angles rounded?"
+        words += " as_designed=True (--as-designed) reads them as right angles)"
     meets_all = near is not None and near[1].coordinates == ALL_COORDINATES
     return Classification(words, None, None, near if meets_all else None)
 

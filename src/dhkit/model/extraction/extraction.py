@@ -52,6 +52,8 @@ class Extraction:
         Numbers that ``as_designed`` read differently from how they are written.
     decimals
         Decimals that its numbers are rounded to; None: they are kept as computed.
+    turned
+        Sum of the angles by which axes were turned to be parallel, rad.
     """
 
     description: Description
@@ -59,6 +61,7 @@ class Extraction:
     notes: tuple[str, ...]
     changes: tuple[str, ...]
     decimals: int | None
+    turned: float = 0.0
 
     def __repr__(self) -> str:
         text = f"{self.description.kinds}, {self.description.convention.value} DH, off by {self.residual.largest:.1e}"
@@ -159,7 +162,7 @@ def extracted(
     else:
         notes.append(f"differs from the file by {residual}")
     description = replace(description, notes="\n".join(notes)[:MAX_NOTES_LENGTH])
-    return Extraction(description, residual, tuple(notes), changes, decimals)
+    return Extraction(description, residual, tuple(notes), changes, decimals, turned)
 
 
 def _robot_name(chain: Chain) -> str:

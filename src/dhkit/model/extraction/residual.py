@@ -11,7 +11,7 @@ from dhkit.description import Array, Description, world_to_tool
 from dhkit.display import value_line
 from dhkit.errors import ModelError
 from dhkit.model.reference import NoPinocchioError, PinocchioModel, pinocchio_model
-from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_model
+from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_model, tip_in_base
 
 STATES = 100
 """Number of random states of a residual."""
@@ -82,7 +82,7 @@ class Original:
         ModelError
             The tool's poses differ: one of the readers does not know an element of the file.
         """
-        difference = np.abs(np.array([self._product(q) for q in self.q]) - self.tool)
+        difference = np.abs(np.array([tip_in_base(self.chain, q) for q in self.q]) - self.tool)
         difference[:, :3, 3] /= max(self.size, 1.0)
         if (largest := difference.max()) > MAX_READING_DIFFERENCE:
             raise ModelError(f"{self.chain.path}: Pinocchio puts the tool {largest:.2g} away from where dhkit reads it")
@@ -104,7 +104,7 @@ class Original:
 
     def _tools(self) -> Iterator[Array]:
         if self.model is None:
-            yield from (self._product(q) for q in self.q)
+            yield from (tip_in_base(self.chain, q) for q in self.q)
             return
         import pinocchio as pin
 
@@ -113,22 +113,6 @@ class Original:
         for q in self.q:
             pin.framesForwardKinematics(self.model, data, q)
             yield (data.oMf[base].inverse() * data.oMf[tip]).homogeneous
-
-    def _product(self, q: Array) -> Array:
-        """Return the tip in the base as a product of the URDF's transforms."""
-        from scipy.spatial.transform import Rotation
-
-        values = dict(zip(self.chain.names, q, strict=True))
-        T = np.eye(4)
-        for joint in self.chain.tree.joints_to(self.chain.tip, self.chain.base) or ():
-            motion = np.eye(4)
-            if (value := values.get(joint.name)) is not None:
-                if joint.is_prismatic:
-                    motion[:3, 3] = value * joint.axis
-                else:
-                    motion[:3, :3] = Rotation.from_rotvec(value * joint.axis).as_matrix()
-            T = T @ joint.T_parent_joint @ motion
-        return T
 
 
 def _random_states(chain: Chain, count: int, seed: int) -> Array:

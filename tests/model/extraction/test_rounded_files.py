@@ -1,0 +1,108 @@
+"""Tables of URDFs whose angles are rounded: no lengths of kilometres, and residuals no larger than the rounding.
+
+Modules: extraction, table, axes.
+"""
+
+import re
+
+import numpy as np
+import pytest
+
+from acceptance import ACCEPTING
+from dhkit import Arm
+from dhkit.description import asset, library_robot, robots, world_to_tool
+from dhkit.errors import ModelError
+from dhkit.model import example_chains, extract_dh
+from dhkit.model.extraction.extraction import extracted
+from dhkit.model.extraction.residual import Original
+from dhkit.model.urdf_chain import chain_of
+from dhkit.model.urdf_reader import read_urdf
+from dhkit.verification import verify_urdf
+
+LENGTHS = 3.0
+"""Largest length of a table, in lengths of the longest offset of the file."""
+HALF = 0.5
+"""A rounded angle is off by half a unit of its last decimal."""
+
+
+def with_rounded_angles(text, decimals):
+    """Return a URDF with all angles rounded."""
+
+    def rounded(match):
+        words = [
+            f"{float(word):.{decimals}f}" if abs(float(word) - round(float(word))) > 1e-12 else word
+            for word in match[2].split()
+        ]
+        return f'{match[1]}"{" ".join(words)}"'
+
+    return re.sub(r"(rpy\s*=\s*)[\"']([^\"']*)[\"']", rounded, text)
+
+
+def library_urdfs():
+    return [(name, asset(f"urdf/{name}.urdf"), None, None) for name in robots() if library_robot(name).n > 1]
+
+
+def example_urdfs():
+    try:
+        chains = list(example_chains()) if ACCEPTING else []
+    except ModelError:
+        return []
+    return [(one.name, one.path, one.base, one.tip) for one in chains if 2 <= len(one.joints) <= 7]
+
+
+@pytest.mark.parametrize("decimals", [3, 4, 5, 6])
+def test_tables_of_rounded_files_are_as_large_as_the_arm(law, decimals, tmp_path):
+    file = tmp_path / "rounded.urdf"
+    every = [*library_urdfs(), *example_urdfs()]
+    for name, path, base, tip in every if ACCEPTING else every[decimals % 4 :: 4]:
+        file.write_text(with_rounded_angles(path.read_text(), decimals))
+        chain = chain_of(read_urdf(file), base, tip)
+        extraction = extracted(chain)
+        arm = extraction.description
+        path_to_tip = chain.tree.joints_to(chain.tip, chain.base)
+        own = max(float(np.linalg.norm(joint.T_parent_joint[:3, 3])) for joint in path_to_tip)
+        longest = float(max(np.abs(arm.numbers.a).max(), np.abs(arm.numbers.d).max()))
+        law.holds("largest length over the file's own", longest / own if own else longest, LENGTHS, name)
+        original = Original(chain)
+        off = np.linalg.norm((world_to_tool(arm, original.q) - original.tool)[:, :3, 3], axis=1).max()
+        rounding = HALF * 10.0**-decimals * max(arm.reach, original.size)
+        law.holds("residual over reach times rounding", float(off) / rounding, 1.0 + 1e-6, name)
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda", "irb140"])
+def test_what_is_computed_of_a_rounded_file_agrees(name, tmp_path):
+    """verify, the comparison with the file, and inverse kinematics by iteration, as for the exact file."""
+    file = tmp_path / "rounded.urdf"
+    file.write_text(with_rounded_angles(asset(f"urdf/{name}.urdf").read_text(), 4))
+    arm = Arm.load(file)
+    assert arm.verify(samples=50).ok
+    assert verify_urdf(arm.description, file, samples=50).ok
+    assert verify_urdf(library_robot(name), file, tip="tool", samples=50).ok
+    exact = Arm.load(name)
+    low = exact.limits.lower.clip(-np.pi)
+    high = exact.limits.upper.clip(None, np.pi)
+    q = np.random.default_rng(0).uniform(low, high, (40, exact.n))
+    found = arm.ik_numeric(arm.fk(q))
+    expected = exact.ik_numeric(exact.fk(q))
+    assert found.valid.sum() >= expected.valid.sum() - 1
+
+
+def test_exact_keeps_the_axes_of_the_file(tmp_path):
+    """Two axes of the SO-100 kind: 1.5708 leaves them 3.7e-6 rad from parallel."""
+    file = tmp_path / "rounded.urdf"
+    file.write_text(with_rounded_angles(asset("urdf/ur5.urdf").read_text(), 4).replace('rpy="0 0 0"', 'rpy="1e-5 0 0"'))
+    kept = extract_dh(file, exact=True)
+    made = extract_dh(file)
+    assert kept.residual.tool < 1e-8
+    assert kept.turned == 0
+    assert any("made parallel" in note for note in made.notes) == (made.turned > 0)
+
+
+def test_angles_of_half_a_turn_less_a_rounded_right_angle_are_designed(tmp_path):
+    """The files of Universal Robots write 1.570796327 beside 1.570796326589793 = pi - 1.570796327."""
+    file = tmp_path / "arm.urdf"
+    text = asset("urdf/ur5.urdf").read_text()
+    assert '"1.5707963267948966' in text
+    file.write_text(text.replace('"1.5707963267948966', '"1.570796326589793'))
+    assert "closed form, 8 branches" in str(Arm.load(file, as_designed=True).family)
+    assert "as_designed=True (--as-designed)" in str(Arm.load(file).family)
