@@ -25,6 +25,9 @@ from dhkit.description.values import Base, Convention, Placement, Tool
 from dhkit.errors import DescriptionError
 from dhkit.expressions import Expression, exact, exact_angle
 
+ROD_DECIMALS = 9
+"""Decimals of the ends of rods between points on the axes, m."""
+
 ASYMMETRY_TOLERANCE = 1e-12
 """Largest difference of two symmetric entries of an inertia, relative to its largest entry: rounding of R I R^T."""
 
@@ -154,7 +157,8 @@ def with_uniform_links(description: Description, masses: Sequence[Quantity] | No
     """Return the arm with each link a thin uniform rod, its mass a parameter ``m1`` ... ``mn``.
 
     In the standard convention link i lies from frame i-1's origin to frame i's, in the modified one from frame i's to
-    frame i+1's; the last ends at the tool. A prismatic joint is at zero.
+    frame i+1's; the last ends at the tool. A prismatic joint is at zero. Where nearly parallel axes take the origins
+    far away, links lie between points on the axes, see :mod:`dhkit.description.joint_centres`.
 
     Parameters
     ----------
@@ -188,12 +192,19 @@ def with_uniform_links(description: Description, masses: Sequence[Quantity] | No
 
 def _link_ends(description: Description) -> list[tuple[Vector, Vector]]:
     """Return where each link's rod begins and ends, in the link's own frame, m."""
+    if (far := description.numbers.link_ends) is not None:
+        return [(_exact_vector(begin), _exact_vector(end)) for begin, end in zip(*far, strict=True)][1:]
     rows = [fixed_row(joint, description.convention) for joint in description.joints]
     tool = _origin(pose_of(description.tool.placement))
     if description.convention is Convention.MODIFIED:
         return [(ORIGIN, _origin(row)) for row in rows[1:]] + [(ORIGIN, tool)]
     starts = [_origin(inverse(row)) for row in rows]
     return [*((start, ORIGIN) for start in starts[:-1]), (starts[-1], tool)]
+
+
+def _exact_vector(point: Array) -> Vector:
+    x, y, z = (exact(round(float(entry), ROD_DECIMALS) + 0.0) for entry in point)
+    return x, y, z
 
 
 def _origin(T: ExactPose) -> Vector:

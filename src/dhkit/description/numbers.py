@@ -13,10 +13,11 @@ from dhkit.cached_property import cached_property
 from dhkit.description.arrays import Array
 from dhkit.description.bodies import INERTIA_PLACES, Body, joined
 from dhkit.description.exact_poses import pose_of
+from dhkit.description.joint_centres import FAR, LinkEnds, link_ends
 from dhkit.description.parameters import resolved
 from dhkit.description.robot_data import RobotData
 from dhkit.description.traversal import with_values
-from dhkit.description.values import Placement
+from dhkit.description.values import Convention, Placement
 from dhkit.display import counted, repr_line
 from dhkit.expressions import Expression, cos, exact_angle, sin, substitute
 
@@ -77,7 +78,15 @@ class Numbers:
     configurations: dict[str, Array]
     """Joint vectors by name, shape (n,), rad and m."""
     reach: float
-    """The sum of abs(a) + abs(d) + stroke, m."""
+    """The sum of abs(a) + abs(d) + stroke, m; with ``link_ends``, of their lengths and the strokes."""
+    link_ends: LinkEnds | None
+    """Ends of the links where a and d are no sizes of the arm, since axes are nearly parallel; see
+    :mod:`dhkit.description.joint_centres`."""
+
+    @property
+    def table_length(self) -> float:
+        """The sum of abs(a) + abs(d), m: rounding errors of positions are shares of it."""
+        return float(np.sum(np.abs(self.a) + np.abs(self.d)))
 
     @cached_property
     def drive_inertia(self) -> Array:
@@ -121,6 +130,13 @@ class Numbers:
         prismatic = np.array([not j.is_revolute for j in joints])
         # How far each prismatic joint can move away from zero, m; one without limits adds nothing to the reach.
         strokes = [float(stroke) for stroke in np.maximum(abs(lower), abs(upper))[prismatic] if np.isfinite(stroke)]
+        T_last_tool = matrix(description.tool.placement, values)
+        cos_alpha, sin_alpha = array(cos(x) for x in alpha), array(sin(x) for x in alpha)
+        is_standard = description.convention is Convention.STANDARD
+        ends = link_ends(a, d, cos_alpha, sin_alpha, is_standard=is_standard, tool=T_last_tool[:3, 3])
+        along_table = float(np.sum(np.abs(a) + np.abs(d)))
+        along_centres = float(ends.lengths.sum())
+        is_far = along_table > FAR * along_centres
         mass, com, inertia = zip(*(_body_arrays(_as_one(j.bodies, values), array, np.nan) for j in joints), strict=True)
         numbers = cls(
             values={name: float(value) for name, value in values.items()},
@@ -128,8 +144,8 @@ class Numbers:
             d=d,
             alpha=array(alpha),
             theta=array(theta),
-            cos_alpha=array(cos(x) for x in alpha),
-            sin_alpha=array(sin(x) for x in alpha),
+            cos_alpha=cos_alpha,
+            sin_alpha=sin_alpha,
             cos_theta=array(cos(x) for x in theta),
             sin_theta=array(sin(x) for x in theta),
             prismatic=prismatic,
@@ -147,9 +163,10 @@ class Numbers:
             base_body=_body_arrays(description.base.body, array, 0.0),
             gravity=array(description.gravity),
             T_world_base=matrix(description.base.placement, values),
-            T_last_tool=matrix(description.tool.placement, values),
+            T_last_tool=T_last_tool,
             configurations={name: array(q) for name, q in description.configurations.items()},
-            reach=float(np.sum(np.abs(a) + np.abs(d)) + float(sum(strokes))),
+            reach=(along_centres if is_far else along_table) + float(sum(strokes)),
+            link_ends=ends if is_far else None,
         )
         for value in [*vars(numbers).values(), *numbers.configurations.values()]:
             if isinstance(value, np.ndarray):

@@ -3,6 +3,7 @@
 A link goes from its own joint's axis to the next: by d along the first, then by a along the common normal of the two.
 These are drawn as a column and a tube. On the next axis the link has a drum, in which the next link turns on a slimmer,
 longer hub. A prismatic joint is a square bar of the stroke's length in a block. Sizes are relative to the arm's reach.
+Where nearly parallel axes make a and d no sizes of the arm, links are tubes between balls at the joints' centres.
 """
 
 from __future__ import annotations
@@ -330,12 +331,16 @@ class _Drawing:
         self.joints = _joints(description, self.links)
         self.T_world_base = description.numbers.T_world_base
         self.T_last_tool = description.numbers.T_last_tool
+        self.far_ends = description.numbers.link_ends
 
     def link(self, i: int) -> Iterator[Solid]:
         """Draw link i in its DH frame."""
         link = self.links[i]
         ends = self.joints[max(i - 1, 0) : i + 1]
         tube = TUBE_RADIUS * min(joint.radius for joint in ends)
+        if self.far_ends is not None:
+            yield from self._between(self.far_ends.begin[i], self.far_ends.end[i], ends[0].radius, tube)
+            return
         if i:
             yield from _own_joint_solids(link, self.joints[i - 1], tube)
         elif not self.joints[0].prismatic:
@@ -346,6 +351,13 @@ class _Drawing:
             yield Sphere(_size(tube)), link.T_corner
         if i < len(self.joints):
             yield from _next_joint_solids(link, self.joints[i])
+
+    def _between(self, begin: Array, end: Array, radius: float, tube: float) -> Iterator[Solid]:
+        """Draw a ball at the centre of a link's own joint, and a tube from it to that of the next."""
+        yield Sphere(_size(radius)), _at(begin)
+        length = float(np.linalg.norm(end - begin))
+        if length > MIN_NECK_LENGTH * tube:
+            yield _cylinder(_at(begin) @ _frame_towards(end - begin), tube, 0.0, length)
 
     def _foot(self) -> Iterator[Solid]:
         """Draw a plate on the floor, and a post from it to the first drum if that is higher.
@@ -363,6 +375,8 @@ class _Drawing:
 
     def neck(self) -> Iterator[Solid]:
         """Draw the neck between the last link and the gripper, in DH frame n."""
+        if self.far_ends is not None:
+            return
         radius, T_end_gripper, root = TUBE_RADIUS * self.joints[-1].radius, *self._gripper_place()
         offset = self.T_last_tool[:3, 3]
         length = float(np.linalg.norm(offset))
@@ -455,6 +469,12 @@ def _normal_pose(a: float, cos_alpha: float, sin_alpha: float) -> Array:
 
 def _shift(x: float = 0.0, z: float = 0.0) -> Array:
     return np.array([[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, z], [0, 0, 0, 1.0]])
+
+
+def _at(point: Array) -> Array:
+    T = np.eye(4)
+    T[:3, 3] = point
+    return T
 
 
 def _about_z(angle: float) -> Array:

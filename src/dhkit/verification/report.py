@@ -11,9 +11,9 @@ MAX_SHOWN = 20
 """Largest number of quantities that a notebook shows; an arm's own report has fewer."""
 MEASURE = (
     "Each error is the largest difference of an entry at one state. Positions and linear rows of Jacobians are divided "
-    "by the arm's reach (at least 1 m); rotations are not scaled. All other quantities are divided by the largest "
-    "entry of the reference, or by a natural size where that is larger (for torques: weight of all links times reach, "
-    "plus the largest entry of M times those of the accelerations and of the squared rates)."
+    "by the lengths of the table (at least 1 m); rotations are not scaled. All other quantities are divided by the "
+    "largest entry of the reference, or by a natural size where that is larger (for torques: weight of all links times "
+    "reach, plus the largest entry of M times those of the accelerations and of the squared rates)."
 )
 
 
