@@ -8,6 +8,7 @@ from hypothesis import given
 
 from bad_robot_files import GOOD
 from dhkit.description import DHTable, Units, from_toml, library_robot, read_robot, robots, to_toml, write_robot
+from dhkit.errors import DescriptionError
 from dhkit.expressions import PI, exact
 from random_arms import arms
 
@@ -170,3 +171,20 @@ def test_the_table_prints_as_people_expect():
     assert "<table>" in table._repr_html_()
     assert r"\begin{tabular}" in table.latex()
     assert "l1" in str(DHTable.of(library_robot("planar2r")))
+
+
+@pytest.mark.parametrize(
+    ("line", "value"),
+    [("theta = q1", "q1"), ("a = 17*inch", "17*inch"), ("limits = [-1, pi/2]", "pi/2"), ("name = puma # x", "puma")],
+)
+def test_expressions_without_quotes_get_a_hint(line, value):
+    with pytest.raises(DescriptionError, match=r"not TOML: .*; names and expressions are in quotes: ") as caught:
+        from_toml(f"format = 1\n{line}\n")
+    assert str(caught.value).endswith(f'"{value}"')
+
+
+def test_a_file_may_write_the_joint_variable():
+    text = to_toml(library_robot("planar2r"))
+    written = iter(("q1", "q2"))
+    lines = [f'theta = "{next(written)}"' if line.startswith("theta") else line for line in text.split("\n")]
+    assert from_toml("\n".join(lines)) == library_robot("planar2r")

@@ -1,9 +1,12 @@
 """Tables in: any order, units, letters, text; and what is no table."""
 
+from dataclasses import replace
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
-from dhkit.description import DHTable, from_dh, world_to_tool
+from dhkit.description import DHTable, from_dh, from_toml, to_toml, world_to_tool
 from dhkit.errors import DescriptionError
 from dhkit.expressions import PI, exact
 
@@ -67,3 +70,37 @@ def test_a_table_of_symbols_prints_symbols():
     latex = DHTable.of(arm).latex()
     assert r"60^\circ" in latex
     assert "°" not in latex
+
+
+def test_rows_may_name_their_entries_and_write_the_joint_variable():
+    """As a table is printed by arm.dh."""
+    by_place = from_dh([(0, 0.3, 0, "pi/2"), ("-pi/2", 0, 0.2, 0)], kinds="RP")
+    by_name = from_dh([{"theta": "q1", "d": 0.3, "alpha": "pi/2"}, {"theta": "-pi/2", "d": "q2", "a": 0.2}], kinds="RP")
+    assert by_name == by_place
+    offset = from_dh([("q1 + pi/2", 0, 0.5, 0), ("q_2 - 0.1", 0, 0.5, 0)])
+    assert offset.numbers.theta == pytest.approx([np.pi / 2, -0.1])
+    with pytest.raises(DescriptionError, match="row 1: found 'phi'; expected theta, d, a, alpha"):
+        from_dh([{"phi": 0}])
+    for entry in ("q2", "2*q1", "q1*2", "sin(q1)"):
+        with pytest.raises(DescriptionError, match="row 1: theta"):
+            from_dh([(entry, 0, 1, 0)])
+
+
+def test_a_number_as_text_has_no_unit():
+    """243.3 in a table of mm would be 243.3 m as an expression."""
+    with pytest.raises(DescriptionError, match=r"row 1: d: '243.3' is text without a unit; expected the number 243.3"):
+        from_dh([(0, "243.3", 0, 0)], length="mm")
+    with pytest.raises(DescriptionError, match=r"row 1: alpha: '90' is text .* such as 90\*deg"):
+        from_dh([(0, 0, 1, "90")], angle="deg")
+    found = from_dh([("0", "243.3*mm", "280*mm", "90*deg")], length="mm", angle="deg")
+    assert found.numbers.d[0] == 0.2433 and found.numbers.alpha[0] == np.pi / 2
+    assert from_dh([(0, "0.2433", "0", "pi/2")]).numbers.d[0] == 0.2433
+
+
+def test_numbers_without_a_finite_decimal_are_written_as_expressions():
+    """0.3 m in inches, and 1 rad in degrees."""
+    arm = from_dh([("1*1", "0.3*1", 1, 0)], length="in", angle="deg")
+    text = to_toml(arm)
+    assert from_toml(text).numbers.d[0] == 0.3
+    plain = replace(arm.joints[0], d=exact(Fraction(3, 10)), theta=exact(1))
+    assert from_toml(to_toml(replace(arm, joints=(plain,)))).numbers.d[0] == 0.3

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from dhkit.description.bodies import INERTIA_PLACES, Body, Inertia, Vector
 from dhkit.description.files import read_bounded, write_atomically
 from dhkit.description.named import Named
+from dhkit.description.quantities import parse_quantity, without_variable
 from dhkit.description.robot import Description, takes_robot
 from dhkit.description.toml_text import toml_document
 from dhkit.description.toml_writer import toml_text
@@ -32,7 +33,7 @@ from dhkit.description.values import (
     Units,
 )
 from dhkit.errors import DescriptionError, ExpressionError
-from dhkit.expressions import Budget, Expression, exact, exact_angle, parse
+from dhkit.expressions import Budget, Expression, exact, exact_angle
 
 if TYPE_CHECKING:
     from dhkit.description.schema import (
@@ -137,7 +138,7 @@ class _FormReader:
     def number(self, where: str, entry: Entry, unit: Expression = ONE) -> Expression:
         """Return the value of an entry: a bare number in this unit, or text in SI."""
         try:
-            return parse(entry, self.names) if isinstance(entry, str) else exact(entry) * unit
+            return parse_quantity(entry, self.names, unit) if isinstance(entry, str) else exact(entry) * unit
         except ExpressionError as error:
             raise DescriptionError(f"{where}: {error}") from None
 
@@ -162,6 +163,11 @@ class _FormReader:
     def joint(self, number: int, form: JointForm) -> Joint:
         where = f"joint {number}" + (f" ({form.name[:40]})" if form.name else "")
         kind = JointType(form.type)
+        theta, d = form.theta, form.d
+        if kind is JointType.REVOLUTE:
+            theta = without_variable(theta, number)
+        else:
+            d = without_variable(d, number)
         limits = None
         if form.limits is not None:
             lower, upper = (self.motion(f"{where}: limits[{i}]", kind, x) for i, x in enumerate(form.limits))
@@ -170,8 +176,8 @@ class _FormReader:
             type=kind,
             a=self.length(f"{where}: a", form.a),
             alpha=self.angle(f"{where}: alpha", form.alpha),
-            d=self.length(f"{where}: d", form.d),
-            theta=self.angle(f"{where}: theta", form.theta),
+            d=self.length(f"{where}: d", d),
+            theta=self.angle(f"{where}: theta", theta),
             name=form.name,
             limits=limits,
             velocity=None if form.velocity is None else self.motion(f"{where}: velocity", kind, form.velocity),

@@ -11,18 +11,19 @@ from typing import Any, TypeAlias
 from dhkit.description.bodies import INERTIA_PLACES, Body, Inertia
 from dhkit.description.named import Named
 from dhkit.description.parameters import check_parameter_name
+from dhkit.description.quantities import parse_quantity, without_variable
 from dhkit.description.robot import Description
 from dhkit.description.table import COLUMNS
-from dhkit.description.values import Convention, Joint, JointType, Units
+from dhkit.description.values import ONE, Convention, Joint, JointType, Units
 from dhkit.errors import DescriptionError, ExpressionError
-from dhkit.expressions import Expression, exact, exact_angle, parse
+from dhkit.expressions import Expression, exact, exact_angle
 
 Quantity: TypeAlias = float | Fraction | Decimal | str | Expression
 """A number, or text: ``0.4318``, ``"17*inch"``, ``"l1/2"``."""
 
 
 def quantity(where: str, value: object, names: Mapping[str, object], unit: Expression | None = None) -> Expression:
-    """Return an argument's exact value; bare numbers are in ``unit``, text is in SI and may use these ``names``.
+    """Return an argument's exact value; numbers are in ``unit``, expressions are in SI and may use these ``names``.
 
     Raises
     ------
@@ -31,7 +32,7 @@ def quantity(where: str, value: object, names: Mapping[str, object], unit: Expre
     """
     try:
         if isinstance(value, str):
-            return parse(value, tuple(names))
+            return parse_quantity(value, tuple(names), ONE if unit is None else unit)
         number = exact(value)
         return number if unit is None or isinstance(value, Expression) else number * unit
     except ExpressionError as error:
@@ -39,7 +40,7 @@ def quantity(where: str, value: object, names: Mapping[str, object], unit: Expre
 
 
 def from_dh(
-    rows: Sequence[Sequence[Quantity]],
+    rows: Sequence[Sequence[Quantity] | Mapping[str, Quantity]],
     *,
     order: Sequence[str] = COLUMNS,
     kinds: str | Sequence[str] | None = None,
@@ -56,7 +57,9 @@ def from_dh(
     Parameters
     ----------
     rows
-        One row a joint: four numbers, in the units given, or text in metres and radians.
+        One row a joint: four numbers, in the units given, or expressions as text, in metres and radians; in a row by
+        names, ``{"theta": 0, "d": 0.3, "a": 0, "alpha": "pi/2"}``, zeros may be left out. The joint variable may be
+        written where ``arm.dh`` prints it: ``"q1"`` or ``"q1 + pi/2"`` for theta of a revolute joint 1.
     order
         Names of the columns, in their order.
     kinds
@@ -126,17 +129,38 @@ def _has_length(value: object, length: int) -> bool:
 
 
 def _joint(
-    number: int, row: Sequence[Quantity], order: Sequence[str], letter: str, units: Units, names: Mapping[str, object]
+    number: int,
+    row: Sequence[Quantity] | Mapping[str, Quantity],
+    order: Sequence[str],
+    letter: str,
+    units: Units,
+    names: Mapping[str, object],
 ) -> Joint:
-    if not _has_length(row, len(COLUMNS)):
-        raise DescriptionError(f"row {number}: found {row!r}; expected {', '.join(order)}")
+    kind = JointType.REVOLUTE if letter == "R" else JointType.PRISMATIC
     entries = {
         key: quantity(f"row {number}: {key}", value, names, units.metres if key in "da" else units.radians)
-        for key, value in zip(order, row, strict=True)
+        for key, value in _named_entries(number, row, order, kind).items()
     }
     theta, alpha = (exact_angle(entries[key]) for key in ("theta", "alpha"))
-    kind = JointType.REVOLUTE if letter == "R" else JointType.PRISMATIC
     return Joint(kind, entries["a"], alpha, entries["d"], theta)
+
+
+def _named_entries(
+    number: int, row: Sequence[Quantity] | Mapping[str, Quantity], order: Sequence[str], kind: JointType
+) -> dict[str, Quantity]:
+    """Return the entries of a row by their names, without the joint variable."""
+    if isinstance(row, Mapping):
+        if unknown := set(row) - set(COLUMNS):
+            found = sorted(map(str, unknown))[0][:40]
+            raise DescriptionError(f"row {number}: found {found!r}; expected {', '.join(COLUMNS)}")
+        entries = dict.fromkeys(COLUMNS, 0) | dict(row)
+    elif _has_length(row, len(COLUMNS)):
+        entries = dict(zip(order, row, strict=True))
+    else:
+        raise DescriptionError(f"row {number}: found {row!r}; expected {', '.join(order)}")
+    column = "theta" if kind is JointType.REVOLUTE else "d"
+    entries[column] = without_variable(entries[column], number)
+    return entries
 
 
 def _limits(

@@ -17,6 +17,11 @@ DOTTED_KEY = re.compile(r"(?<![\w\-\"'])[\w\-\"']++(?:[ \t]*+\.[ \t]*+[\w\-\"']+
 """A key of ten dotted parts or more, which no file of ours has; tomllib takes quadratic time over such keys.
 
 Possessive quantifiers keep this expression itself linear."""
+LINE = re.compile(r"\(at line (\d+),")
+UNQUOTED = re.compile(r"[=,\[]\s*(?!(?:true|false|inf|nan)\b)([^\s\"'\[{,#]*[A-Za-z*/][^\"',\]}#]{0,200})")
+"""A value, of a key or in a list, that is neither text nor a number."""
+MAX_HINT = 500
+"""Number of characters of a line that are searched for such a value."""
 MAX_INTEGER_BITS = 2_048
 """Largest size of a whole number, in bits: beyond the range of a double."""
 
@@ -37,8 +42,15 @@ def toml_document(text: str) -> Document:
     except RecursionError:
         raise DescriptionError("nested too deep") from None
     except ValueError as error:
-        raise DescriptionError(f"not TOML: {str(error)[:200]}") from None
+        raise DescriptionError(f"not TOML: {str(error)[:200]}{_unquoted(text, str(error))}") from None
     return document
+
+
+def _unquoted(text: str, message: str) -> str:
+    """Return a hint if the parser stopped in a line with an expression or a name that lacks its quotes."""
+    place = LINE.search(message)
+    value = UNQUOTED.search(text.split("\n")[int(place[1]) - 1][:MAX_HINT]) if place else None
+    return f'; names and expressions are in quotes: "{value[1].strip()[:40]}"' if value else ""
 
 
 def plain_numbers(document: Document) -> Document:

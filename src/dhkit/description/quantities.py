@@ -1,0 +1,56 @@
+"""Text of a quantity in a table with units."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+from typing import TypeVar
+
+from dhkit.description.values import ONE
+from dhkit.errors import ExpressionError
+from dhkit.expressions import CONSTANTS, Expression, parse
+
+PLAIN_NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?\s*", re.ASCII)
+"""Text that is a number and nothing else."""
+
+JOINT_VARIABLE = re.compile(r"\s*q_?([0-9]{1,2})\s*([+-].*)?", re.ASCII | re.DOTALL)
+"""A joint variable and what is added to it."""
+
+Entry = TypeVar("Entry")
+
+
+def is_plain_number(text: str) -> bool:
+    """Return whether text is a number and nothing else."""
+    return PLAIN_NUMBER.fullmatch(text) is not None
+
+
+def parse_quantity(text: str, names: Collection[str], unit: Expression = ONE) -> Expression:
+    """Return the value of an expression, which is in metres and radians; it may use these names.
+
+    A number as text, "243.3" in a table of mm, is refused: it may mean either unit. "(0.2433)" is an expression.
+
+    Raises
+    ------
+    ExpressionError
+        Not an expression, or a number as text where ``unit``, that of numbers, is another one.
+    """
+    value = parse(text, names)
+    if unit != ONE and is_plain_number(text) and not value.is_zero:
+        written = text.strip()
+        name = next((name for name, constant in CONSTANTS.items() if constant == unit), "its unit")
+        raise ExpressionError(
+            f"{written!r} is text without a unit; expected the number {written}, or an expression such as"
+            f" {written}*{name}; in parentheses it is in m or rad"
+        )
+    return value
+
+
+def without_variable(entry: Entry, number: int) -> Entry | str | int:
+    """Return an entry of a table's row without that row's joint variable before its offset: of "q1 + pi/2" the offset.
+
+    Tables are printed so, and books print them so; the variable itself is added to theta, or to d, of every row.
+    """
+    if isinstance(entry, str) and (match := JOINT_VARIABLE.fullmatch(entry)) and int(match[1]) == number:
+        offset: str | None = match[2]
+        return offset or 0
+    return entry
