@@ -1,4 +1,7 @@
-"""Tables in: any order, units, letters, text; and what is no table."""
+"""Tables in: any order, units, letters, text; and what is no table.
+
+Modules: table_rows, quantities.
+"""
 
 from dataclasses import replace
 from fractions import Fraction

@@ -135,3 +135,30 @@ def test_the_free_joint_of_the_neighbour_comes_from_the_seed():
     q = np.array([0.3, 0.5, -1.2, 0.7, 0.0, 0.2])
     near = arm.ik(arm.fk(q), seed=q).nearest(q)
     assert np.abs(arm.fk(near) - arm.fk(q)).max() < CLOSES
+
+
+@pytest.mark.parametrize(
+    ("twist", "offset"), [(1e-15, 0), (1e-14, 0), (9e-13, 0), (0, 1e-15), (0, 1e-14), (0, 9e-13), (0, 0)]
+)
+def test_poses_at_the_boundary_of_an_arm_that_nearly_is_of_a_family_are_reached(law, twist, offset):
+    """Stretched and folded: the family's member is 1e-6 of the reach too short for an arm that misses it by 1e-12."""
+    right = np.pi / 2
+    rows = [
+        (0, 0.3, 0, right),
+        (0, 0, 0.4, twist),
+        (0, 0.1, 0.05, -right),
+        (0, 0.4, offset, right),
+        (0, 0, 0, -right),
+        (0, 0.1, 0, 0),
+    ]
+    arm = Arm.from_dh(rows)
+    assert arm.family.closed_form
+    rng = np.random.default_rng(0)
+    count = law.samples(300, least=40)
+    q = rng.uniform(-np.pi, np.pi, (count, 6))
+    q[:, 2] = rng.choice([-right, right], count) + np.arctan2(0.05, 0.4) + rng.choice([0, 1e-9, 1e-6], count)
+    T = arm.fk(q)
+    found = arm.ik(T)
+    law.holds("poses that are not reached", int(np.sum(~found.valid.any(axis=1))), 0)
+    back = arm.fk(np.where(found.valid[..., None], found.q, 0.0))
+    law.holds("closing", float(np.abs(back - T[:, None]).max(axis=(2, 3))[found.valid].max()), 1e-10)

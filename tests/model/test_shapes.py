@@ -1,4 +1,7 @@
-"""Laws of what arms look like."""
+"""Laws of what arms look like.
+
+Modules: shapes, drawing.
+"""
 
 import re
 from dataclasses import replace

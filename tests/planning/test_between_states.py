@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from dhkit import Arm, Floor, Obstacle
+from dhkit import Arm, Floor, Limits, Obstacle
 from dhkit.description import from_toml
 from dhkit.errors import PlanningError
 from dhkit.planning.between_states import SMALLEST_TRAVEL, smallest_between
+from dhkit.planning.certificate import Checker
 from dhkit.planning.loaded import loaded
 from dhkit.planning.obstacles import distance
-from dhkit.planning.states import States
 from dhkit.trajectories import JointPath, Trajectory
 
 ROD = """
@@ -58,16 +58,16 @@ def test_a_contact_of_any_depth_is_found_from_few_states(arm, law):
         point = Arm(arm).frames(motion.q(rng.uniform(0.1, 0.6)))[-1]
         near = point[:3, 3] - (1 - share) * point[:3, 0] + rng.normal(size=3) * (0.002 + size) * rng.choice([0.3, 1.5])
         scene = [Obstacle.sphere(size, near)]
-        least = np.array([rng.choice([0.0, 0.003])])
+        least = np.full((8, 1), rng.choice([0.0, 0.003]))
 
         def gaps(q, scene=scene):
             return np.asarray(distance(arm, q, scene).distance)[:, None]
 
-        states = States.of(loaded(arm), motion, np.linspace(0, 0.7, 8))
+        states = Checker(loaded(arm), Limits.of(arm), points=8).states(motion)
         found = min(gaps(states.q).min(), smallest_between(states, gaps(states.q), gaps, least).min())
         truth = gaps(motion.q(np.linspace(0, 0.7, 20_001))).min()
-        seen += truth < least[0] - SMALLEST_TRAVEL
-        missed += truth < least[0] - SMALLEST_TRAVEL and found >= least[0]
+        seen += truth < least[0, 0] - SMALLEST_TRAVEL
+        missed += truth < least[0, 0] - SMALLEST_TRAVEL and found >= least[0, 0]
         assert found >= truth - 1e-4
     assert seen
     law.holds("contacts missed", missed, 0)
@@ -80,8 +80,9 @@ def test_far_away_nothing_is_measured_again():
         calls.append(len(q))
         return np.full((len(q), 1), 2.0)
 
-    states = States.of(loaded(ONE), Trajectory.from_samples(ONE, [0, 1], [[0], [1]], [[0], [0]]), np.linspace(0, 1, 9))
-    assert np.isinf(smallest_between(states, np.full((9, 1), 2.0), gaps, np.zeros(1))).all()
+    motion = Trajectory.from_samples(ONE, [0, 1], [[0], [1]], [[0], [0]])
+    states = Checker(loaded(ONE), Limits.of(ONE), points=9).states(motion)
+    assert np.isinf(smallest_between(states, np.full((9, 1), 2.0), gaps, np.zeros((9, 1)))).all()
     assert not calls
 
 

@@ -280,15 +280,15 @@ def test_both_sides_of_a_constraint_are_certified():
 def test_a_state_that_is_not_a_number_is_not_certified(monkeypatch):
     arm = library_robot("planar2r")
     motion = Planner(arm, intervals=12).solve([0, 0], [0.6, -0.5])
-    peaks = Checker.peaks
+    measured = Checker.measured
 
     def with_one_unknown(self, states):
-        found = peaks(self, states)
+        found = measured(self, states)
         found[max(found)][5, 0] = np.nan
         return found
 
     assert Checker(arm, Limits.of(arm)).check(motion).ok
-    monkeypatch.setattr(Checker, "peaks", with_one_unknown)
+    monkeypatch.setattr(Checker, "measured", with_one_unknown)
     certificate = Checker(arm, Limits.of(arm)).check(motion)
     assert not certificate.ok
     assert certificate.violation == np.inf

@@ -241,7 +241,7 @@ def _join_base(chain: _Chain, row: ExactPose) -> _Chain:
     """Make frame 1 the new frame 0."""
     T_new_old = inverse(row)
     placement = placement_of(pose_of(chain.base.placement) @ row)
-    shapes = _moved_shapes(chain.base.shapes, T_new_old) + chain.joints[0].shapes
+    shapes = _joined_shapes(_moved_shapes(chain.base.shapes, T_new_old), chain.joints[0].shapes)
     on_base = _moved_bodies(chain.bodies[0], T_new_old) + chain.bodies[1]
     return _Chain(Base(placement, shapes), chain.joints[1:], chain.tool, (on_base, *chain.bodies[2:]))
 
@@ -282,9 +282,15 @@ def _join_link_before(
 
 def _with_shapes_of(before: Joint, locked: Joint, T_new_before: ExactPose, T_new_locked: ExactPose) -> Joint:
     """Return the link before with the locked link's shapes, both moved into the new frame."""
-    shapes = _moved_shapes(before.shapes, T_new_before) + _moved_shapes(locked.shapes, T_new_locked)
+    shapes = _joined_shapes(_moved_shapes(before.shapes, T_new_before), _moved_shapes(locked.shapes, T_new_locked))
     assumed = tuple(dict.fromkeys(before.assumed + ("body",) * ("body" in locked.assumed)))
     return replace(before, shapes=shapes, assumed=assumed)
+
+
+def _joined_shapes(before: tuple[Shape, ...], locked: tuple[Shape, ...]) -> tuple[Shape, ...]:
+    """Return the shapes of a link and of one that is locked to it, whose bodies are numbered on."""
+    count = 1 + max((shape.body for shape in before), default=0)
+    return before + tuple(replace(shape, body=count + shape.body) for shape in locked)
 
 
 def _moved_bodies(bodies: LinkBodies, T: ExactPose) -> LinkBodies:

@@ -221,7 +221,7 @@ class _FormReader:
     def shape(self, where: str, form: ShapeForm) -> Shape:
         placement = self.placement(where, form)
         frame = self.placement(f"{where}.frame", form.frame)
-        return Shape(self.geometry(where, form), placement, form.color, frame)
+        return Shape(self.geometry(where, form), placement, form.color, frame, form.frame.body)
 
     def geometry(self, where: str, form: ShapeForm) -> Geometry:
         if form.mesh is not None:

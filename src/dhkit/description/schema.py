@@ -172,8 +172,9 @@ class BallForm(Form):
 
 
 class FrameForm(Form):
-    """The DH frame of a link that was locked to another, in the DH frame of that one."""
+    """The DH frame of a link that was locked to another, in the DH frame of that one, and its number in the link."""
 
+    body: Annotated[int, Field(ge=0, le=MAX_JOINTS)] = 0
     xyz: Triple = Field(default=[0, 0, 0])
     rpy: Triple = Field(default=[0, 0, 0])
 

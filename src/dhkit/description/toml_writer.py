@@ -143,7 +143,7 @@ def _shape(shape: Shape, units: Units) -> InlineTable:
             ends = {key: _entry(size, units.metres) for key, size in vars(geometry).items()}
             content = {type(geometry).__name__.lower(): _inline_table(ends)}
     color = {"color": shape.color} if shape.color is not None else {}
-    frame = _placement(shape.frame, units)
+    frame = _placement(shape.frame, units) | ({"body": shape.body} if shape.body else {})
     of_locked_link = {"frame": _inline_table(frame)} if frame else {}
     return _inline_table(content | _placement(shape.placement, units) | of_locked_link | color)
 

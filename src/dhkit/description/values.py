@@ -171,6 +171,8 @@ class Shape:
     frame: Placement = Placement()
     """Pose of that frame in the link's DH frame. It is the same frame, but for shapes of a link that was locked to this
     one: they keep their own frame, and remain one body."""
+    body: int = 0
+    """Number of that body in the link, along the chain: 0, unless links were locked together."""
 
     def __repr__(self) -> str:
         color = "" if self.color is None else f", {self.color}"

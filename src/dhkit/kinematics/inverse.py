@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,9 +13,11 @@ from dhkit.errors import ModelError
 from dhkit.kernels import check_whole, pose_rows
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.external import solve_externally
-from dhkit.kinematics.solutions import IKSolutions
+from dhkit.kinematics.solutions import IKSolutions, IKStatus
 from dhkit.kinematics.solver import free_angles, solve_in_closed_form, solver_of
 
+BOUNDARY_SHARE = 1e-4
+"""Distance beyond the workspace, as a share of the reach, of poses that an arm near a family may still reach."""
 CHUNK = 16_384
 """Poses per chunk: with eight branches 6 MB of joint positions, which fit into the processor's cache."""
 
@@ -65,7 +68,44 @@ def inverse_kinematics(
         return _solved_otherwise(description, poses, seed, out)
     batch = poses.shape[:-2]
     free = free_angles(description, solver.fit, seed, batch)
-    return solve_in_closed_form(description, solver, poses, free, out, threads)
+    found = solve_in_closed_form(description, solver, poses, free, out, threads)
+    return found if classify(description).neighbour is None else _with_poses_at_the_boundary(description, found, poses)
+
+
+def _with_poses_at_the_boundary(description: Description, found: IKSolutions, poses: Array) -> IKSolutions:
+    """Return solutions of an arm that misses its family by at most 1e-12, near the boundary of the workspace too.
+
+    There the miss counts by its square root: a pose that the arm reaches stretched may be 1e-6 of the reach beyond what
+    the family's member reaches. Such poses are solved by Newton's method from that member's solutions.
+    """
+    from dhkit.kinematics.neighbour import solve_from_neighbour  # with SciPy's rotations, 60 ms
+
+    least = BOUNDARY_SHARE * max(description.reach, 1e-300)
+    is_near = (found.status_code == IKStatus.out_of_reach) & (found.distance <= least)
+    rows = np.flatnonzero(is_near.ravel())
+    if not len(rows):
+        return found
+    refined = solve_from_neighbour(description, poses.reshape(-1, 4, 4)[rows])
+    B = len(found.branches)
+    q = found.q.reshape(-1, B, description.n)
+    valid, flags = found.valid.reshape(-1, B), found.flags.reshape(-1, B)
+    status, distance = found.status_code.ravel(), found.distance.ravel()
+    q[rows], valid[rows], flags[rows] = refined.q[:, :B], refined.valid[:, :B], refined.flags[:, :B]
+    # What iteration finds beside the branches takes the place of the first.
+    by_iteration = np.flatnonzero(refined.valid[:, B] & ~refined.valid[:, :B].any(axis=1))
+    for each, others in ((q, refined.q), (valid, refined.valid), (flags, refined.flags)):
+        each[rows[by_iteration], 0] = others[by_iteration, B]
+    reached = valid[rows].any(axis=1)
+    status[rows] = np.where(reached, IKStatus.singular, IKStatus.not_found)
+    distance[rows] = np.where(reached, 0.0, distance[rows])
+    return replace(
+        found,
+        q=q.reshape(found.q.shape),
+        valid=valid.reshape(found.valid.shape),
+        flags=flags.reshape(found.flags.shape),
+        status_code=status.reshape(found.status_code.shape),
+        distance=distance.reshape(found.distance.shape),
+    )
 
 
 @takes_robot

@@ -1,25 +1,18 @@
-"""Shapes of an arm's links: those of its description, or solids drawn from the table for links without shapes.
-
-A link goes from its own joint's axis to the next: by d along the first, then by a along the common normal of the two.
-These are drawn as a column and a tube. On the next axis the link has a drum, in which the next link turns on a slimmer,
-longer hub. A prismatic joint is a square bar of the stroke's length in a block. Sizes are relative to the arm's reach.
-Where nearly parallel axes make a and d no sizes of the arm, links are tubes between balls at the joints' centres.
-"""
+"""Shapes of an arm's links: those of its description, or solids drawn from the table for links without shapes."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from itertools import pairwise
 from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
 
 from dhkit.cached_property import cached_property
-from dhkit.description import Array, Box, Convention, Cylinder, Description, Geometry, Mesh, Shape, Sphere, takes_robot
+from dhkit.description import Array, Description, Geometry, Mesh, Shape, takes_robot
 from dhkit.description.assets import inside
 from dhkit.description.changes import placement_of_pose
 from dhkit.description.mesh_files import is_mesh_file
@@ -27,43 +20,13 @@ from dhkit.description.numbers import matrix
 from dhkit.description.parameters import resolved
 from dhkit.description.traversal import with_values
 from dhkit.display import repr_line
-from dhkit.expressions import Expression, exact
-
-Solid: TypeAlias = tuple[Geometry, Array]
-"""A geometry and its pose in its link's DH frame, shape (4, 4), m."""
+from dhkit.model.drawing import Drawing, Solid
 
 BASE_COLOR = "#4a4f57"
 """Foot and gripper: dark, to tell them from links."""
 PALETTE = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#bbbbbb")
 """Links 1, 2 ...: Tol's bright scheme (SRON/EPS/TN/09-002, 2021), which colour-blind people can tell apart too."""
-FIRST_DRUM_RADIUS, LAST_DRUM_RADIUS = 0.05, 0.028
-"""Radius of the first and of the last drum, relative to the reach: arms taper."""
-TUBE_RADIUS = 0.62
-"""Radius of a tube, relative to the smaller drum at its ends, so that drums stay visible."""
-DRUM_HALF_HEIGHT = 0.9
-"""Half the height of a drum, relative to its radius: the tube, which is narrower, ends inside the drum."""
-HUB_RADIUS, HUB_HALF_LENGTH = 0.8, 1.2
-"""Radius and half length of a hub, relative to its drum: slimmer, and visible at both faces."""
-NESTED_RADIUS, NESTED_HALF_HEIGHT = 0.78, 1.25
-"""Of drums about one point each is slimmer and longer than the one before by these factors, so that all are visible."""
-MAX_FIRST_DRUM_HALF = 0.3
-"""Half the height of the first drum, at most, relative to the height of the next axis: the drum stays below it."""
-BLOCK_HALF_LENGTH = 1.3
-"""Half the length of a slider's block, relative to its half width."""
-BAR_HALF_WIDTH, STOP_HALF_WIDTH = 0.55, 0.8
-"""Half widths of a slider's bar and of the stops at a rail's ends, relative to the block's."""
-PLATE_RADIUS, POST_HEIGHT = 1.8, 2.0
-"""Radius of the foot's plate and height of the post below a drum at frame 0, relative to the drum's radius."""
-THICKNESS = 0.25
-"""Thickness of plates and stops, relative to the radius of the drum or the half width of the block."""
-GRIPPER_START = 1.25
-"""Distance at which the gripper begins on an arm that ends in its last drum, relative to the joint's extent."""
-MIN_NECK_LENGTH = 1e-3
-"""Shortest neck that is drawn, relative to its radius."""
-
 IDENTITY: Array = np.eye(4)
-ALONG_X: Array = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-"""The rotation that takes z to x."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +143,7 @@ def with_drawn_shapes(description: Description) -> Description:
 
 def _parts(description: Description) -> tuple[list[list[Part]], list[list[Part]]]:
     """Return the described and the drawn parts of the base, each link and the tool; drawn are those without shapes."""
-    n, T_last_tool, arm = description.n, description.numbers.T_last_tool, _Drawing(description)
+    n, T_last_tool, arm = description.n, description.numbers.T_last_tool, Drawing(description)
     colors = [BASE_COLOR, *(PALETTE[i % len(PALETTE)] for i in range(n))]
     own = (description.base.shapes, *(joint.shapes for joint in description.joints))
     described = [_described_parts(description, shapes, i, colors[i]) for i, shapes in enumerate(own)]
@@ -214,8 +177,7 @@ def _tool_parts(description: Description, last_link: Sequence[Part]) -> list[Par
 def _described_parts(description: Description, shapes: Sequence[Shape], link: int, color: str) -> list[Part]:
     """Return shapes of a link as parts; none if a mesh's file is missing."""
     values = resolved(description.parameters)
-    frames = list(dict.fromkeys(shape.frame for shape in shapes))
-    poses = [matrix(frame, values) for frame in frames]
+    poses = {frame: matrix(frame, values) for frame in dict.fromkeys(shape.frame for shape in shapes)}
     parts: list[Part] = []
     for shape in shapes:
         geometry, file = shape.geometry, None
@@ -223,269 +185,10 @@ def _described_parts(description: Description, shapes: Sequence[Shape], link: in
             file = inside(description.mesh_folder, geometry.path, "shape.mesh")
             if file is None or not is_mesh_file(file):
                 return []
-        body = frames.index(shape.frame)
         T_body_part = matrix(shape.placement, values)
         color_of_part = shape.color or color
-        parts.append(Part(link, with_values(geometry, values), T_body_part, color_of_part, file, body, poses[body]))
-    return parts
-
-
-@dataclass(frozen=True, eq=False)
-class _Link:
-    """The path of a link: along its joint's axis by d to a corner, from there along the common normal by a to its end.
-
-    The base has only the second half. Poses are in the link's DH frame.
-    """
-
-    d: float
-    """m; that of a prismatic joint at q = 0."""
-    a: float
-    """m."""
-    T_corner: Array
-    """Shape (4, 4): z along the link's own joint axis, x along the common normal."""
-    T_end: Array
-    """Shape (4, 4): z along the next joint's axis, the same x."""
-
-    @property
-    def is_parallel(self) -> bool:
-        """Whether the axes of its two joints are parallel."""
-        return np.array_equal(np.abs(self.T_corner[:3, 2]), np.abs(self.T_end[:3, 2]))
-
-    def is_straight(self, within: float) -> bool:
-        """Whether the link ends on the axis on which it begins, up to a distance in m."""
-        return self.is_parallel and abs(self.a) < within
-
-
-@dataclass(frozen=True)
-class _Joint:
-    """The sizes of a joint, m; heights are along its axis, from the end of the link before it."""
-
-    prismatic: bool
-    radius: float
-    """Radius of the drum; half the width of a slider's block."""
-    half: float
-    """Half the drum's height; half the block's length."""
-    lift: float = 0.0
-    """Height of the drum's centre."""
-    stroke: tuple[float, float] = (0.0, 0.0)
-    """Lowest and highest height of a slider's corner."""
-    theta: float = 0.0
-    """A slider's angle about its axis, rad."""
-    is_rod: bool = False
-    """Whether the slider's bar moves, in a block of the link before; otherwise the block moves, on a rail."""
-
-    @property
-    def near(self) -> float:
-        """The height in a slider's stroke nearest to the link before; 0 if the stroke goes past it."""
-        return float(np.clip(0.0, *self.stroke))
-
-    @property
-    def extent(self) -> float:
-        """Largest distance of the joint's solids from the corner of the link after it, m."""
-        return 0.0 if self.is_rod else max(self.radius, HUB_HALF_LENGTH * self.half)
-
-
-def _links(description: Description) -> list[_Link]:
-    """Return the paths of links 0 to n."""
-    numbers = description.numbers
-    rows = np.stack([numbers.a, numbers.cos_alpha, numbers.sin_alpha], axis=1).tolist()
-    d, straight = [0.0, *numbers.d.tolist()], (0.0, 1.0, 0.0)
-    # A row's a and alpha describe the end of its own link, in the modified convention that of the link before.
-    if description.convention is Convention.STANDARD:
-        return [
-            _Link(x, a, _normal_pose(-a, c, -s), IDENTITY) for x, (a, c, s) in zip(d, [straight, *rows], strict=True)
-        ]
-    return [_Link(x, a, IDENTITY, _normal_pose(a, c, s)) for x, (a, c, s) in zip(d, [*rows, straight], strict=True)]
-
-
-def _joints(description: Description, links: Sequence[_Link]) -> list[_Joint]:
-    """Return the sizes of joints 1 to n."""
-    numbers, n = description.numbers, description.n
-    scale = max(description.reach, float(np.linalg.norm(numbers.T_last_tool[:3, 3]))) or 1.0
-    taper = LAST_DRUM_RADIUS - FIRST_DRUM_RADIUS
-    joints: list[_Joint] = []
-    for i, (before, after) in enumerate(pairwise(links)):
-        prismatic, radius, lift = bool(numbers.prismatic[i]), scale * (FIRST_DRUM_RADIUS + taper * i / n), 0.0
-        half = radius * (BLOCK_HALF_LENGTH if prismatic else DRUM_HALF_HEIGHT)
-        if joints and abs(before.d) + abs(before.a) < joints[-1].extent:
-            radius = min(radius, NESTED_RADIUS * joints[-1].radius)
-            half = max(half, NESTED_HALF_HEIGHT * joints[-1].extent / HUB_HALF_LENGTH)
-        if not joints and abs(after.d) > radius:  # frame 0 is on the floor: the drum stands on it, not in it
-            half = min(half, MAX_FIRST_DRUM_HALF * abs(after.d))
-            lift = float(np.copysign(HUB_HALF_LENGTH * half, after.d))
-        if not prismatic:
-            joints.append(_Joint(False, radius, half, lift))
-            continue
-        low, high = np.clip((numbers.lower[i], numbers.upper[i]), -scale, scale) + after.d
-        # A straight next link would lie inside a rail, so its bar moves instead, unless it would move through a base.
-        is_rod = after.is_straight(radius) and not all(link.is_straight(radius) for link in links[: i + 1])
-        joints.append(_Joint(True, radius, half, 0.0, (low, high), float(numbers.theta[i]), is_rod))
-    return joints
-
-
-class _Drawing:
-    """The links of an arm as solids, from its table alone."""
-
-    def __init__(self, description: Description) -> None:
-        self.links = _links(description)
-        self.joints = _joints(description, self.links)
-        self.T_world_base = description.numbers.T_world_base
-        self.T_last_tool = description.numbers.T_last_tool
-        self.far_ends = description.numbers.link_ends
-
-    def link(self, i: int) -> Iterator[Solid]:
-        """Draw link i in its DH frame."""
-        link = self.links[i]
-        ends = self.joints[max(i - 1, 0) : i + 1]
-        tube = TUBE_RADIUS * min(joint.radius for joint in ends)
-        if self.far_ends is not None:
-            yield from self._between(self.far_ends.begin[i], self.far_ends.end[i], ends[0].radius, tube)
-            return
-        if i:
-            yield from _own_joint_solids(link, self.joints[i - 1], tube)
-        elif not self.joints[0].prismatic:
-            yield from self._foot()
-        if link.a:
-            yield _cylinder(link.T_corner @ ALONG_X, tube, 0.0, link.a)
-        if link.a and link.d:
-            yield Sphere(_size(tube)), link.T_corner
-        if i < len(self.joints):
-            yield from _next_joint_solids(link, self.joints[i])
-
-    def _between(self, begin: Array, end: Array, radius: float, tube: float) -> Iterator[Solid]:
-        """Draw a ball at the centre of a link's own joint, and a tube from it to that of the next."""
-        yield Sphere(_size(radius)), _at(begin)
-        length = float(np.linalg.norm(end - begin))
-        if length > MIN_NECK_LENGTH * tube:
-            yield _cylinder(_at(begin) @ _frame_towards(end - begin), tube, 0.0, length)
-
-    def _foot(self) -> Iterator[Solid]:
-        """Draw a plate on the floor, and a post from it to the first drum if that is higher.
-
-        The floor is frame 0's plane if the arm rises from it, the world's z = 0 if frame 0 is above that.
-        """
-        joint, T_base_end = self.joints[0], self.links[0].T_end
-        T_world_end = self.T_world_base @ T_base_end
-        up = -1.0 if joint.lift < 0 else 1.0
-        raised = T_world_end[2, 3] if np.isclose(up * T_world_end[2, 2], 1.0) else 0.0
-        depth = max(raised, 0.0 if joint.lift else joint.extent + POST_HEIGHT * joint.radius)
-        yield _cylinder(T_base_end, PLATE_RADIUS * joint.radius, -up * depth, -up * (depth - THICKNESS * joint.radius))
-        if depth:
-            yield _cylinder(T_base_end, joint.radius, -up * depth, joint.lift)
-
-    def neck(self) -> Iterator[Solid]:
-        """Draw the neck between the last link and the gripper, in DH frame n."""
-        if self.far_ends is not None:
-            return
-        radius, T_end_gripper, root = TUBE_RADIUS * self.joints[-1].radius, *self._gripper_place()
-        offset = self.T_last_tool[:3, 3]
-        length = float(np.linalg.norm(offset))
-        if length > MIN_NECK_LENGTH * radius:
-            yield _cylinder(_frame_towards(offset), radius, 0.0, length)
-        if root:
-            yield _cylinder(T_end_gripper, radius, 0.0, root)
-
-    def gripper(self) -> Iterator[Solid]:
-        """Draw a flange and two fingers at the tool's origin, in DH frame n."""
-        size, T, root = self.joints[-1].radius, *self._gripper_place()
-        yield _cylinder(T, 0.9 * size, root, root + 0.3 * size)
-        yield _box(T, (1.05 * size, 0.45 * size), root + 0.3 * size, root + 0.7 * size)
-        for side in (-0.85, 0.85):
-            yield _box(T @ _shift(x=side * size), (0.2 * size, 0.4 * size), root + 0.7 * size, root + 1.9 * size)
-
-    def _gripper_place(self) -> tuple[Array, float]:
-        """Return the gripper's pose, z forwards, and the distance at which it begins, m.
-
-        An arm may end inside its last drum: then the gripper begins outside of it.
-        """
-        before, last, joint = *self.links[-2:], self.joints[-1]
-        T = self.T_last_tool
-        length = abs(last.d) + abs(last.a) + float(np.linalg.norm(T[:3, 3]))
-        root = max(0.0, GRIPPER_START * joint.extent - length)
-        if last.d or not np.array_equal(T, IDENTITY):
-            return T, root
-        a = last.a or (before.a if before.is_parallel and not joint.prismatic else 0.0)
-        return (_about_z(0.0 if a > 0 else np.pi) @ ALONG_X if a else T), root
-
-
-def _own_joint_solids(link: _Link, joint: _Joint, tube: float) -> Iterator[Solid]:
-    """Draw a link's part of its own joint: a hub and the column above it, a rod, or a block on a rail."""
-    if not joint.prismatic:
-        T_start, half = link.T_corner @ _shift(z=-link.d), HUB_HALF_LENGTH * joint.half
-        yield _cylinder(T_start, HUB_RADIUS * joint.radius, joint.lift - half, joint.lift + half)
-        if link.d:
-            yield _cylinder(T_start, tube, 0.0, link.d)
-        return
-    T, (low, high), wide = link.T_corner @ _about_z(-joint.theta), joint.stroke, joint.radius
-    if joint.is_rod:
-        yield _box(
-            T,
-            (BAR_HALF_WIDTH * wide, BAR_HALF_WIDTH * wide),
-            *_bar_ends(joint.near - high, joint.near - low, joint.half),
+        own = Part(
+            link, with_values(geometry, values), T_body_part, color_of_part, file, shape.body, poses[shape.frame]
         )
-    else:
-        yield _box(T, (wide, wide), -joint.half, joint.half)
-
-
-def _next_joint_solids(link: _Link, joint: _Joint) -> Iterator[Solid]:
-    """Draw a link's part of the next joint: a drum, a block around a rod, or a rail with its stops."""
-    T, wide = link.T_end, joint.radius
-    if not joint.prismatic:
-        yield _cylinder(T, joint.radius, joint.lift - joint.half, joint.lift + joint.half)
-    elif joint.is_rod:
-        yield _box(T, (wide, wide), min(-joint.half, joint.near), max(joint.half, joint.near))
-    else:
-        low, high = _bar_ends(*joint.stroke, joint.half + THICKNESS * wide)
-        yield _box(T, (BAR_HALF_WIDTH * wide, BAR_HALF_WIDTH * wide), low, high)
-        yield _box(T, (STOP_HALF_WIDTH * wide, STOP_HALF_WIDTH * wide), low, low + THICKNESS * wide)
-        yield _box(T, (STOP_HALF_WIDTH * wide, STOP_HALF_WIDTH * wide), high - THICKNESS * wide, high)
-
-
-def _bar_ends(low: float, high: float, margin: float) -> tuple[float, float]:
-    """Return the ends of a bar from 0 over a stroke, with a margin for the block at the ends other than 0."""
-    if low == high == 0:
-        return -margin, margin
-    return min(0.0, low - margin * (low < 0)), max(0.0, high + margin * (high > 0))
-
-
-def _cylinder(T: Array, radius: float, start: float, end: float) -> Solid:
-    """Return a cylinder about the z axis of T, from height start to end, m."""
-    return Cylinder(_size(radius), _size(abs(end - start))), T @ _shift(z=(start + end) / 2)
-
-
-def _box(T: Array, half: tuple[float, float], start: float, end: float) -> Solid:
-    """Return a box about the z axis of T, from height start to end, m; half widths along x and y."""
-    return Box((_size(2 * half[0]), _size(2 * half[1]), _size(end - start))), T @ _shift(z=(start + end) / 2)
-
-
-def _size(value: float) -> Expression:
-    """Return a length, m, rounded to six digits: a micrometre in a metre."""
-    return exact(float(f"{value:.6g}"))
-
-
-def _normal_pose(a: float, cos_alpha: float, sin_alpha: float) -> Array:
-    return np.array([[1, 0, 0, a], [0, cos_alpha, -sin_alpha, 0], [0, sin_alpha, cos_alpha, 0], [0, 0, 0, 1.0]])
-
-
-def _shift(x: float = 0.0, z: float = 0.0) -> Array:
-    return np.array([[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, z], [0, 0, 0, 1.0]])
-
-
-def _at(point: Array) -> Array:
-    T = np.eye(4)
-    T[:3, 3] = point
-    return T
-
-
-def _about_z(angle: float) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
-
-
-def _frame_towards(point: Array) -> Array:
-    """Return a frame at the origin whose z axis points to another point, shape (3,), m."""
-    from scipy.spatial.transform import Rotation
-
-    T = np.eye(4)
-    T[:3, :3] = Rotation.align_vectors([point], [(0, 0, 1)])[0].as_matrix()
-    return T
+        parts.append(own)
+    return parts

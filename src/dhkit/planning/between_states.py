@@ -16,9 +16,10 @@ from dhkit.description import Array
 from dhkit.description.frames import carrying, world_to_frames
 from dhkit.planning.obstacles import link_capsules, world_axes
 from dhkit.planning.states import States
+from dhkit.trajectories.pieces import Pieces
 
-SMALLEST_TRAVEL = 1e-4
-"""Travel of a link, m, below which a motion is not sampled more finely."""
+SMALLEST_TRAVEL, SMALLEST_SHARE = 1e-4, 0.1
+"""Travel of a link, m and as a share of the thinnest capsule's radius, below which a motion is not sampled again."""
 MAX_PARTS = 64
 """Largest number of parts into which a step is divided at once."""
 MAX_TURN = 0.5
@@ -30,40 +31,46 @@ def smallest_between(
 ) -> Array:
     """Return the smallest distances that are found after each state, before the next, shape (N, G), m.
 
-    If none of them is below ``least``, no distance is anywhere, to ``SMALLEST_TRAVEL``. They are infinite where the
-    distances at the states suffice to tell.
+    If none of them is below ``least``, no distance is anywhere, to half of ``SMALLEST_TRAVEL`` or ``SMALLEST_SHARE``.
+    They are infinite where the distances at the states suffice to tell.
 
     Parameters
     ----------
     states
-        N states in the order of time; where the time goes back, another run begins.
+        N states of a motion on a grid, see :class:`States`.
     found
         G distances at the states, shape (N, G), m.
     gaps
         Returns them for joint values (M, n), rad and m, as (M, G).
     least
-        Distances that are asked for between the states, shape (G,), m.
+        Distances that are asked for between each state and the next, shape (N, G), m.
     beside_axes
         Largest distance of the points that are measured from the capsules' axes, m; 0 where capsules are measured.
     """
     smallest = np.full(found.shape, np.inf)
     step = np.append(np.diff(states.times), 0.0)
     steps = np.flatnonzero(step > 0)
+    if not len(steps):
+        return smallest
+    least = least[steps]
     travels = _travels(states, steps, beside_axes)
+    radii = [capsule.radius for capsule in link_capsules(states.description) if capsule.radius > 0]
+    smallest_travel = min([SMALLEST_TRAVEL, *(SMALLEST_SHARE * radius for radius in radii)])
     # Parts of steps: their step, as an index of ``steps``, beginning and end, 0 to 1, and the distances there.
     which, low, high = np.arange(len(steps)), np.zeros(len(steps)), np.ones(len(steps))
     at_low, at_high = found[steps], found[steps + 1]
     while len(which):
         travel = travels[which] * (high - low)
         near = np.minimum(at_low, at_high)
-        open_ = (near >= least) & ((at_low + at_high - travel[:, None]) / 2 < least)
-        kept = open_.any(axis=1) & (travel > SMALLEST_TRAVEL)
+        needed = least[which]
+        open_ = (near >= needed) & ((at_low + at_high - travel[:, None]) / 2 < needed)
+        kept = open_.any(axis=1) & (travel > smallest_travel)
         which, low, high, travel = which[kept], low[kept], high[kept], travel[kept]
-        room = np.where(open_, at_low + at_high - 2 * least, np.inf)[kept].min(axis=1, initial=np.inf)
+        room = np.where(open_, at_low + at_high - 2 * needed, np.inf)[kept].min(axis=1, initial=np.inf)
         at_low, at_high = at_low[kept], at_high[kept]
         if not len(which):
             break
-        parts = np.clip(np.ceil(1.5 * travel / np.maximum(room, SMALLEST_TRAVEL)), 2, MAX_PARTS).astype(int)
+        parts = np.clip(np.ceil(1.5 * travel / np.maximum(room, smallest_travel)), 2, MAX_PARTS).astype(int)
         which, low, high, at_low, at_high = _divided(states, steps, (which, low, high, at_low, at_high), parts, gaps)
         np.minimum.at(smallest, steps[which], at_low)
     return smallest
@@ -90,29 +97,40 @@ def _divided(
     return which, begin, begin + size, begins, ends
 
 
+def _motion(states: States) -> Pieces:
+    """Return the joint values of which states are a grid."""
+    if states.motion is None:
+        raise ValueError("states of no motion; expected those of Checker.states")
+    return states.motion
+
+
 def _joint_values(states: States, step: NDArray[np.int_], s: Array) -> Array:
-    """Return joint values at shares s (M,) of steps, shape (M, n): the quintic through both states with their rates."""
-    h, s = (states.times[step + 1] - states.times[step])[:, None], s[:, None]
-    q0, v0, a0 = states.q[step], states.qd[step] * h, states.qdd[step] * h * h
-    q1, v1, a1 = states.q[step + 1], states.qd[step + 1] * h, states.qdd[step + 1] * h * h
-    # What the parabola of the first state misses at the end: value, slope and curvature.
-    x, y, z = q1 - (q0 + v0 + a0 / 2), v1 - (v0 + a0), a1 - a0
-    c3, c4, c5 = 10 * x - 4 * y + z / 2, -15 * x + 7 * y - z, 6 * x - 3 * y + z / 2
-    values: Array = q0 + s * (v0 + s * (a0 / 2 + s * (c3 + s * (c4 + s * c5))))
-    return values
+    """Return the motion's joint values at shares s (M,) of steps, shape (M, n)."""
+    motion = _motion(states)
+    piece = step // states.points
+    share = (step % states.points + s) / (states.points - 1)
+    return motion.on(piece, share * np.diff(motion.breaks)[piece])
+
+
+def _ways(states: States, steps: NDArray[np.int_]) -> Array:
+    """Return how far each joint moves at most in steps, shape (K, n), rad and m: by hulls of its rate in each step."""
+    motion = _motion(states)
+    parts = states.points - 1
+    rates = motion.differentiated(1).divided(parts)
+    fastest = np.abs(rates.bernstein).max(axis=1)
+    in_order = steps // states.points * parts + steps % states.points
+    ways: Array = fastest[in_order] * np.diff(rates.breaks)[in_order, None]
+    return ways
 
 
 def _travels(states: States, steps: NDArray[np.int_], beside_axes: float) -> Array:
     """Return bounds of the distance that a point beside the capsules' axes travels in steps, shape (K,), m."""
-    h = (states.times[steps + 1] - states.times[steps])[:, None]
     numbers = states.description.numbers
 
     def larger(values: Array) -> Array:
         return np.maximum(np.abs(values[steps]), np.abs(values[steps + 1]))
 
-    way = np.maximum(
-        np.abs(states.q[steps + 1] - states.q[steps]), h * larger(states.qd) + h * h / 2 * larger(states.qdd)
-    )
+    way = _ways(states, steps)
     turn = way[:, ~numbers.prismatic].sum(axis=1)
     # Inside a step a lever is longer than at its ends by no more than a point travels; in large turns by any length
     # that the arm has.

@@ -32,6 +32,8 @@ MAX_POINTS = 20_000
 """Largest number of states in an interval."""
 ACCEPTED_EXCESS = 5e-7
 """Largest excess of a certified motion, as a share of the limit: half of the documented 1e-6."""
+SMALL = 1e-2
+"""Size of joint values and speeds, rad and m, that jumps of smaller ones are compared with."""
 MAX_SLOW_DOWN, SLOW_DOWN_TOLERANCE = 1e9, 1e-9
 """Largest factor by which a motion is slowed down, and the tolerance of such factors."""
 PROVED = 2e-8
@@ -219,6 +221,8 @@ def _not_checked(description: Description, limits: Limits, avoidance: CollisionA
         found.append(f"torques, as the links of {', '.join(bare)} have no body")
     if avoidance:
         found += not_checked(description, avoidance.obstacles, avoidance.self_collision, avoidance.clearance)
+        kept_in_part = [each for each in avoidance.reduced if min(each.start, each.goal) > 0]
+        found += [f"all of the clearance near the ends: {each}" for each in kept_in_part]
     return tuple(found)
 
 
@@ -242,7 +246,8 @@ class Checker:
         t = breaks[:-1, None] + np.diff(breaks)[:, None] * s
         # A break belongs to both its intervals: the last state of each comes from the left.
         inside = States.of(self.description, trajectory, t[:, :-1], self.friction, "right")
-        return inside.beside(States.of(self.description, trajectory, t[:, -1:], self.friction, "left"), self.points)
+        last = States.of(self.description, trajectory, t[:, -1:], self.friction, "left")
+        return replace(inside.beside(last, self.points), motion=trajectory.pieces, points=self.points)
 
     @cached_property
     def every(self) -> tuple[tuple[Constraint, Array], ...]:
@@ -275,16 +280,17 @@ class Checker:
         if (jump := _largest_jump(trajectory, self.limits)) is not None:
             checks.append(jump)
         sampled: list[str] = []
-        for k, use in self.peaks(states).items():
+        for k, at_states in self.measured(states).items():
             constraint, _ = self.limiting[k]
+            use = _with_peaks_between(at_states, self.points)
             if k <= Limit.JERK:
                 check = _proved_check(trajectory, self.limits, Limit(k))
+            elif k == Limit.TORQUE:
+                check, unproved = self._check_of_torques(trajectory, at_states, use, states.times)
+                sampled += unproved
             else:
                 check = _check(constraint, k, use - 1, states.times)
-            if k == Limit.TORQUE:
-                check, unproved = self._with_torques_between(trajectory, check)
-                sampled += unproved
-            elif k > Limit.CLEARANCE:
+            if k > Limit.CLEARANCE:
                 sampled.append(constraint.what)
             checks.append(check)
             reached = use >= constraint.active_share
@@ -304,9 +310,23 @@ class Checker:
             sampled=tuple(sampled),
         )
 
-    def _with_torques_between(self, trajectory: Trajectory, check: Check) -> tuple[Check, list[str]]:
-        """Return the check of torques with proved bounds of what lies between the states, and what is not proved."""
+    def _check_of_torques(
+        self, trajectory: Trajectory, at_states: Array, with_peaks: Array, times: Array
+    ) -> tuple[Check, list[str]]:
+        """Return the check of torques, and those of which nothing is proved between the states.
+
+        Where the proof succeeds, it decides on what lies between the states; elsewhere the peaks of cubics do.
+
+        Parameters
+        ----------
+        at_states, with_peaks
+            Uses at the states, and raised to the peaks of cubics between them, shape (N, n).
+        times
+            Times of the states, shape (N,), s.
+        """
         peaks = torque_peaks(self.description, trajectory, self.limits.torque, self.friction)
+        use = np.where(peaks.is_proved, at_states, with_peaks)
+        check = _check(self.limiting[Limit.TORQUE][0], Limit.TORQUE, use - 1, times)
         excess = np.where(peaks.is_proved, peaks.largest, peaks.seen) - 1
         i = int(excess.argmax())
         if excess[i] > max(check.excess, 0.0):
@@ -369,11 +389,13 @@ def _largest_jump(trajectory: Trajectory, limits: Limits) -> Check | None:
     if not len(inner):
         return None
     found: list[Check] = []
+    # Shares of what the motion does: limits may be far larger.
     speeds = np.abs(trajectory.qd(trajectory.breaks)).max(axis=0)
-    fastest = np.where(np.isfinite(limits.velocity), limits.velocity, np.maximum(speeds, 1e-3))
+    fastest = np.minimum(limits.velocity, np.maximum(speeds, SMALL))
+    widest = np.maximum(np.abs(trajectory.q(trajectory.breaks)).max(axis=0), SMALL)
     largest = max(float(np.abs(trajectory.qdd(trajectory.breaks)).max()), 1e-3)
     for what, values, size in (
-        ("jump of position", trajectory.q, PositionLimit(limits).sizes),
+        ("jump of position", trajectory.q, np.minimum(PositionLimit(limits).sizes, widest)),
         ("jump of velocity", trajectory.qd, fastest),
         ("jump of acceleration", trajectory.qdd, np.where(np.isfinite(limits.jerk), largest, np.inf)),
     ):

@@ -53,6 +53,12 @@ LEAVING = 10.0
 reduced."""
 
 
+def _without_slack(required: Array) -> Array:
+    """Return the distances that are asked for between two states, m, of those that are required at states."""
+    slack = np.minimum(np.maximum(BETWEEN * required, MIN_BETWEEN), required)
+    return np.asarray(required - slack)
+
+
 @dataclass(frozen=True)
 class ReducedClearance:
     """A pair that is nearer than the clearance at the start or the goal of a motion, and what it keeps there."""
@@ -238,25 +244,24 @@ class CollisionAvoidance:
     def shortfalls(self, states: States) -> Array:
         """Return how much is missing of the required distances along a motion, shape (N,), m; by coal.
 
-        At the states the distances themselves are required, and between them all but ``BETWEEN`` of the clearance;
-        pairs with a reduced clearance may not touch.
+        At the states the distances themselves are required, and between them all but ``BETWEEN`` of them.
         """
         pairs, description = [reduced.pair for reduced in self.reduced], states.description
-        usual, each = self._distances(description, states.q), self._reduced_distances(description, states.q)
-        short = self.clearance - usual
-        if pairs:
-            short = np.maximum(short, np.max(self.required(description, states.q, pairs) - each, axis=1))
-
-        def nearest(gaps: Array) -> Array:
-            return np.asarray(gaps.min(axis=1, initial=np.inf))
 
         def gaps(q: Array) -> Array:
-            return np.stack([self._distances(description, q), nearest(self._reduced_distances(description, q))], axis=1)
+            return np.column_stack([self._distances(description, q), self._reduced_distances(description, q)])
 
-        least = np.array([self.clearance - self._slack, 0.0])
-        between = smallest_between(states, np.stack([usual, nearest(each)], axis=1), gaps, least)
-        missing = np.where(between < least, [self.clearance, 0.0] - between, -np.inf)
-        result: Array = np.maximum(np.maximum(short, missing.max(axis=1)), self._shortfalls_of_shapes(states))
+        found = gaps(states.q)
+        required = np.full(found.shape, self.clearance)
+        if pairs:
+            required[:, 1:] = self.required(description, states.q, pairs)
+        # Between two states, what is required at one of them.
+        required_between = np.minimum(required, np.append(required[1:], required[-1:], axis=0))
+        least = _without_slack(required_between)
+        between = smallest_between(states, found, gaps, least)
+        missing = np.where(between < least, required_between - between, -np.inf)
+        short = np.maximum(required - found, missing).max(axis=1)
+        result: Array = np.maximum(short, self._shortfalls_of_shapes(states))
         return result
 
     def _shortfalls_of_shapes(self, states: States) -> Array:
@@ -265,7 +270,7 @@ class CollisionAvoidance:
             return np.full(len(states.q), -np.inf)
         kept = np.array([pair.kept for pair in self.by_shapes])
         found = self._shape_gaps(states.description, states.q, MEASURED)
-        least = np.maximum(kept - self._slack, 0.0)
+        least = np.broadcast_to(_without_slack(kept), found.shape)
 
         def gaps(q: Array) -> Array:
             return self._shape_gaps(states.description, q, MEASURED)
@@ -276,11 +281,6 @@ class CollisionAvoidance:
         missing = np.where(between < least, kept - between, -np.inf)
         shortfalls: Array = np.maximum(kept - found, missing).max(axis=1)
         return shortfalls
-
-    @property
-    def _slack(self) -> float:
-        """Distance, m, by which the clearance may be missed between two states of a certificate."""
-        return min(max(BETWEEN * self.clearance, MIN_BETWEEN), self.clearance)
 
     def _shape_gaps(self, description: Description, q: Array, more: float) -> Array:
         """Return the distances of the links that are measured by their shapes, shape (N, E), m.

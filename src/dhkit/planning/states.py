@@ -19,7 +19,7 @@ from dhkit.model import PinocchioModel, pinocchio_model
 from dhkit.planning.loaded import LoadedArm
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Trajectory
-from dhkit.trajectories.pieces import Side
+from dhkit.trajectories.pieces import Pieces, Side
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +35,9 @@ class States:
     friction: Friction | None = None
     jerk: Array = field(default_factory=lambda: np.zeros((0, 0)))
     """Jerks, shape (N, n), rad/s^3 and m/s^3; empty unless requested."""
+    motion: Pieces | None = None
+    """The joint values of which they are states, ``points`` evenly spread ones in each piece, both ends included."""
+    points: int = 0
 
     @classmethod
     def of(
@@ -117,6 +120,7 @@ class States:
     def slowed(self, c: float) -> States:
         """Return the states of the motion slowed down c times, with torques g + (tau - g) / c^2."""
         slower = replace(self, times=self.times * c, qd=self.qd / c, qdd=self.qdd / c**2, jerk=self.jerk / c**3)
+        slower = replace(slower, motion=None)  # their joint values are the same, and so is the clearance
         known: dict[str, Any] = slower.__dict__
         if "_rigid" in self.__dict__:
             known["_rigid"] = self.gravity_torque + (self._rigid - self.gravity_torque) / c**2

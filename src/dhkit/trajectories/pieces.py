@@ -114,6 +114,11 @@ class Pieces:
         breaks = np.append(np.repeat(self.breaks[:-1], parts) + begin, self.end)
         return Pieces(breaks, shift(np.repeat(self.coefficients, parts, axis=0), begin))
 
+    def with_breaks(self, breaks: Array) -> Pieces:
+        """Return the same function with other breaks, shape (K+1,), among which its own are."""
+        piece = np.searchsorted(self.breaks, breaks[:-1], side="right") - 1
+        return Pieces(breaks, shift(self.coefficients[piece], breaks[:-1] - self.breaks[piece]))
+
     @property
     def bernstein(self) -> Array:
         """Bernstein coefficients of each piece, shape (K, p+1, m).
@@ -135,6 +140,10 @@ class Pieces:
         """
         # The largest of f and of -f.
         both = self.bernstein
+        # Rounding of the powers' sum, which is what the function's values have too: it matters above degree 12.
+        powers = np.diff(self.breaks)[:, None] ** np.arange(self.coefficients.shape[1])
+        size = np.einsum("kp,kpm->km", powers, np.abs(self.coefficients)).max(axis=0)
+        rounding = self.coefficients.shape[1] * np.finfo(float).eps * size
         b = np.concatenate([both, -both], axis=2)
         allowed = np.tile(np.broadcast_to(tolerance, both.shape[2]), 2)
         begin, width = self.breaks[:-1], np.diff(self.breaks)
@@ -157,7 +166,7 @@ class Pieces:
             begin, width = np.concatenate([begin, begin + width]), np.concatenate([width, width])
         else:
             bound = np.maximum(bound, b.max(axis=(0, 1)))
-        highest, negated = np.split(bound, 2)
+        highest, negated = np.split(bound + np.tile(rounding, 2), 2)
         at_highest, at_lowest = np.split(places, 2)
         return Bounds(-negated, at_lowest, highest, at_highest)
 

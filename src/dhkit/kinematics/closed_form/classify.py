@@ -23,6 +23,8 @@ FAMILIES = (
     Family("slider", planar.slider_fit, planar.slider_formulas),
 )
 """Families of closed forms, in the order in which they are tried."""
+ROUNDING = 2e-16
+"""Tolerance within which an arm misses a family by rounding alone."""
 NEAR_MISSES = (1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
 """Tolerances (rad, share of the reach) within which an arm that misses a family probably has a typing error."""
 
@@ -38,8 +40,8 @@ class Classification:
     fit: Fit | None
     """The arm's parameters in the family's formulas; None if there is no family."""
     neighbour: tuple[Family, Fit] | None = None
-    """Family of six joints and parameters of its member that this arm misses by at most 1e-3; None if the arm has a
-    closed form itself, or is not near a family."""
+    """Family of six joints and parameters of its member that this arm misses by at most 1e-3; the arm's own family if
+    it misses that by more than rounding; None if the arm is a member, or is not near a family."""
 
     @property
     def closed_form(self) -> bool:
@@ -78,7 +80,11 @@ def classify(description: Description) -> Classification:
         count = len(fit.branches)
         branches = f"{count} branch{'es' if count > 1 else ''}"
         met = "" if len(fit.coordinates) == 6 else f"; meets {', '.join(fit.coordinates)}"
-        return Classification(f"{kinds}, {fit.geometry}: closed form, {branches}{met}", family, fit)
+        words = f"{kinds}, {fit.geometry}: closed form, {branches}{met}"
+        exactly = _first(Axes.of(description, ROUNDING))
+        is_exact = exactly is not None and exactly[0] is family
+        meets_all = fit.coordinates == ALL_COORDINATES
+        return Classification(words, family, fit, found if meets_all and not is_exact else None)
     words = f"{kinds}: no closed form known"
     near = next(filter(None, (_first(Axes.of(description, tolerance)) for tolerance in NEAR_MISSES)), None)
     if near is not None:

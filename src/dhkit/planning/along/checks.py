@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 
 from dhkit.errors import PlanningError
@@ -77,7 +79,9 @@ def require_kept(program: PathProgram[Profile]) -> None:
     # clearance is measured along the path itself.
     q, slope, bend = (np.swapaxes(x, 0, 1).reshape(-1, task.arm.n) for x in (states.q, states.qs, states.qss))
     s = states.s.T.ravel()
-    still = States(task.loaded, s, q, slope, bend)
+    knots = np.append(states.s[0], states.s[1, -1])
+    along = cast("JointPath", task.path).pieces.with_breaks(knots)
+    still = States(task.loaded, s, q, slope, bend, motion=along, points=2)
     for limit, (constraint, parameters) in task.checker.limiting.items():
         if constraint.moving or limit == Limit.POSITION:
             continue

@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dhkit.description import Array, Convention, Description, world_to_frames
-from dhkit.description.frames import carrying
+from dhkit.description import Array, Convention, Description
 from dhkit.model.shapes import MeshVersions, link_parts, mesh_versions
 from dhkit.planning.obstacles.capsules import LinkBody, link_capsules, world_axes
 from dhkit.planning.obstacles.link_shapes import shape_distances
@@ -31,10 +30,10 @@ MOST_JOINTS = 2
 """Number of joints between two links up to which their distance is computed on a grid."""
 GRID = 256
 """Number of values of a joint on that grid."""
-VERTICAL = 1e-15
-"""Difference of the cosine of an axis' tilt from 1 that is rounding: a tilt of 4e-8 rad moves 1 m by 40 nm."""
 STILL = 1e-9
 """Largest travel, as a share of the size of the space in which the links move, that is rounding."""
+LEAST_TURN, LEAST_STROKE = 0.2, 0.1
+"""Ranges of joints, rad and as a share of the reach, that are sampled at least."""
 STANDING_SAMPLES = 400
 """Number of configurations in which an arm that stands in an obstacle overlaps it."""
 FOOT = LinkBody(0)
@@ -216,8 +215,11 @@ def _sampled_axes(description: Description, count: int = SAMPLES) -> Array:
     for joint in range(max(frames, default=0), 0, -1):
         # Joint k turns about z of frame k - 1, in the modified convention about z of frame k.
         T = frames.get(joint - 1 if description.convention is Convention.STANDARD else joint)
-        if T is not None:
-            carried = [i for i, body in enumerate(bodies) if body.link > 0 or body.number >= joint]
+        carried = [i for i, body in enumerate(bodies) if body.link > 0 or body.number >= joint]
+        if T is None:  # of a link without shapes: its axis is not known, and everything behind it moves
+            size = float(np.ptp(axes.reshape(-1, 3), axis=0).max(initial=0.0)) or 1.0
+            axes[:, carried] += rng.uniform(-size, size, (len(axes), 1, 1, 3))
+        else:
             turns = rng.uniform(-np.pi, np.pi, len(axes))
             R = Rotation.from_rotvec(np.outer(turns, T[:3, 2])).as_matrix()
             axes[:, carried] = (axes[:, carried] - T[:3, 3]) @ np.swapaxes(R, -1, -2)[:, None] + T[:3, 3]
@@ -315,7 +317,7 @@ def standing(description: Description, obstacle: Obstacle | Floor) -> tuple[Stan
     """Return the links with parts that are not checked against an obstacle since they stay where they are.
 
     A capsule that turns about its own axis stays where it is, but what it contains need not be round. Links that turn
-    about vertical axes alone are left out for the floor: all their heights stay the same.
+    about vertical axes alone keep their heights above a floor.
     """
     return _standing(description, mesh_versions(description), obstacle)
 
@@ -327,11 +329,10 @@ def _standing(description: Description, meshes: MeshVersions, obstacle: Obstacle
     axes = world_axes(description, q)
     found: dict[int, float] = {}
     if isinstance(obstacle, Floor):
-        upright = _upright_links(description, q)
         checked = ends_above(description, obstacle.height)
         for i, end in product(range(len(capsules)), (0, 1)):
             link = capsules[i].link
-            if link > upright and (i, end) not in checked:
+            if capsules[i].body != FOOT and (i, end) not in checked:
                 gap = float(axes[:, i, end, 2].max()) - capsules[i].radius - obstacle.height
                 found[link] = min(gap, found.get(link, gap))
     else:
@@ -343,22 +344,14 @@ def _standing(description: Description, meshes: MeshVersions, obstacle: Obstacle
     return tuple(Standing(link, gap) for link, gap in sorted(found.items()))
 
 
-def _upright_links(description: Description, q: Array) -> int:
-    """Return the number of links from the base on that turn about vertical axes alone."""
-    frames = np.moveaxis(world_to_frames(description, q), -3, 0)
-    count = 0
-    for i, T in enumerate(carrying(description.convention, frames)):
-        is_vertical = bool(np.all(np.abs(np.abs(T[:, 2, 2]) - 1) < VERTICAL))
-        if description.numbers.prismatic[i] or not is_vertical:
-            break
-        count += 1
-    return count
-
-
 def _configurations(description: Description) -> Array:
     numbers = description.numbers
     span = np.where(numbers.prismatic, max(description.reach, 1.0), np.pi)
     lower = np.where(np.isfinite(numbers.lower), numbers.lower, -span)
     upper = np.where(np.isfinite(numbers.upper), numbers.upper, span)
     low, high = np.minimum(lower, upper), np.maximum(lower, upper)
+    # A joint whose range is a point may move by the limits of a motion.
+    least = np.where(numbers.prismatic, LEAST_STROKE * max(description.reach, LEAST_STROKE), LEAST_TURN)
+    widened = np.maximum(least - (high - low), 0.0) / 2
+    low, high = low - widened, high + widened
     return np.random.default_rng(SEED).uniform(low, high, (SAMPLES, description.n))
