@@ -28,6 +28,7 @@ def collect(
     branches: tuple[str, ...],
     met: tuple[str, ...],
     flags: NDArray[np.uint8] | None = None,
+    complete: bool = True,
 ) -> IKSolutions:
     """Return joint positions as solutions.
 
@@ -47,6 +48,8 @@ def collect(
         See :class:`dhkit.kinematics.IKSolutions`.
     flags
         Flags of the branches but for limits, shape (..., B); none unless given.
+    complete
+        Whether these are all solutions.
     """
     valid = np.asarray(~np.isnan(q).any(axis=-1))
     found = valid.any(axis=-1)
@@ -66,6 +69,7 @@ def collect(
         branches=branches,
         met=met,
         description=description,
+        complete=complete,
     )
 
 

@@ -16,11 +16,20 @@ from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.candidates import are_poses, collect, orthonormal
 from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import ALL_COORDINATES
-from dhkit.kinematics.numeric import refined
+from dhkit.kinematics.manipulability import freedoms
+from dhkit.kinematics.numeric import refined, solve_numerically
 from dhkit.kinematics.solutions import IKSolutions
 
 log = logging.getLogger(__name__)
 
+RESTARTED_JOINTS = 6
+"""Number of joints of arms with finitely many solutions."""
+STARTS, MAX_ROUNDS = 32, 8
+"""Number of random starts in a round of iterations, and largest number of rounds."""
+CLOSES = 1e-11
+"""Error to which a solution closes that iteration finds: share of the reach, and rad."""
+SAME_SOLUTION = 1e-5
+"""Solutions that differ by less, rad, are one: near singularities iterations end that far apart."""
 SAME_ANGLE = 1e-6
 """Angles that differ by less, rad, count as equal when solutions are sorted."""
 
@@ -28,11 +37,12 @@ SAME_ANGLE = 1e-6
 def solve_externally(description: Description, T: ArrayLike) -> IKSolutions:
     """Return the solutions of T_world_tool(q) = T that ssik finds, polished and checked by our own kinematics.
 
-    For arms of six joints these are all solutions. An arm of seven joints has infinitely many, in curves; ssik
-    returns points of them, by the defaults of its solver for the arm: up to eight or so for each of sixteen values of
-    the redundant coordinate, or a few values in each interval where there is a solution (as for the Panda). The first
-    call for an arm prepares a solver, which takes up to a minute for arms of six joints without any special geometry;
-    ssik keeps what it derived in a cache of its own. A pose takes milliseconds.
+    Of arms of six joints ssik misses some now and then: iterations from random starts add what they find, until a round
+    of them finds nothing new. That proves nothing: ``complete`` is False. An arm of seven joints has infinitely many
+    solutions, in curves; ssik returns points of them, by the defaults of its solver for the arm: up to eight or so for
+    each of sixteen values of the redundant coordinate, or a few values in each interval where there is a solution (as
+    for the Panda). The first call for an arm prepares a solver, which takes up to a minute for arms of six joints
+    without any special geometry; ssik keeps what it derived in a cache of its own. A pose takes milliseconds.
 
     Parameters
     ----------
@@ -52,7 +62,8 @@ def solve_externally(description: Description, T: ArrayLike) -> IKSolutions:
     Raises
     ------
     ModelError
-        The arm has prismatic joints, or not six or seven, or ssik is not installed.
+        The arm has prismatic joints, or not six or seven, or ssik is not installed. An arm that ssik refuses is solved
+        by iteration alone.
     ValueError, TypeError
         T has not shape (..., 4, 4), or is not numeric.
     """
@@ -60,12 +71,18 @@ def solve_externally(description: Description, T: ArrayLike) -> IKSolutions:
     solver = _solver(description)
     posed = are_poses(poses)
     goals, n = orthonormal(poses[posed]), description.n
-    found = [_solutions(solver, goal, n) for goal in goals @ _tool_axes(description)]
+    if solver is None:
+        found = [np.empty((0, n)) for _ in goals]
+    else:
+        found = [_solutions(solver, goal, n) for goal in goals @ _tool_axes(description)]
     counts = np.array([len(q) for q in found], dtype=int)
     owner = np.repeat(np.flatnonzero(posed), counts)
     q = np.concatenate([np.empty((0, n)), *found])
     q, closed = refined(description, q, np.repeat(goals.reshape(-1, 16), counts, axis=0))
-    table = _ordered(q[closed], owner[closed], posed.size)
+    q, owner = q[closed], owner[closed]
+    if n == RESTARTED_JOINTS or solver is None:
+        q, owner = _with_restarts(description, poses.reshape(-1, 4, 4), np.flatnonzero(posed), q, owner)
+    table = _ordered(q, owner, posed.size)
     B = table.shape[1]
     return collect(
         description,
@@ -75,12 +92,53 @@ def solve_externally(description: Description, T: ArrayLike) -> IKSolutions:
         posed=posed,
         branches=tuple(f"solution {k + 1}" for k in range(B)),
         met=ALL_COORDINATES,
+        complete=False,
     )
+
+
+def _with_restarts(
+    description: Description, poses: Array, rows: NDArray[np.intp], q: Array, owner: NDArray[np.intp]
+) -> tuple[Array, NDArray[np.intp]]:
+    """Return solutions (K, n) and the poses that they belong to, with those that iteration finds from random starts.
+
+    Parameters
+    ----------
+    poses, rows
+        Poses of the tool, shape (N, 4, 4), m, and which of them are poses.
+    q, owner
+        Solutions, shape (K, n), and the indices of their poses, shape (K,).
+    """
+    rng = np.random.default_rng(0)
+    has_curves = freedoms(description, "whole") < description.n  # infinitely many solutions: one is enough
+    waiting = rows
+    for _ in range(MAX_ROUNDS):
+        if has_curves:
+            waiting = np.setdiff1d(waiting, owner)
+        if not len(waiting):
+            break
+        of_start = np.repeat(waiting, STARTS)
+        starts = rng.uniform(-np.pi, np.pi, (len(of_start), description.n))
+        found = solve_numerically(description, poses[of_start], starts, restarts=0, tolerance=CLOSES, limits=False)
+        reached = found.valid[:, 0]
+        before = np.bincount(owner, minlength=len(poses))
+        q, owner = _distinct(np.concatenate([q, found.q[reached, 0]]), np.concatenate([owner, of_start[reached]]))
+        waiting = waiting[np.bincount(owner, minlength=len(poses))[waiting] > before[waiting]]
+    return q, owner
+
+
+def _distinct(q: Array, owner: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
+    """Return solutions (K, n) without those that an earlier one of the same pose equals, and their poses (K,)."""
+    kept = np.ones(len(q), dtype=bool)
+    order = np.argsort(owner, kind="stable")
+    for places in np.split(order, np.flatnonzero(np.diff(owner[order])) + 1):
+        turns = np.abs(np.angle(np.exp(1j * (q[places, None] - q[places])))).max(axis=-1)
+        kept[places] = ~np.any(np.tril(turns < SAME_SOLUTION, k=-1), axis=1)
+    return q[kept], owner[kept]
 
 
 @lru_cache(maxsize=64)
 def _solver(description: Description) -> Any:
-    """Return ssik's ``Manipulator`` for an arm, prepared."""
+    """Return ssik's ``Manipulator`` for an arm, prepared; None if it refuses the arm."""
     words = f"{description.name} is {classify(description).words}"
     if description.numbers.prismatic.any() or description.n not in (6, 7):
         raise ModelError(f"{words}; ik_numeric solves any arm")
@@ -93,8 +151,12 @@ def _solver(description: Description) -> Any:
     axes = Axes.of(description)
     # ssik's P: from the world to the first axis, from axis to axis, and to the tool; its H: the axes' directions.
     offsets = np.diff(axes.points, axis=0, prepend=0.0, append=axes.T_world_tool[None, :3, 3])
-    solver = ssik.Manipulator.from_axes(axes.directions, offsets)
-    solver.prepare()
+    try:
+        solver = ssik.Manipulator.from_axes(axes.directions, offsets)
+        solver.prepare()
+    except (ValueError, ArithmeticError, NotImplementedError, np.linalg.LinAlgError) as error:
+        log.info("ssik refuses %s, which is solved by iteration: %s", description.name, str(error)[:200])
+        return None
     return solver
 
 
@@ -110,7 +172,7 @@ def _solutions(solver: Any, goal: Array, n: int) -> Array:
     try:
         with np.errstate(all="ignore"):
             found = solver.solve(goal, respect_limits=False)
-    except (ArithmeticError, np.linalg.LinAlgError) as error:
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         log.warning("ssik failed at a pose, which counts as not reached: %s", error)
         found = []
     return np.array([solution.q for solution in found], dtype=float).reshape(-1, n)

@@ -97,6 +97,7 @@ def solve_from_neighbour(description: Description, T: ArrayLike, seed: ArrayLike
         branches=(*solver.fit.branches, OTHER),
         met=ALL_COORDINATES,
         flags=(flags & SINGULARITIES | np.uint8(IKFlag.refined)).reshape(*batch, B),
+        complete=False,
     )
 
 

@@ -150,6 +150,7 @@ def solve_numerically(
         posed=posed,
         branches=("numeric",),
         met=ALL_COORDINATES[: newton.size],
+        complete=False,
     )
 
 

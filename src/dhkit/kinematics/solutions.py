@@ -78,6 +78,9 @@ class IKSolutions:
     """Which coordinates of a pose the arm meets: all six, or fewer for arms of fewer freedoms."""
     description: Description
     """The robot."""
+    complete: bool = True
+    """Whether a pose that is reached has no other solutions than these; False where they were found by ssik or by
+    iteration, which may miss some."""
 
     @property
     def lower(self) -> Array:
@@ -217,7 +220,8 @@ class IKSolutions:
     def __repr__(self) -> str:
         of = f"{counted(self.distance.size, 'pose')}, {counted(len(self), 'branch')}"
         if self.distance.shape:
-            return repr_line("IKSolutions", of, ", ".join(f"{count} {status.name}" for status, count in self._counts))
+            counts = ", ".join(f"{count} {status.name}" for status, count in self._counts)
+            return repr_line("IKSolutions", of, counts + self._doubt)
         return repr_line("IKSolutions", of, self._summary)
 
     def _repr_html_(self) -> str:
@@ -266,7 +270,12 @@ class IKSolutions:
         """What became of one pose."""
         status = IKStatus(int(self.status_code)).name
         missed = f" by {float(self.distance):.4g} m" if self.distance > 0 else ""
-        return f"{status}{missed}, {self.valid.sum()} reached, {self.allowed.sum()} inside the limits"
+        return f"{status}{missed}, {self.valid.sum()} reached, {self.allowed.sum()} inside the limits{self._doubt}"
+
+    @property
+    def _doubt(self) -> str:
+        is_one_of_many = len(self) == 1  # of an iteration, which looks for one
+        return "" if self.complete or is_one_of_many else ", may be incomplete"
 
     @property
     def _counts(self) -> list[tuple[IKStatus, int]]:
