@@ -258,3 +258,20 @@ def test_a_hull_is_closed_and_outwards():
     hull = convex_hull(joined_meshes([box(), box((1, 1, 1), (5, 0, 0))]))
     found = shape_inertia(hull, density=1.0)
     assert found.method is InertiaMethod.CLOSED and found.notes == ()
+
+
+def test_walls_that_two_bodies_share_are_no_duplicates():
+    """A block with a pinhole, and half a block inside it: both have the wall x = 0, with the same triangles."""
+    import trimesh
+
+    def block(width):
+        solid = trimesh.creation.box((width, 60, 100))
+        solid.apply_translation((width / 2, 0, 0))
+        return solid.subdivide().subdivide().subdivide()
+
+    whole, half = block(80), block(40)
+    top = int(np.argmax(whole.triangles_center[:, 0]))
+    faces = np.vstack([np.delete(whole.faces, top, axis=0), half.faces + len(whole.vertices)])
+    found = shape_inertia(TriangleMesh(np.vstack([whole.vertices, half.vertices]), faces), density=1.0)
+    assert found.method is InertiaMethod.FILLED
+    assert found.volume == pytest.approx(480_000 + 240_000, rel=0.01)

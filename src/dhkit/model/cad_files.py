@@ -166,7 +166,9 @@ def assign_parts(
             f"{where}: {_name_list(parts[beyond[0]])} for link {beyond[0]}; the table has links 0 to {links}{hint}"
         )
     if missing := [number for number in range(1, links + 1) if number not in parts]:
-        raise ModelError(f"{where}: no part for link{'s' * (len(missing) > 1)} {', '.join(map(str, missing))}{hint}")
+        without = f'; --map "{missing[0]}=" is a link with no part of its own'
+        words = f"no part for link{'s' * (len(missing) > 1)} {', '.join(map(str, missing))}{hint}{without}"
+        raise ModelError(f"{where}: {words}")
     if not parts.get(0):
         note += "; no base part"
     if left_out:

@@ -62,11 +62,13 @@ def repaired(mesh: TriangleMesh) -> Surface:
         notes = (*notes, f"{turned} triangles were turned to go round as their neighbours do")
     if is_closed(oriented):
         return Surface(oriented, is_closed=True, notes=notes)
-    capped, share = _capped(oriented)
-    if is_closed(capped):
-        caps = f"open: holes were capped, {100 * share:.2g} % of the area"
-        return Surface(capped, is_closed=True, is_filled=True, notes=(*notes, caps))
-    return Surface(capped, is_closed=False, notes=notes)
+    # Triangles that are written twice may be the wall between two bodies: without them, both would be open.
+    for candidate, changes in ((oriented, notes), (merged, ()), (_consistently_oriented(merged)[0], ())):
+        capped, share = _capped(candidate)
+        if is_closed(capped):
+            caps = f"open: holes were capped, {100 * share:.2g} % of the area"
+            return Surface(capped, is_closed=True, is_filled=True, notes=(*changes, caps))
+    return Surface(oriented, is_closed=False, notes=notes)
 
 
 def _closed_surface(mesh: TriangleMesh, *notes: str) -> Surface:
