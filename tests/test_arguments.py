@@ -28,6 +28,7 @@ from dhkit import (
     trajectories,
     verification,
 )
+from dhkit.errors import DescriptionError
 from dhkit.viewer import View
 
 PACKAGES = [
@@ -272,3 +273,22 @@ def test_what_an_arm_returns_is_exported():
     foreign = {"Array", "Iterator", "Mapping", "None", "Path", "PinocchioModel"}
     assert returned - foreign <= set(dhkit.__all__)
     assert all(hasattr(dhkit, name) for name in dhkit.__all__)
+
+
+def test_a_robot_where_a_description_or_gains_are_expected_gets_the_cure(tmp_path, caplog):
+    arm = dhkit.Arm.load("planar2r")
+    with pytest.raises(TypeError, match=r"found 'puma560'; .* Arm.load\('puma560'\) reads a robot"):
+        dhkit.Arm("puma560")
+    with pytest.raises(TypeError, match="found a Arm; expected a Description"):
+        dhkit.Arm(arm)
+    with pytest.raises(TypeError, match=r"kp is a robot; expected gains, which PID.tuned\(arm\) computes"):
+        dhkit.PID(arm)
+    (tmp_path / "bare.csv").write_text("0,0.1,0.2\n0.1,0.2,0.3\n")
+    with pytest.raises(DescriptionError, match="no header: the first line has numbers"):
+        dhkit.Trajectory.read(tmp_path / "bare.csv", arm)
+    (tmp_path / "degrees.csv").write_text("t,q1,q2\n0,10,20\n0.1,20,30\n0.2,35,40\n")
+    dhkit.Trajectory.read(tmp_path / "degrees.csv", arm)
+    assert "were degrees meant?" in caplog.text and "degrees=True (--degrees) reads them" in caplog.text
+    caplog.clear()
+    dhkit.Trajectory.read(tmp_path / "degrees.csv", arm, degrees=True)
+    assert caplog.text == ""

@@ -48,6 +48,11 @@ class Arm:
     _description: Description
 
     def __init__(self, description: Description) -> None:
+        if isinstance(description, str | Path):
+            name = str(description)
+            raise TypeError(f"found {name!r}; expected a Description: Arm.load({name!r}) reads a robot")
+        if not isinstance(description, describe.Description):
+            raise TypeError(f"found a {type(description).__name__}; expected a Description, as Arm.load reads it")
         object.__setattr__(self, "_description", description)
 
     # Constructors

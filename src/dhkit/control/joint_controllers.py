@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.control.gains import batch_of, effective_inertia, gain, gains_text, pid_gains, positive
 from dhkit.control.references import Setpoint
-from dhkit.description import Array, Robot, description_of
+from dhkit.description import Array, Description, Robot, description_of
 from dhkit.description.arrays import number_array
 from dhkit.display import repr_line
 
@@ -50,6 +50,9 @@ class PID:
         cutoff: float | None = None,
         limit: ArrayLike | None = None,
     ) -> None:
+        given: object = kp
+        if isinstance(given, Description) or hasattr(given, "description"):
+            raise TypeError("kp is a robot; expected gains, which PID.tuned(arm) computes")
         self.kp, self.ki, self.kd = gain(kp, "kp"), gain(ki, "ki"), gain(kd, "kd")
         if derivative not in ("error", "measurement"):
             raise ValueError(f"derivative is {derivative!r}; expected 'error' or 'measurement'")

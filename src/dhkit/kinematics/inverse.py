@@ -30,7 +30,7 @@ def inverse_kinematics(
 
     An arm whose axes are nearly those of a family, to 1e-3, is solved by Newton's method from the solutions of the
     exact member of the family: see :mod:`dhkit.kinematics.neighbour`. Other arms of six or seven revolute joints
-    without a closed form of ours are handed to the package ssik, which finds most solutions of six joints, and iteration adds: see
+    without a closed form of ours are handed to the package ssik, and iteration adds what it misses: see
     :func:`dhkit.kinematics.external.solve_externally`.
 
     Parameters

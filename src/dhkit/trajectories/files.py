@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -11,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from dhkit.description import Array, Description, Payload, Robot, description_of, write_atomically
+from dhkit.description.joint_text import degrees_hint, joint_text
 from dhkit.errors import DescriptionError
 from dhkit.symbolic import Friction
 from dhkit.trajectories.archives import ARCHIVES, archive_bytes, archive_format, read_archive
@@ -19,6 +22,8 @@ from dhkit.trajectories.matlab_samples import MATRICES, matlab_table
 from dhkit.trajectories.ros_yaml import MESSAGE, POINT, ROWS, TIMES, parse_message, trajectory_text
 from dhkit.trajectories.tables import check_columns, read_table, select_columns, table_text
 from dhkit.trajectories.trajectory import Trajectory
+
+log = logging.getLogger(__name__)
 
 TABLES = (".csv", ".yaml", ".yml")
 SAMPLES = (*TABLES, ".mat")
@@ -39,6 +44,8 @@ MAX_COEFFICIENTS = 65
 """Largest number of coefficients of a polynomial; evaluating a motion takes time in proportion."""
 DEFAULT_RATE = 1000.0
 """Samples per second if no rate is given."""
+TURNS = 3
+"""Whole turns of a joint without limits beyond which degrees may be meant."""
 MAX_JUMP = 1e-6
 """Largest jump of joint values, rad or m, and speeds between pieces of a motion, absolute and relative."""
 NANOSECONDS = 1_000_000_000
@@ -216,6 +223,8 @@ def read_samples(
         raise ValueError(f"columns is given; expected none for {suffix}, whose joint_names say which joint is which")
     try:
         samples = _samples(suffix, content, description, names)
+        if not degrees and (question := samples.degrees_question(description)):
+            log.warning("%s: %s", path, question)
         return samples.in_radians(description).trajectory(description) if degrees else samples.trajectory(description)
     except (DescriptionError, ValueError, TypeError) as error:
         raise DescriptionError(f"{path}: {error}") from None
@@ -235,6 +244,20 @@ class _FileSamples:
     def in_radians(self, description: Description) -> _FileSamples:
         unit = np.where(description.numbers.prismatic, 1.0, np.pi / 180)
         return replace(self, arrays=[array * unit for array in self.arrays])
+
+    def degrees_question(self, description: Description) -> str:
+        """Return a question whether degrees were meant, if some angle is beyond a turn and the joint's limits."""
+        q = np.abs(self.arrays[0])
+        numbers = description.numbers
+        allowed = np.maximum(np.maximum(np.abs(numbers.lower), np.abs(numbers.upper)), math.tau)
+        allowed = np.where(np.isfinite(allowed), allowed, TURNS * math.tau)
+        beyond = (q > allowed) & ~numbers.prismatic
+        if not beyond.any():
+            return ""
+        row, i = np.unravel_index(int(np.argmax(np.where(beyond, q, 0.0))), q.shape)
+        value = float(self.arrays[0][row, i])
+        found = f"{description.joints[int(i)].name} is at {joint_text(value, slides=False)}"
+        return f"{found}{degrees_hint(value, slides=False)}; degrees=True (--degrees) reads them"
 
     def trajectory(self, description: Description) -> Trajectory:
         return replace(Trajectory.from_samples(description, self.times, *self.arrays), **self.load)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from dhkit.description import Array, Description
+from dhkit.description.quantities import is_plain_number
 from dhkit.errors import DescriptionError
 
 MOST_COLUMNS = 1000
@@ -134,6 +135,10 @@ def select_columns(
     names |= {name: k for k, name in enumerate(table[0])}
     names |= {ours: table[0].index(place_of_name(theirs, table[0])) for ours, theirs in (columns or {}).items()}
     time = next((names[name] for name in TIMES if name in names), None)
+    if time is None and all(is_plain_number(name) for name in table[0]):
+        raise DescriptionError(
+            "no header: the first line has numbers; expected the names of the columns in it, such as t,q1,q2"
+        )
     if time is None:
         raise DescriptionError(f"no column of times: found {', '.join(table[0])[:80]}; expected t or time")
     chosen: list[Array] = []
