@@ -29,6 +29,7 @@ from dhkit.grading.answers.typeset import typeset
 from dhkit.grading.answers.vocabulary import Vocabulary
 from dhkit.grading.judging.consistency import Consistency
 from dhkit.grading.judging.functions import judge_function
+from dhkit.grading.judging.numeric import names_of
 from dhkit.grading.judging.quantities import JudgedQuantity, judge_quantity
 from dhkit.grading.judging.quotients import RingReader
 from dhkit.grading.judging.truth import Truth, truth_of
@@ -140,11 +141,28 @@ class _SheetJudge:
         judged: dict[str, JudgedQuantity] = {}
         refused: dict[str, DhkitError] = {}
         names = QuantityNames(self.truth.description)
+        read: dict[str, tuple[Given, ...]] = {}
         for name, value in with_entries_gathered(self.sheet.answers, names).items():
             if _is_empty(value):
                 continue
             try:
-                judged[name] = self._quantity(name, value, names)
+                self._require_known(name, names)
+                if callable(value):
+                    judged[name] = judge_function(name, value, self.truth, self.seed)
+                else:
+                    read[name] = given_quantity(name, value, shape_of(name, names.n), self.vocabulary, names)
+            except AnswerError as error:
+                refused[name] = self._refusal(error)
+            except DescriptionError as error:
+                refused[name] = error
+        letters = frozenset(self.truth.description.parameters)
+        trees = [entry.tree for given in read.values() for entry in given if entry.tree is not None]
+        in_symbols = any(letters & names_of(tree) for tree in trees)
+        for name, given in read.items():
+            try:
+                judged[name] = judge_quantity(
+                    name, given, self.truth, self.sheet.task, self.digits, self.seed, in_symbols=in_symbols
+                )
             except AnswerError as error:
                 refused[name] = self._refusal(error)
             except DescriptionError as error:
@@ -154,7 +172,8 @@ class _SheetJudge:
     def _refusal(self, error: AnswerError) -> AnswerError:
         return AnswerError(f"{self.sheet.file}: answer: {error}")
 
-    def _quantity(self, name: str, value: object, names: QuantityNames) -> JudgedQuantity:
+    def _require_known(self, name: str, names: QuantityNames) -> None:
+        """Refuse a name that is none of a quantity."""
         known = quantity_names(names.n)
         if name not in known:
             meant = ALIASES.get(name) or next(iter(difflib.get_close_matches(name, known, n=1)), "")
@@ -162,10 +181,6 @@ class _SheetJudge:
             if name in self.truth.description.parameters:
                 hint = f"it is a parameter of the robot; give all of {meant or 'the quantity'} as a list"
             raise AnswerError(f"unknown quantity {name[:40]!r}; {hint}")
-        if callable(value):
-            return judge_function(name, value, self.truth, self.seed)
-        given = given_quantity(name, value, shape_of(name, names.n), self.vocabulary, names)
-        return judge_quantity(name, given, self.truth, self.sheet.task, self.digits, self.seed)
 
     def kinematics(self, explain: bool) -> tuple[list[KinematicJudgement], dict[str, DhkitError]]:
         """Judge the table and the inverse kinematics; return them, and the errors of those that were refused."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import TypeAlias
 
 import numpy as np
@@ -17,13 +18,15 @@ from dhkit.grading.judging.findings import Comparison, Finding, compare, exact_d
 from dhkit.grading.judging.numeric import doubles, general_state, names_of, state_arrays
 from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient
 from dhkit.grading.judging.rounding import Residuals
-from dhkit.grading.judging.truth import Truth, exact_number
+from dhkit.grading.judging.truth import Truth, exact_number, substituted
 from dhkit.grading.report import Verdict
 from dhkit.symbolic import ExactArm
-from dhkit.symbolic.ring import Element, Elements, RingError
+from dhkit.symbolic.ring import Element, Elements, RingError, element_array
 
 Index: TypeAlias = tuple[int, ...]
 """Indices of an entry in its quantity, from 0."""
+MOST_TOGETHER = 3
+"""Largest number of parameters whose numbers are looked at together: whether they multiply to 1."""
 ROUNDED_DECIMALS = 5e-3
 """Relative tolerance that decimals of four digits stay below."""
 
@@ -108,9 +111,19 @@ def place_of(quantity: str, index: Index) -> Index:
 
 
 def judge_quantity(
-    name: str, given: tuple[Given, ...], truth: Truth, task: Requirements, digits: int = 4, seed: int = 0
+    name: str,
+    given: tuple[Given, ...],
+    truth: Truth,
+    task: Requirements,
+    digits: int = 4,
+    seed: int = 0,
+    *,
+    in_symbols: bool = False,
 ) -> JudgedQuantity:
     """Judge a quantity with its parameters as symbols; a parameter that the answer lacks is replaced by its number.
+
+    A number may stand where the answer has it, 9.81 for g. A letter that is left out is no number: where its value is
+    1, or the values of several multiply to 1, the answer would be equal at the file's values alone.
 
     Parameters
     ----------
@@ -126,6 +139,8 @@ def judge_quantity(
         Significant digits from which a decimal may have been rounded.
     seed
         Seed of the random states at which answers outside the ring are tried.
+    in_symbols
+        Whether the sheet has some letter of the robot's file; an answer without any is judged at the file's values.
 
     Raises
     ------
@@ -139,6 +154,8 @@ def judge_quantity(
     by = Comparison(arm, reader, digits, residuals=_residuals(name, task), seed=seed, up_to_constant=up_to_constant)
     judged = JudgedQuantity(name, given, _findings(name, given, right, by, truth), right)
     missing = _missing_parameters(truth, right, given)
+    if in_symbols and missing:
+        missing -= _droppable(name, truth, right, missing)
     all_numbers = bool(missing) and missing == parameters_in(right, truth)
     likely = [entry for entry in given if _is_near(judged, entry, arm)] if missing and judged.wrong else []
     if judged.wrong and not judged.is_zero and (all_numbers or likely or (missing and name == "C")):
@@ -183,18 +200,14 @@ def _is_near(judged: JudgedQuantity, entry: Given, arm: ExactArm) -> bool:
 
 
 def _with_mixed_numbers(judged: JudgedQuantity, tried: frozenset[str], truth: Truth, by: Comparison) -> JudgedQuantity:
-    """Judge wrong entries with numbers for parameters that they lack, though other entries have the symbols.
-
-    A parameter whose number is 1 counts as missing: in a product its number cannot be seen.
-    """
+    """Judge wrong entries with numbers for parameters that they lack, though other entries have the symbols."""
     findings, mixed = dict(judged.findings), set(judged.numbers)
     for entry in judged.given:
         if not _is_near(judged, entry, by.arm):
             continue
         right = np.array([judged.right(entry.index)], dtype=object)
-        numbers = frozenset(
-            p for p in _missing_parameters(truth, right, [entry]) if exact_number(truth.description, p) != 1
-        )
+        numbers = _missing_parameters(truth, right, [entry])
+        numbers -= _droppable(judged.name, truth, right, numbers)
         if not numbers or numbers == tried:
             continue
         finding = _finding(entry.tree, entry.error, truth.with_numbers(judged.name, right, numbers)[0], by)
@@ -202,6 +215,26 @@ def _with_mixed_numbers(judged: JudgedQuantity, tried: frozenset[str], truth: Tr
             findings[entry.index] = finding
             mixed |= numbers
     return replace(judged, findings=findings, numbers=frozenset(mixed)) if mixed != judged.numbers else judged
+
+
+def _droppable(name: str, truth: Truth, right: Elements, missing: frozenset[str]) -> frozenset[str]:
+    """Return those of missing parameters that can be left out of an entry without a change of its numbers.
+
+    Their numbers are 1, or multiply to 1, as 2 and 1/2 do: whether an answer has them as numbers cannot be seen.
+    """
+    found: set[str] = set()
+    ring = truth.arm(name).ring
+    numbers = {p: ring.number(exact_number(truth.description, p)) for p in missing}
+    for entry in right.flat:
+        single = element_array([entry])
+        own = sorted(names_in(entry) & missing)
+        in_numbers = substituted(single, numbers, ring)[0]
+        for count in range(1, MOST_TOGETHER + 1):
+            for some in combinations(own, count):
+                without = substituted(single, numbers | dict.fromkeys(some, ring.one), ring)[0]
+                if (without - in_numbers).is_zero:
+                    found |= set(some)
+    return frozenset(found)
 
 
 def _missing_parameters(truth: Truth, right: Elements, given: Sequence[Given]) -> frozenset[str]:
