@@ -1,0 +1,85 @@
+"""Letters are letters: one that is left out is no number, though its value is 1 or that of another letter.
+
+Modules: quantities.
+"""
+
+import re
+
+import numpy as np
+import pytest
+
+from dhkit import Arm
+from dhkit.description import from_toml, library_robot, to_toml
+from grading_answers import written
+
+VALUES = (1.0, 1.0, 0.5, 2.0, 0.7)
+"""Values that letters take: several are equal, are 1, or multiply to 1."""
+LETTER = re.compile(r"(?<![\w.])(g|l1|l2|m1|m2)(\^2)?(?![\w(^])")
+
+
+def with_values(rng):
+    """Return a planar arm whose letters have values of these."""
+    text = to_toml(library_robot("planar2r"))
+    for name in ("g", "l1", "l2", "m1", "m2"):
+        text, count = re.subn(rf"(?m)^{name} = [\d.]+$", f"{name} = {rng.choice(VALUES)}", text)
+        assert count == 1
+    return Arm(from_toml(text))
+
+
+def without_one_letter(rng, answer):
+    """Return an answer in which one letter, or its square, is left out in one place."""
+    place = rng.choice(list(LETTER.finditer(answer)))
+    before, after = answer[: place.start()], answer[place.end() :]
+    if after.startswith("*"):
+        return before + after[1:]
+    return before[:-1] + after if before.endswith("*") else f"{before}1{after}"
+
+
+def test_an_answer_that_lacks_a_letter_is_not_right(law):
+    rng = np.random.default_rng(0)
+    for _ in range(law.samples(5000, least=60)):
+        arm = with_values(rng)
+        quantity = str(rng.choice(["M", "h", "g"]))
+        elements = getattr(arm.lagrangian, quantity)
+        entries = written(elements, arm.lagrangian.arm)
+        i = int(rng.integers(2))
+        place = (i, i) if quantity == "M" else (i,)
+        right = entries[i][i] if quantity == "M" else entries[i]
+        if not LETTER.search(right):
+            continue
+        wrong = without_one_letter(rng, right)
+        if quantity == "M":
+            entries[i][i] = wrong
+        else:
+            entries[i] = wrong
+        report = arm.grade({quantity: entries}, explain=False)
+        passes = [entry.verdict.passes for entry in report.entries if entry.index == place]
+        law.holds("answers without a letter that pass", sum(passes), 0, (wrong, dict(arm.description.parameters)))
+
+
+def test_numbers_may_stand_where_they_are_written():
+    arm = Arm.load("planar2r")
+    numbers = {name: float(value) for name, value in arm.description.numbers.values.items()}
+    g = written(arm.lagrangian.g, arm.lagrangian.arm)
+    with_number = [re.sub(r"\bg\b", f"{numbers['g']}", entry) for entry in g]
+    assert arm.grade({"g": with_number}).verdict.passes
+
+
+def test_a_sheet_without_letters_is_judged_at_the_values_of_the_file():
+    arm = Arm.load("planar2r")
+    values = {name: f"({float(value)})" for name, value in arm.description.numbers.values.items()}
+    g = [LETTER.sub(lambda m: values[m[1]] + (m[2] or ""), entry) for entry in written(arm.lagrangian.g)]
+    report = arm.grade({"g": g})
+    assert report.verdict.passes
+    assert "judged at" in str(report)
+
+
+@pytest.mark.parametrize("pair", [("l1", "l2"), ("m1", "m2")])
+def test_a_letter_of_the_same_value_is_another_letter(pair):
+    text = to_toml(library_robot("planar2r"))
+    for name in pair:
+        text = re.sub(rf"(?m)^{name} = [\d.]+$", f"{name} = 0.5", text)
+    arm = Arm(from_toml(text))
+    g = written(arm.lagrangian.g, arm.lagrangian.arm)
+    exchanged = [re.sub(rf"\b{pair[0]}\b", pair[1], entry) for entry in g]
+    assert not arm.grade({"g": exchanged}).verdict.passes
