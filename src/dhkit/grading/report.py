@@ -188,14 +188,14 @@ class KinematicJudgement:
         Mistakes, row by row or branch by branch.
     notes
         Remarks that a reader needs besides the verdicts.
-    judged_at
+    at_values
         Values of the parameters that the answer holds as numbers, SI units and rad.
     """
 
     entries: tuple[Entry, ...]
     diagnosis: tuple[Diagnosis, ...] = ()
     notes: tuple[Note, ...] = ()
-    judged_at: Mapping[str, float] = field(default_factory=dict)
+    at_values: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def verdict(self) -> Verdict:
@@ -231,7 +231,7 @@ class GradeReport:
         Time that judging took, s.
     left_out
         Statements and files of the student's that were not read as answers.
-    judged_at
+    at_values
         Parameters that the answers hold as numbers, in SI units and rad: verdicts hold at these values, the file's,
         alone.
     seed
@@ -260,7 +260,7 @@ class GradeReport:
     error: str = ""
     seconds: float = field(default=0.0, compare=False)
     left_out: tuple[str, ...] = ()
-    judged_at: Mapping[str, float] = field(default_factory=dict)
+    at_values: Mapping[str, float] = field(default_factory=dict)
     seed: int | None = field(default=None, compare=False)
     proof_required: bool = False
     own_robot: bool = False
@@ -281,7 +281,7 @@ class GradeReport:
     @property
     def conclusion(self) -> str:
         """The verdict in words, with the parameter values at which it holds and what the sheet lacks to pass."""
-        values = ", ".join(f"{name} = {value:g}" for name, value in self.judged_at.items())
+        values = ", ".join(f"{name} = {value:g}" for name, value in self.at_values.items())
         proof = ", and a proof is asked for" if self._lacks_proof else ""
         return f"{self.verdict.value}{f', judged at {values}' if values else ''}{proof}"
 

@@ -109,6 +109,9 @@ def _properties() -> Schema:
         "proof": _choice("proof", "Whether an answer has to be proved equal, or may be tried at random states."),
         "frames": _choice("frames", "Whether a table may place its frames freely, or must have the robot file's."),
         "zero": _choice("zero", "Whether a table's zero pose is free, or must be the robot file's."),
+        "values": _switch(
+            "Whether answers in numbers pass that are right at the robot file's values; true if not given."
+        ),
         "convention": _choice(
             "convention", "Whose Denavit-Hartenberg table it is: the standard one, or Craig's modified."
         ),

@@ -90,9 +90,9 @@ def judge_sheet(
     notes = [Note(NoteKind.PROGRAM, values=(text,)) for text in sheet.notes]
     notes += [*_notes(truth, judged, vocabulary), *agreement]
     entries += [Entry(name, (), Verdict.UNREADABLE, statement=str(error)) for name, error in refused.items()]
-    judged_at = {p: value for quantity in judged.values() for p, value in _numbers_in(truth, quantity).items()}
+    at_values = {p: value for quantity in judged.values() for p, value in _numbers_in(truth, quantity).items()}
     for other in others:
-        judged_at |= other.judged_at
+        at_values |= other.at_values
         entries += other.entries
         diagnosis += other.diagnosis if explain else ()
         notes += other.notes
@@ -113,7 +113,7 @@ def judge_sheet(
         student=sheet.student,
         seconds=time.perf_counter() - start,
         left_out=sheet.left_out,
-        judged_at=judged_at,
+        at_values=at_values,
         seed=seed,
         proof_required=sheet.task.proof_required,
     )

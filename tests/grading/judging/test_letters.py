@@ -83,3 +83,14 @@ def test_a_letter_of_the_same_value_is_another_letter(pair):
     g = written(arm.lagrangian.g, arm.lagrangian.arm)
     exchanged = [re.sub(rf"\b{pair[0]}\b", pair[1], entry) for entry in g]
     assert not arm.grade({"g": exchanged}).verdict.passes
+
+
+def test_a_task_may_ask_for_letters():
+    arm = Arm.load("planar2r")
+    values = {name: f"({float(value)})" for name, value in arm.description.numbers.values.items()}
+    g = [LETTER.sub(lambda m: values[m[1]] + (m[2] or ""), entry) for entry in written(arm.lagrangian.g)]
+    report = arm.grade({"g": g}, task={"values": False})
+    assert report.verdict.value == "incomplete"
+    assert all("the task asks for letters" in entry.statement for entry in report.entries)
+    assert arm.grade({"g": g}, task={"values": True}).verdict.passes
+    assert arm.grade({"g": written(arm.lagrangian.g)}, task={"values": False}).verdict.passes

@@ -112,7 +112,7 @@ def test_numbers_in_place_of_parameters():
     l1, l2 = (float(description.numbers.a[i]) for i in (0, 1))
     judgement = judge("planar2r", [["q1", "0", l1, "0"], ["q2", "0", l2, "0"]])
     assert set(verdicts(judgement)) == {CORRECT}
-    assert judgement.judged_at == {"l1": l1, "l2": l2}
+    assert judgement.at_values == {"l1": l1, "l2": l2}
     turned = judge("planar2r", [["q1", "0", l1, "0"], ["q2 + pi", "0", -l2, "0"]])
     assert verdicts(turned) == (CORRECT, UNDECIDED)
     assert frames(turned) == ("frame 2's x axis points the other way",)

@@ -46,7 +46,7 @@ KEYS = {
     "sheet": ("format", "robot", "student", "names", "task", "answer", "rubric"),
     "task file": ("format", "robot", "names", "task", "rubric"),
     "names": ("q", "qd", "qdd", "angles", "parameters"),
-    "task": ("friction", "total_derivative", "asked", "proof", "frames", "zero"),
+    "task": ("friction", "total_derivative", "asked", "proof", "frames", "zero", "values"),
     "dh": ("convention", "rows"),
     "ik": ("branches", "steps"),
     "step": ("joint", "equation", "solution"),
@@ -296,6 +296,7 @@ def _requirements(checker: _Checker, data: Mapping[str, object]) -> Requirements
         checker.choice(data, "proof", "task.") == "required",
         checker.choice(data, "frames", "task.") == "given",
         checker.choice(data, "zero", "task.") == "given",
+        "values" in data and not checker.switch(data, "values", "task."),
     )
 
 

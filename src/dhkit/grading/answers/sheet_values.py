@@ -87,6 +87,8 @@ class Requirements:
         Whether a table must have the file's own frames (``frames = "given"``).
     zero_given
         Whether a table's joint variables must be zero in the file's own zero pose (``zero = "given"``).
+    in_letters
+        Whether answers in numbers do not pass, though they are right at the file's values (``values = false``).
     """
 
     friction: bool = False
@@ -95,6 +97,7 @@ class Requirements:
     proof_required: bool = False
     frames_given: bool = False
     zero_given: bool = False
+    in_letters: bool = False
 
 
 @dataclass(frozen=True)

@@ -165,8 +165,19 @@ def judge_quantity(
         judged = other if all_numbers or other.wrong < judged.wrong else judged
     if name != "C" and judged.wrong:
         judged = _with_mixed_numbers(judged, missing, truth, by)
+    if task.in_letters and judged.numbers:
+        judged = replace(judged, findings={index: _in_numbers(found) for index, found in judged.findings.items()})
     contradictions = tuple(entry.index for entry in given if _contradicts(entry, judged, by))
     return replace(judged, contradictions=contradictions)
+
+
+def _in_numbers(finding: Finding) -> Finding:
+    """Return the finding on an entry that is right at the file's values, where the task asks for letters."""
+    if not finding.verdict.passes:
+        return finding
+    return replace(
+        finding, verdict=Verdict.INCOMPLETE, statement="right at the file's values; the task asks for letters"
+    )
 
 
 def _contradicts(entry: Given, judged: JudgedQuantity, by: Comparison) -> bool:

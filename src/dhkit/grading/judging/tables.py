@@ -98,7 +98,7 @@ def judge_table(
 def _judge(table: TableRows, task: Requirements) -> TableJudgement:
     rows = [table.row(i) for i in range(table.n)]
     in_numbers = frozenset().union(*(row.numbers for row in rows))
-    judged_at = {name: table.states[0][name] for name in table.description.parameters if name in in_numbers}
+    at_values = {name: table.states[0][name] for name in table.description.parameters if name in in_numbers}
     notes: tuple[Note, ...] = ()
     if table.converted:
         conventions = (table.description.convention.value, table.convention.value)
@@ -106,18 +106,18 @@ def _judge(table: TableRows, task: Requirements) -> TableJudgement:
     wrong = [i for i, row in enumerate(rows) if row.verdict is Verdict.WRONG]
     entries = _entries(rows)
     if not wrong:
-        return TableJudgement(entries, notes=notes, judged_at=judged_at)
+        return TableJudgement(entries, notes=notes, at_values=at_values)
     mistakes = row_mistakes(table, wrong)
     overlay = _overlay(table)
     # Without changes all frames are the file's to 1e-9: the numbers that are wrong by less belong to another arm.
     if overlay is not None and overlay.changes:
-        return _judge_in_other_frames(rows, wrong, mistakes, overlay, task, notes, judged_at)
+        return _judge_in_other_frames(rows, wrong, mistakes, overlay, task, notes, at_values)
     diagnosis = tuple(mistake.diagnosis() for mistake in mistakes)
     if _is_of_other_convention(table):
         other, given = other_convention(table.convention).value, table.convention.value
         detail = f"it is the {other} one, and was handed in as {given}"
         diagnosis = (_diagnosis_of_table("other_convention", entries, detail),)
-    return TableJudgement(entries, diagnosis, notes, judged_at)
+    return TableJudgement(entries, diagnosis, notes, at_values)
 
 
 def _judge_in_other_frames(
@@ -127,7 +127,7 @@ def _judge_in_other_frames(
     overlay: Overlay,
     task: Requirements,
     notes: tuple[Note, ...],
-    judged_at: Mapping[str, float],
+    at_values: Mapping[str, float],
 ) -> TableJudgement:
     """Judge a table that is the same arm in other frames: a choice of frames, or a single slip.
 
@@ -148,7 +148,7 @@ def _judge_in_other_frames(
         notes = (*notes, Note(NoteKind.RIGHT_IN_OTHER_FRAMES, "dh"))
     else:
         diagnosis = (_diagnosis_of_table("other_frames", entries, "; ".join(map(str, overlay.changes))),)
-    return TableJudgement(entries, diagnosis, notes, judged_at, overlay.changes, overlay.moves_zero)
+    return TableJudgement(entries, diagnosis, notes, at_values, overlay.changes, overlay.moves_zero)
 
 
 def _refusal(overlay: Overlay, task: Requirements) -> str:

@@ -45,7 +45,7 @@ def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
             points(sheet.most),
             *(by_quantity.get(quantity, "") for quantity in quantities),
             report.verdict.value,
-            ", ".join(f"{name} = {value:g}" for name, value in report.judged_at.items()),
+            ", ".join(f"{name} = {value:g}" for name, value in report.at_values.items()),
             " ".join(report.missing),
             "; ".join(report.left_out),
             " ".join(dict.fromkeys(one.mistake for one in report.diagnosis if one.mistake)),
