@@ -11,6 +11,8 @@ from dhkit.display import repr_line
 class NoteKind(Enum):
     """Subject of a note; :func:`dhkit.grading.reports.notes.note_text` writes the sentence."""
 
+    ONLY_AT_VALUES = "only_at_values"
+    """Formulas are right at the robot file's values of its parameters, and wrong at the ``values``."""
     AGREES = "agrees"
     """A quantity is what the sheet's own quantities ``values`` give, right or wrong."""
     DISAGREES = "disagrees"

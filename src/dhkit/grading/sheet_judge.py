@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
+from itertools import chain
 
 import numpy as np
 
@@ -216,12 +217,34 @@ class _SheetJudge:
             from dhkit.grading.judging.inverse_steps import judge_steps
 
             steps = given_steps(self.sheet.steps, vocabulary)
-            return judge_steps(description, steps, seed=self.seed, explain=explain)
+            return self._at_other_values(
+                [tree for step in steps for tree in (*step.solutions, *chain.from_iterable(step.equations))],
+                lambda arm: judge_steps(arm, steps, seed=self.seed, explain=explain),
+            )
         return _judge_rows(
             "ik",
             given_branches(self.sheet.branches, description.n, vocabulary),
-            lambda trees: judge_inverse(description, trees, seed=self.seed, explain=explain),
+            lambda trees: self._at_other_values(
+                [tree for branch in trees for tree in branch],
+                lambda arm: judge_inverse(arm, trees, seed=self.seed, explain=explain),
+            ),
         )
+
+    def _at_other_values(
+        self, trees: Sequence[Tree], judge: Callable[[Description], KinematicJudgement]
+    ) -> KinematicJudgement:
+        """Judge formulas at the file's values; those that pass at other values of the parameters too."""
+        from dhkit.grading.judging.other_values import with_other_values
+
+        judged = judge(self.truth.description)
+        other = with_other_values(self.truth.description, trees, self.seed) if judged.verdict.passes else None
+        if other is None:
+            return judged
+        elsewhere = judge(other)
+        if elsewhere.verdict.passes:
+            return judged
+        values = tuple(f"{name} = {value:.6g}" for name, value in other.numbers.values.items())
+        return replace(elsewhere, notes=(*elsewhere.notes, Note(NoteKind.ONLY_AT_VALUES, "ik", values)))
 
 
 def _judge_rows(

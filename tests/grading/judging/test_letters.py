@@ -1,6 +1,6 @@
 """Letters are letters: one that is left out is no number, though its value is 1 or that of another letter.
 
-Modules: quantities.
+Modules: quantities, other_values.
 """
 
 import re
@@ -10,6 +10,7 @@ import pytest
 
 from dhkit import Arm
 from dhkit.description import from_toml, library_robot, to_toml
+from dhkit.grading.remarks import NoteKind
 from grading_answers import written
 
 VALUES = (1.0, 1.0, 0.5, 2.0, 0.7)
@@ -94,3 +95,32 @@ def test_a_task_may_ask_for_letters():
     assert all("the task asks for letters" in entry.statement for entry in report.entries)
     assert arm.grade({"g": g}, task={"values": True}).verdict.passes
     assert arm.grade({"g": written(arm.lagrangian.g)}, task={"values": False}).verdict.passes
+
+
+def with_lengths(l1, l2):
+    text = to_toml(library_robot("planar2r"))
+    for name, value in (("l1", l1), ("l2", l2)):
+        text = re.sub(rf"(?m)^{name} = [\d.]+$", f"{name} = {value}", text)
+    return Arm(from_toml(text))
+
+
+RIGHT = "acos((px^2 + py^2 - l1^2 - l2^2)/(2*l1*l2))"
+FIRST = "atan2(py, px) - atan2(l2*sin(q2), l1 + l2*cos(q2))"
+INVERSE = {
+    "right": (RIGHT, FIRST, True),
+    "a length left out": (RIGHT.replace("2*l1*l2", "2*l2"), FIRST, False),
+    "lengths exchanged": (RIGHT, "atan2(py, px) - atan2(l1*sin(q2), l2 + l1*cos(q2))", False),
+    "a length not squared": (RIGHT.replace("l1^2", "l1"), FIRST, False),
+    "numbers": (RIGHT.replace("l1", "1").replace("l2", "1"), "atan2(py, px) - atan2(sin(q2), 1 + cos(q2))", True),
+}
+
+
+@pytest.mark.parametrize("name", INVERSE)
+def test_inverse_kinematics_in_letters_is_right_at_other_values_too(name):
+    arm = with_lengths(1.0, 1.0)
+    second, first, passes = INVERSE[name]
+    steps = [{"joint": 2, "solution": f"±{second}"}, {"joint": 1, "solution": first}]
+    report = arm.grade({"ik": {"steps": steps}})
+    assert report.verdict.passes == passes, str(report)
+    by_chance = any(note.kind is NoteKind.ONLY_AT_VALUES for note in report.notes)
+    assert by_chance == (not passes)

@@ -21,6 +21,7 @@ AGREEMENT = {
 SENTENCES: Mapping[NoteKind, str] = {
     NoteKind.AGREES: "{quantity} is {agreement}",
     NoteKind.DISAGREES: "{quantity} is not {agreement}",
+    NoteKind.ONLY_AT_VALUES: "{quantity}: right at the file's values alone, by chance; judged at other ones: {values}",
     NoteKind.NUMBERS: "{quantity}: judged at the file's numbers: {values}",
     NoteKind.SIDES_DIFFER: "{quantity}: the sides of its chain of equations differ; the last one is judged",
     NoteKind.SIDES_UNREAD: "{quantity}: a side of its chain of equations could not be read; the last one is judged",
