@@ -350,9 +350,13 @@ def _factorization(truth: Truth, judged: JudgedQuantity) -> NoteKind | None:
         if element is None:
             return NoteKind.BY_TORQUES
         C[entry.index] = element
-    if all(element.is_zero for element in (C - coordinates.in_y("C", lag.C)).flat):
+    christoffel = truth.with_numbers("C", coordinates.in_y("C", lag.C), judged.numbers)
+    if all(element.is_zero for element in (C - christoffel).flat):
         return NoteKind.CHRISTOFFEL
-    rate = np.array([[entry.by_time() for entry in row] for row in truth.of("M")], dtype=object)
+    if any(finding.verdict is Verdict.ROUNDED for finding in judged.findings.values()):
+        return NoteKind.BY_TORQUES  # of rounded decimals only the torques are known to be right
+    M = truth.with_numbers("M", truth.of("M"), judged.numbers)
+    rate = np.array([[entry.by_time() for entry in row] for row in M], dtype=object)
     N = rate - 2 * C
     is_skew = all(element.is_zero for element in (N + N.T).flat)
     return NoteKind.SKEW if is_skew else NoteKind.NOT_SKEW

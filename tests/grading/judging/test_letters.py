@@ -124,3 +124,13 @@ def test_inverse_kinematics_in_letters_is_right_at_other_values_too(name):
     assert report.verdict.passes == passes, str(report)
     by_chance = any(note.kind is NoteKind.ONLY_AT_VALUES for note in report.notes)
     assert by_chance == (not passes)
+
+
+def test_a_christoffel_c_in_numbers_is_called_that():
+    arm = Arm.load("planar2r")
+    values = {name: f"({float(value)})" for name, value in arm.description.numbers.values.items()}
+    C = [
+        [LETTER.sub(lambda m: values[m[1]] + (m[2] or ""), entry) for entry in row] for row in written(arm.lagrangian.C)
+    ]
+    kinds = [note.kind for note in arm.grade({"C": C}).notes]
+    assert NoteKind.CHRISTOFFEL in kinds and NoteKind.NOT_SKEW not in kinds
