@@ -198,3 +198,27 @@ def test_what_is_wrong_with_any_pose_is_said_before_an_axis_is_blamed(tmp_path, 
 def test_points_fall_from_the_bound_to_ten_times_it():
     assert [share_within(value, 0.1) for value in (0.0, 0.1, 1.0, 2.0, np.inf)] == [1.0, 1.0, 0.0, 0.0, 0.0]
     assert share_within(0.3, 0.1) == pytest.approx(1 - np.log10(3))
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("mm", 1000), ("cm", 100), ("inches", 1 / 0.0254)])
+def test_other_units_of_length_are_named(unit, factor, tmp_path):
+    arm = Arm.load("planar2r")
+    l1, l2 = (factor * length for length in arm.description.numbers.a)
+    text = (
+        "from math import acos, atan2, cos, sin\n"
+        f"l1, l2 = {l1}, {l2}\n"
+        "def fk(q):\n"
+        "    a, b = q[0], q[0] + q[1]\n"
+        "    c, s = cos(b), sin(b)\n"
+        "    x, y = l1 * cos(a) + l2 * c, l1 * sin(a) + l2 * s\n"
+        "    return [[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, 0], [0, 0, 0, 1]]\n"
+        "def ik(T):\n"
+        "    x, y = T[0][3], T[1][3]\n"
+        "    k = (x * x + y * y - l1**2 - l2**2) / (2 * l1 * l2)\n"
+        "    if abs(k) > 1:\n        return []\n"
+        "    return [[atan2(y, x) - atan2(l2 * sin(b), l1 + l2 * cos(b)), b] for b in (acos(k), -acos(k))]\n"
+    )
+    report = checked(arm, text, tmp_path, samples=10, rubric=PATIENT)
+    assert f"its positions are in {unit}; expected m" in str(report)
+    assert f"when their positions are given in {unit}; expected m" in str(report)
+    assert "axis is wrong" not in str(report)

@@ -11,6 +11,8 @@ from dhkit.grading.isolation import WAITING_FACTOR
 from dhkit.programs.process import Failure, ProgramError
 from dhkit.programs.program import Program
 
+LENGTH_UNITS = {"mm": 1e3, "cm": 1e2, "inches": 1 / 0.0254}
+"""Units of length that programs may use in place of metres, and how many a metre has."""
 POSE_TOLERANCE = 1e-6
 """Largest difference of poses that agree: entries of rotations, and positions as shares of the arm's reach."""
 MAX_DETAILS = 5

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from dhkit.arm import Arm
 from dhkit.description import Array, Robot, description_of
 from dhkit.display import listed
 from dhkit.errors import AnswerError, DhkitError
-from dhkit.programs.caller import MAX_DETAILS, POSE_TOLERANCE, Caller
+from dhkit.programs.caller import LENGTH_UNITS, MAX_DETAILS, POSE_TOLERANCE, Caller
 from dhkit.programs.inverse import score_inverse
 from dhkit.programs.process import ProgramError
 from dhkit.programs.program import Program
@@ -104,7 +104,7 @@ def score_forward(
     if not agrees.all() and not details:
         k = int(np.argmin(agrees))
         returned = np.array([T for T in poses if T is not None])
-        hint = _pose_hint(returned, float(errors.max())) or _axis_hint(arm, call, rng)
+        hint = _pose_hint(returned, float(errors.max())) or _unit_hint(poses, truth) or _axis_hint(arm, call, rng)
         details = (f"first at q = {listed(states[k])}", *hint)
     yield Part("agrees", most * agrees.mean(), most, text, details)
 
@@ -136,6 +136,21 @@ def _pose_hint(poses: Array, error: float) -> tuple[str, ...]:
     skew = float(np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max())
     if skew > MAX_ROUNDING or np.any(np.linalg.det(R) < 0):
         return (f"its upper left 3 x 3 part is no rotation: R^T R differs from 1 by {skew:.2g}; look at signs in A_i",)
+    return ()
+
+
+def _unit_hint(poses: Sequence[Array | None], truth: Array) -> tuple[str, ...]:
+    """Return the unit of positions that are right but for it; ``poses`` and ``truth`` are (4, 4) each, m."""
+    pairs = [(T, right) for T, right in zip(poses, truth, strict=True) if T is not None]
+    if not pairs:
+        return ()
+    theirs, ours = (np.array(matrices) for matrices in zip(*pairs, strict=True))
+    if np.abs(theirs[:, :3, :3] - ours[:, :3, :3]).max() > POSE_TOLERANCE:
+        return ()
+    size = float(np.abs(ours[:, :3, 3]).max())
+    for unit, factor in LENGTH_UNITS.items():
+        if size > 0 and np.abs(theirs[:, :3, 3] / factor - ours[:, :3, 3]).max() < POSE_TOLERANCE * size:
+            return (f"its positions are in {unit}; expected m",)
     return ()
 
 

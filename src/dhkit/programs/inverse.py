@@ -12,7 +12,7 @@ from dhkit.arm import Arm
 from dhkit.description import Array
 from dhkit.display import listed
 from dhkit.kinematics import classify
-from dhkit.programs.caller import MAX_DETAILS, POSE_TOLERANCE, Caller
+from dhkit.programs.caller import LENGTH_UNITS, MAX_DETAILS, POSE_TOLERANCE, Caller
 from dhkit.programs.process import ProgramError
 from dhkit.programs.random_poses import poses_out_of_reach, random_states, regular_states, singular_states
 from dhkit.programs.report import Part, share_within
@@ -58,6 +58,8 @@ def score_inverse(
     text = f"{sum(right)} of {len(regular)} poses are met by every solution returned; "
     text += f"{sum(empty)} of {len(empty)} out of reach are empty" if len(empty) else "none is out of reach"
     worth = points["closes"] + spare
+    if not any(right):
+        judge.try_units(arm.fk(regular_states(arm, rng, UNIT_POSES)))
     yield Part("closes", worth * share, worth, text, judge.details())
     if has_closed_form:
         yield _branches_part(regular, points["branches"])
@@ -70,6 +72,10 @@ def score_inverse(
     if share < 1:
         text += f"; counts for the {100 * share:.0f} % of the poses that are met"
     yield Part("time", points["time"] * share_within(float(seconds), limit) * share, points["time"], text)
+
+
+UNIT_POSES = 3
+"""Number of poses that a program is given in other units of length."""
 
 
 @dataclass(frozen=True)
@@ -139,6 +145,20 @@ class PoseJudge:
             tuple(name for name, is_found in zip(names, found, strict=True) if is_found),
             tuple(name for name, is_found in zip(names, found, strict=True) if not is_found),
         )
+
+    def try_units(self, poses: Array) -> None:
+        """Note the unit of positions with which a program that meets no pose meets these, shape (N, 4, 4), m."""
+        for unit, factor in LENGTH_UNITS.items():
+            scale = np.where(self._prismatic, 1 / factor, 1.0)
+            scaled = poses.copy()
+            scaled[:, :3, 3] *= factor
+            answers = [self._solutions(T)[0] for T in scaled]
+            if all(
+                rows is not None and len(rows) and self._pose_error(rows[0] * scale, T) < POSE_TOLERANCE
+                for rows, T in zip(answers, poses, strict=True)
+            ):
+                self._errors[f"it meets the poses when their positions are given in {unit}; expected m"] += len(poses)
+                return
 
     def returns_nothing(self, T: Array) -> bool:
         """Return whether the program has no solutions of a pose out of reach, shape (4, 4), m, world."""
