@@ -42,7 +42,7 @@ MEANINGS = {
     "V": "Potential energy, J, counted from any zero.",
     "L": "Lagrangian K - V, J.",
     "T": "Transform from base to tool, 4 rows of 4: lengths in m.",
-    "J": "The tool's Jacobian, 6 rows of n: linear (m), then angular; world axes.",
+    "J": "The tool's Jacobian, 6 rows of n: linear (m), then angular; world axes. Planar arms: x, y, or x, y, angle.",
 }
 """Descriptions by quantity, without the link transforms."""
 UNITS = dict(zip(COLUMNS, ("rad", "m", "m", "rad"), strict=True))

@@ -150,6 +150,8 @@ class _SheetJudge:
                 self._require_known(name, names)
                 if callable(value):
                     judged[name] = judge_function(name, value, self.truth, self.seed)
+                elif name == "J":
+                    read[name] = self._jacobian(value, names)
                 else:
                     read[name] = given_quantity(name, value, shape_of(name, names.n), self.vocabulary, names)
             except AnswerError as error:
@@ -172,6 +174,31 @@ class _SheetJudge:
 
     def _refusal(self, error: AnswerError) -> AnswerError:
         return AnswerError(f"{self.sheet.file}: answer: {error}")
+
+    def _jacobian(self, value: object, names: QuantityNames) -> tuple[Given, ...]:
+        """Return the entries of a Jacobian: of six rows, or of the two or three rows that an arm's motion has.
+
+        Of an arm in a plane these are the two positions in it, with the angle about its normal or without; of others
+        three rows are those of the position.
+        """
+        try:
+            return given_quantity("J", value, shape_of("J", names.n), self.vocabulary, names)
+        except AnswerError as error:
+            for rows in self._rows_of_few():
+                try:
+                    given = given_quantity("J", value, (len(rows), names.n), self.vocabulary, names)
+                except AnswerError:
+                    continue
+                return tuple(replace(entry, index=(rows[entry.index[0]], entry.index[1])) for entry in given)
+            raise error from None
+
+    def _rows_of_few(self) -> list[tuple[int, ...]]:
+        """Return the rows, from 0, that a Jacobian of fewer than six has."""
+        J = self.truth.of("J")
+        moving = [row for row in range(6) if not all(element.is_zero for element in J[row])]
+        position = tuple(row for row in moving if row < 3)
+        is_planar = len(position) == 2 and len(moving) <= 3
+        return [position, tuple(moving)] if is_planar else [(0, 1, 2)]
 
     def _require_known(self, name: str, names: QuantityNames) -> None:
         """Refuse a name that is none of a quantity."""

@@ -6,6 +6,8 @@ from sympy import cos, sin
 
 from dhkit import Arm
 from dhkit.description import from_dh
+from dhkit.errors import AnswerError
+from dhkit.grading import Verdict
 
 q1, q2, q3, l1, l2, l3, d1, a2, a3 = sympy.symbols("q1 q2 q3 l1 l2 l3 d1 a2 a3")
 
@@ -94,3 +96,34 @@ def test_cosines_of_sums_split_up_in_the_pose(name, joints):
     T = [[c, -s, 0, x], [s, c, 0, y], [0, 0, 1, z], [0, 0, 0, 1]]
     report = Arm.load(name).grade(T=[[str(entry) for entry in row] for row in T])
     assert [one.mistake for one in report.diagnosis] == ["sum_of_angles_split"], str(report)
+
+
+ROWS = [["-l1*s1 - l2*s12", "-l2*s12"], ["l1*c1 + l2*c12", "l2*c12"], ["1", "1"]]
+"""Positions in the plane, and the angle, of planar2r."""
+
+
+@pytest.mark.parametrize("count", [2, 3])
+@pytest.mark.parametrize("as_text", [False, True])
+def test_a_planar_jacobian_has_the_rows_of_its_plane(count, as_text):
+    arm = Arm.load("planar2r")
+    rows = ROWS[:count]
+    text = "[" + "; ".join(", ".join(row) for row in rows) + "]"
+    report = arm.grade({"J": text if as_text else rows})
+    assert report.verdict is Verdict.CORRECT
+    assert len(report.entries) == 2 * count
+    wrong = [["l1*s1 - l2*s12", "-l2*s12"], *rows[1:]]
+    found = arm.grade({"J": wrong})
+    assert [entry.index for entry in found.entries if not entry.verdict.passes] == [(0, 0)]
+
+
+def test_three_rows_of_other_arms_are_the_position():
+    """A turntable with a slide that reaches outwards and upwards."""
+    arm = Arm.from_dh([(0, 0.3, 0, "pi/2"), (0, 0, 0.5, 0)])
+    rows = [["-0.5*s1*c2", "-0.5*c1*s2"], ["0.5*c1*c2", "-0.5*s1*s2"], ["0", "0.5*c2"]]
+    assert arm.grade({"J": rows}).verdict.passes
+    assert not arm.grade({"J": [*rows[:2], ["0", "-0.5*c2"]]}).verdict.passes
+
+
+def test_other_numbers_of_rows_are_refused():
+    with pytest.raises(AnswerError, match="J: found a list of 4; expected a list of 6"):
+        Arm.load("planar2r").grade({"J": [["1", "1"]] * 4})
