@@ -41,6 +41,8 @@ EXIT_DELAY = 0.3
 """Longest time from the end of a program's answers to its own end, s."""
 WATCH_PERIOD = 0.05
 """Time between two looks at memory and processes, s."""
+LAST_WORDS_TIME = 1.0
+"""Longest time for the printed output of a program that has ended, s: children may hold it open."""
 MAX_END_TIME = 5.0
 """Longest time that the supervisor may take to end the processes that a program started, s."""
 
@@ -169,6 +171,8 @@ class Process:
         self._processor_times: dict[int, float] = {}
         self._lines: queue.Queue[bytes | None] = queue.Queue(MAX_UNREAD_ANSWERS)
         self._output = bytearray()
+        self._drained = threading.Event()
+        """Set at the end of the printed output."""
         self._closed = threading.Event()
         self._count = 0
         self._threads = [
@@ -291,6 +295,8 @@ class Process:
             Failure.ENDED: f"the program ended{self._exit_status_text()}",
             Failure.GARBAGE: "wrote what is no answer",
         }
+        if self.failure is Failure.ENDED:
+            self._drained.wait(LAST_WORDS_TIME)  # its last words may come after the news of its end
         lines = self.output().strip().splitlines() if self.failure is Failure.ENDED else []
         last_line = f": {printable(lines[-1])[:200]}" if lines else ""
         return ProgramError(texts[self.failure] + last_line, self.failure)
@@ -330,6 +336,7 @@ class Process:
             while piece := os.read(stream.fileno(), MAX_OUTPUT_BYTES):
                 self._output += piece
                 del self._output[:-MAX_OUTPUT_BYTES]
+        self._drained.set()
 
     def _watch(self) -> None:
         """Watch processor time, memory, number and files of the processes, and end the process beyond its limits."""
