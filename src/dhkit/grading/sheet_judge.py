@@ -261,7 +261,7 @@ class _SheetJudge:
         self, trees: Sequence[Tree], judge: Callable[[Description], KinematicJudgement]
     ) -> KinematicJudgement:
         """Judge formulas at the file's values; those that pass at other values of the parameters too."""
-        from dhkit.grading.judging.other_values import with_other_values
+        from dhkit.grading.judging.inverse import with_other_values
 
         judged = judge(self.truth.description)
         other = with_other_values(self.truth.description, trees, self.seed) if judged.verdict.passes else None
