@@ -70,7 +70,7 @@ def test_all_chains_have_tables(law, convention, capsys):
     with capsys.disabled():
         for example in chains if count == 1000 else chains[::12]:
             chain = chain_of(read_urdf(example.path), example.base, example.tip)
-            extraction = extracted(chain, convention=convention)
+            extraction = extracted(chain, convention=convention, exact=True)
             tool, M, g = compare(chain, extraction.description, count)
             law.holds("tool", tool, AGREED, example.name)
             law.holds("M", M, AGREED, example.name)
