@@ -66,6 +66,7 @@ def as_designed_option() -> Any:
     def command(as_designed: Annotated[bool, option] = False) -> None:
         """Have the option."""
 
+    # Annotations of this file are text, and typer does not see the names inside this function.
     command.__annotations__["as_designed"] = Annotated[bool, option]
     app = typer.Typer()
     app.command()(command)

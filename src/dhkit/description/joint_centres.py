@@ -54,13 +54,11 @@ def link_ends(a: Array, d: Array, cos_alpha: Array, sin_alpha: Array, *, is_stan
         The tool's origin in frame n, shape (3,), m.
     """
     n = len(a)
-    oblique = np.stack([np.zeros(n), sin_alpha, cos_alpha], axis=1)
-    if not is_standard:
-        oblique[:, 1] *= -1
-    # Points of joint i: those on the side of its row, offset + slope s_i, and (0, 0, s_i) on the other side.
-    offset = np.stack([-a, np.zeros(n), np.zeros(n)], axis=1) - d[:, None] * oblique
-    if not is_standard:
-        offset = np.stack([a, np.zeros(n), np.zeros(n)], axis=1) + d[:, None] * oblique
+    # Points of joint i: offset + oblique s_i on the side of its row, and (0, 0, s_i) on the other side.
+    sign = 1.0 if is_standard else -1.0
+    oblique = np.stack([np.zeros(n), sign * sin_alpha, cos_alpha], axis=1)
+    along_x = np.stack([a, np.zeros(n), np.zeros(n)], axis=1)
+    offset = -sign * (along_x + d[:, None] * oblique)
     begin_offset = np.zeros((n + 1, 3))
     end_offset = np.zeros((n + 1, 3))
     end_offset[n] = tool

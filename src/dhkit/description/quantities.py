@@ -10,9 +10,8 @@ from dhkit.description.values import ONE
 from dhkit.errors import ExpressionError
 from dhkit.expressions import CONSTANTS, Expression, parse
 
-PLAIN_NUMBER = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?\s*", re.ASCII)
-"""Text that is a number and nothing else."""
-
+NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?", re.ASCII)
+"""A decimal, as files have it."""
 JOINT_VARIABLE = re.compile(r"\s*q_?([0-9]{1,2})\s*([+-].*)?", re.ASCII | re.DOTALL)
 """A joint variable and what is added to it."""
 
@@ -20,8 +19,8 @@ Entry = TypeVar("Entry")
 
 
 def is_plain_number(text: str) -> bool:
-    """Return whether text is a number and nothing else."""
-    return PLAIN_NUMBER.fullmatch(text) is not None
+    """Return whether text is a number and nothing else but spaces around it."""
+    return NUMBER.fullmatch(text.strip()) is not None
 
 
 def parse_quantity(text: str, names: Collection[str], unit: Expression = ONE) -> Expression:

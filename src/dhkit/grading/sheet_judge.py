@@ -154,10 +154,8 @@ class _SheetJudge:
                     read[name] = self._jacobian(value, names)
                 else:
                     read[name] = given_quantity(name, value, shape_of(name, names.n), self.vocabulary, names)
-            except AnswerError as error:
+            except (AnswerError, DescriptionError) as error:
                 refused[name] = self._refusal(error)
-            except DescriptionError as error:
-                refused[name] = error
         letters = frozenset(self.truth.description.parameters)
         trees = [entry.tree for given in read.values() for entry in given if entry.tree is not None]
         in_symbols = any(letters & names_of(tree) for tree in trees)
@@ -166,13 +164,14 @@ class _SheetJudge:
                 judged[name] = judge_quantity(
                     name, given, self.truth, self.sheet.task, self.digits, self.seed, in_symbols=in_symbols
                 )
-            except AnswerError as error:
+            except (AnswerError, DescriptionError) as error:
                 refused[name] = self._refusal(error)
-            except DescriptionError as error:
-                refused[name] = error
         return judged, refused
 
-    def _refusal(self, error: AnswerError) -> AnswerError:
+    def _refusal(self, error: AnswerError | DescriptionError) -> DhkitError:
+        """Return the error of an answer with the file in front; that of a robot as it is."""
+        if isinstance(error, DescriptionError):
+            return error
         return AnswerError(f"{self.sheet.file}: answer: {error}")
 
     def _jacobian(self, value: object, names: QuantityNames) -> tuple[Given, ...]:

@@ -186,9 +186,7 @@ def _described_parts(description: Description, shapes: Sequence[Shape], link: in
             if file is None or not is_mesh_file(file):
                 return []
         T_body_part = matrix(shape.placement, values)
-        color_of_part = shape.color or color
-        own = Part(
-            link, with_values(geometry, values), T_body_part, color_of_part, file, shape.body, poses[shape.frame]
-        )
-        parts.append(own)
+        own_color = shape.color or color
+        T_link_body = poses[shape.frame]
+        parts.append(Part(link, with_values(geometry, values), T_body_part, own_color, file, shape.body, T_link_body))
     return parts

@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 from xml.parsers import expat
 
 from dhkit.description.files import error_reason
+from dhkit.description.quantities import NUMBER
 from dhkit.errors import ModelError
 
 Element = ElementTree.Element
@@ -22,7 +23,6 @@ MAX_ELEMENTS = 100_000
 """Largest number of elements; a humanoid with hands has 5,000."""
 MAX_ATTRIBUTE_LENGTH = 1_000
 """Longest attribute, in characters: a name, a path or a list of numbers."""
-NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?", re.ASCII)
 RUN_XACRO = "run xacro on it first, and give its output"
 DECLARED_ENCODING = re.compile(rb"\s*<\?xml[^>]{0,100}?encoding\s*=\s*[\"']([A-Za-z0-9_.\-]{1,40})[\"']")
 REFUSED_ENCODINGS = {"idna", "punycode"}

@@ -26,6 +26,8 @@ MAX_JOINT_VALUE = 1e6
 """Largest joint value of a solution, rad and m."""
 RANK_TOLERANCE = 1e-9
 """Largest singular value of a Jacobian, m, that counts as zero."""
+UNIT_POSES = 3
+"""Number of poses that a program is given in other units of length."""
 OUT_OF_REACH_SHARE = 0.1
 """Number of poses out of reach over that of regular poses."""
 SOLUTION_ORDERS = {
@@ -72,10 +74,6 @@ def score_inverse(
     if share < 1:
         text += f"; counts for the {100 * share:.0f} % of the poses that are met"
     yield Part("time", points["time"] * share_within(float(seconds), limit) * share, points["time"], text)
-
-
-UNIT_POSES = 3
-"""Number of poses that a program is given in other units of length."""
 
 
 @dataclass(frozen=True)
