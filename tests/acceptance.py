@@ -19,15 +19,22 @@ import pytest
 ACCEPTING = os.environ.get("DHKIT_ACCEPT") == "1"
 RESULTS = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "acceptance.json"
 SHARE = 50
-LEAST = 5
+FEWEST = 5
 
 only_accepting = pytest.mark.skipif(not ACCEPTING, reason="in make accept")
 """For tests that take too long for every change."""
 
 
-def sample_size(full: int, least: int = LEAST) -> int:
-    """Return how many samples this run takes of a law stated with ``full``."""
-    return full if ACCEPTING else max(min(full, least), full // SHARE)
+def sample_size(full: int, quick: int | None = None) -> int:
+    """Return how many samples this run takes of a law stated with ``full``.
+
+    Outside of ``make accept`` they are ``quick``, and unless it is given a fiftieth, and at least ``FEWEST``.
+    """
+    if ACCEPTING:
+        return full
+    if quick is not None:
+        return min(quick, full)
+    return max(min(full, FEWEST), full // SHARE)
 
 
 DIFFERENT_ROBOTS = ("planar2r", "puma560", "stanford", "cobra600", "panda", "manutec_r3", "ax12_arm")
@@ -52,9 +59,9 @@ class Law:
         self.size = 0
         self.worst: dict[str, tuple[float, float]] = {}
 
-    def samples(self, full: int, least: int = LEAST) -> int:
-        """Return the number of samples of this run; ``least`` for samples that take seconds each."""
-        self.size = sample_size(full, least)
+    def samples(self, full: int, quick: int | None = None) -> int:
+        """Return the number of samples of this run, see :func:`sample_size`."""
+        self.size = sample_size(full, quick)
         return self.size
 
     def holds(self, quantity: str, seen: float, required: float, where: object = None) -> None:

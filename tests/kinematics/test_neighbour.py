@@ -154,7 +154,7 @@ def test_poses_at_the_boundary_of_an_arm_that_nearly_is_of_a_family_are_reached(
     arm = Arm.from_dh(rows)
     assert arm.family.closed_form
     rng = np.random.default_rng(0)
-    count = law.samples(300, least=40)
+    count = law.samples(300, quick=40)
     q = rng.uniform(-np.pi, np.pi, (count, 6))
     q[:, 2] = rng.choice([-right, right], count) + np.arctan2(0.05, 0.4) + rng.choice([0, 1e-9, 1e-6], count)
     T = arm.fk(q)

@@ -234,7 +234,7 @@ def test_a_branch_outside_the_limits_is_only_shown(puma):
 def test_a_motion_of_an_old_arm_is_never_shown(open_lab):
     lab = open_lab("planar2r")
     rng = np.random.default_rng(0)
-    for k in range(sample_size(30, least=12)):
+    for k in range(sample_size(30, quick=12)):
         lab.answer("motion.plan", {"kind": "line", "goal": {"q": [0.6, 0.9]}})
         time.sleep(rng.uniform(0, 0.05))
         lab.answer("table.edit", {"row": 1, "column": "a", "text": f"0.4{k:02d}"})

@@ -18,7 +18,7 @@ ALLOWED = 1e-6
 @pytest.mark.slow
 @pytest.mark.parametrize(("speed", "near"), [(1.0, 0.005), pytest.param(3.0, 0.01, marks=only_accepting)])
 def test_pairs(law, speed, near):
-    pairs = random_pairs(PUMA, law.samples(100, least=3), seed=int(speed))
+    pairs = random_pairs(PUMA, law.samples(100, quick=3), seed=int(speed))
     limits = Limits.of(PUMA).scaled(velocity=speed)
     planner = Planner(PUMA, limits=limits)
     fine = Planner(PUMA, limits=limits, intervals=FINER * planner.intervals)

@@ -81,7 +81,7 @@ def coal_gap(motion, obstacle, rate=500.0):
 def test_scenes(law):
     planner = Planner(PUMA)
     seconds, solves, longer = [], [], []
-    for k, (start, goal, obstacle) in enumerate(scenes(law.samples(20, least=3))):
+    for k, (start, goal, obstacle) in enumerate(scenes(law.samples(20, quick=3))):
         motion = planner.solve(start, goal, obstacles=[obstacle], clearance=CLEARANCE)
         law.holds("m short of the clearance, by coal", CLEARANCE - coal_gap(motion, obstacle), ROUNDING, k)
         for what, excess in worst_excess(PUMA, motion, planner.limits).items():
@@ -170,7 +170,7 @@ def test_links_that_move_together_near_each_other_cost_no_time(law):
     """A plane between two links that is fixed in the world would have to separate them while both move."""
     arm = library_robot("ur5")
     planner = Planner(arm)
-    for k, (start, goal, balls) in enumerate(beside_two_balls(arm, law.samples(10, least=2), seed=1)):
+    for k, (start, goal, balls) in enumerate(beside_two_balls(arm, law.samples(10, quick=2), seed=1)):
         free = planner.solve(start, goal, obstacles=balls, clearance=CLEARANCE)
         motion = planner.solve(start, goal, obstacles=balls, clearance=CLEARANCE, self_collision=True)
         assert motion.report.is_converged, k
@@ -231,7 +231,7 @@ def test_goals_just_above_a_box_take_hardly_longer_than_without_it():
     """Boxes 1 to 8 mm below the lowest link: the clearance is reduced there, and the motion is not slowed down."""
     rng, arm = np.random.default_rng(4), library_robot("ur5")
     planner, capsules, tried = Planner(arm), link_capsules(arm), 0
-    while tried < sample_size(4, least=2):
+    while tried < sample_size(4, quick=2):
         start, goal = rng.uniform(-2.5, 2.5, (2, 6))
         axes, gap = world_axes(arm, goal[None])[0], rng.uniform(0.001, 0.008)
         low, i, end = min((axes[i, e, 2] - capsules[i].radius, i, e) for i in range(1, len(capsules)) for e in (0, 1))
@@ -263,7 +263,7 @@ def test_where_the_optimizer_finds_nothing_a_sampled_path_is_slowed_down():
 
 def test_many_obstacles_far_away_cost_little():
     planner, start = Planner(PUMA), np.array([0, 0.8, -1.0, 0, 0.5, 0])
-    far = [Obstacle.sphere(0.02, (0.1 * i, 0, 5)) for i in range(sample_size(1500, least=300))]
+    far = [Obstacle.sphere(0.02, (0.1 * i, 0, 5)) for i in range(sample_size(1500, quick=300))]
     motion = planner.solve(start, [1.2, 0.3, -0.8, 0.5, -0.6, 1.0], obstacles=far)
     assert motion.report.certificate.ok
 

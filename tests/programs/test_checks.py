@@ -77,7 +77,10 @@ def test_a_wrong_row_is_found(name, puma, tmp_path):
     assert report.points < 100 and said in str(report)
 
 
-@pytest.mark.parametrize("name", ["planar2r", "cobra600", "stanford", "ur5", "panda"])
+@pytest.mark.parametrize(
+    "name",
+    ["planar2r", "cobra600", "panda", *(pytest.param(each, marks=pytest.mark.slow) for each in ("stanford", "ur5"))],
+)
 def test_our_own_kinematics_get_full_marks(name, tmp_path):
     text = (
         f"from dhkit import Arm\narm = Arm.load({name!r})\n"

@@ -41,7 +41,7 @@ def random_motion(arm, rng, kind):
 def test_bounds_are_the_largest_torques(name, law):
     arm = dhkit.Arm.load(name)
     rng = np.random.default_rng(0)
-    for trial in range(law.samples(60, least=3)):
+    for trial in range(law.samples(60, quick=3)):
         motion = random_motion(arm, rng, ("quintic", "cubic", "trapezoidal")[trial % 3])
         seen = largest_torques(arm, motion)
         moved = seen > 1e-6

@@ -263,7 +263,7 @@ def test_divided_pieces_are_the_same_function_between_their_bernstein_coefficien
 
 def test_bounds_of_polynomials_are_proved_and_tight(law):
     rng = np.random.default_rng(0)
-    for _ in range(law.samples(300, least=20)):
+    for _ in range(law.samples(300, quick=20)):
         degree, pieces = int(rng.integers(0, 8)), int(rng.integers(1, 6))
         breaks = np.concatenate([[0.0], np.cumsum(rng.uniform(0.1, 2.0, pieces))])
         f = Pieces.of(breaks, rng.normal(size=(pieces, degree + 1, 3)), 3)

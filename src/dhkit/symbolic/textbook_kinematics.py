@@ -208,13 +208,15 @@ class TextbookKinematics:
         ring, row = self.arm.ring, self._lengths(i, self._angles(i, self.arm.rows[i]))
         Rz, Rx = rotation(ring, 0, 1, row.theta), rotation(ring, 1, 2, row.alpha)
         Tz, Tx = translation(ring, 2, row.d), translation(ring, 0, row.a)
-        turned = Rz @ Rx if self._standard else Rx @ Rz
+        first, last = (Rz, Rx) if self._standard else (Rx, Rz)
         if self._has("rotations_first", i):
-            A = turned @ Tx @ Tz
+            A = first @ last @ Tx @ Tz
         elif self._has("translations_first", i):
-            A = Tx @ Tz @ turned
+            A = Tx @ Tz @ first @ last
+        elif self._standard:
+            A = Rz @ Tz @ Tx @ Rx
         else:
-            A = Rz @ Tz @ Tx @ Rx if self._standard else Rx @ Tx @ Rz @ Tz
+            A = Rx @ Tx @ Rz @ Tz
         if self._has("rotation_transposed", i):
             A[:3, :3] = A[:3, :3].T.copy()
         return A

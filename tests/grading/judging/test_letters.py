@@ -38,7 +38,7 @@ def without_one_letter(rng, answer):
 
 def test_an_answer_that_lacks_a_letter_is_not_right(law):
     rng = np.random.default_rng(0)
-    for _ in range(law.samples(5000, least=60)):
+    for _ in range(law.samples(5000, quick=60)):
         arm = with_values(rng)
         quantity = str(rng.choice(["M", "h", "g"]))
         elements = getattr(arm.lagrangian, quantity)

@@ -190,7 +190,7 @@ def test_the_planes_that_are_kept_separate_all_solids(ur5):
     for k, state in enumerate(q):
         mine = [row for row in rows if row.knot == k]
         assert {link for knot, link, _ in needed if knot == k} == {row.link for row in mine}
-        near = state + rng.uniform(-0.3, 0.3, (sample_size(300, least=100), 6))
+        near = state + rng.uniform(-0.3, 0.3, (sample_size(300, quick=100), 6))
         frames = world_to_frames(ur5, near)
         clear = np.ones(len(near), dtype=bool)
         for row in mine:

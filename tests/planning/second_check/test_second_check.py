@@ -22,7 +22,7 @@ PLANNED = ("library", "locked", "table", "urdf")
 def test_no_certificate_is_refuted(law, tmp_path):
     """Of random motions with limits and clearances that a certificate just accepts, or with room."""
     certified = 0
-    count = law.samples(1000, least=len(KINDS))
+    count = law.samples(1000, quick=len(KINDS))
     for k in range(count):
         case = random_case(np.random.default_rng(k), KINDS[k % len(KINDS)], tmp_path)
         if case.certify().ok:
@@ -35,7 +35,7 @@ def test_no_certificate_is_refuted(law, tmp_path):
 def test_no_planned_motion_is_refuted(law, tmp_path):
     """Of arms between random configurations, among random solids."""
     found = 0
-    count = law.samples(100, least=3)
+    count = law.samples(100, quick=3)
     for k in range(count):
         rng = np.random.default_rng(1000 + k)
         arm = random_arm(rng, PLANNED[k % len(PLANNED)], tmp_path)

@@ -46,22 +46,22 @@ def enclose(balls: Balls) -> Enclosure:
 
     A capsule is convex, so it contains the convex hull of the balls that it contains.
     """
-    return min((_about(balls, R, _middle(balls, R)) for R in _candidates(balls)), key=lambda c: c.volume)
+    return min((_about(balls, R[:, 2], _middle(balls, R)) for R in _candidates(balls)), key=lambda c: c.volume)
 
 
 def refine(balls: Balls) -> Enclosure:
     """Return the capsule of :func:`enclose`, or a smaller one with a tilted axis."""
     from scipy.optimize import minimize
 
-    ranked = sorted(_candidates(balls), key=lambda R: _about(balls, R, _middle(balls, R)).volume)
-    R, middle = ranked[0], _middle(balls, ranked[0])
-    best = _about(balls, R, middle)
+    ranked = sorted(_candidates(balls), key=lambda R: _about(balls, R[:, 2], _middle(balls, R)).volume)
+    R = ranked[0]
+    middle = _middle(balls, R)
+    best = _about(balls, R[:, 2], middle)
     scale = best.radius
 
     def tilted(x: Array) -> Enclosure:
         direction = R @ np.array([x[0], x[1], 1.0])
-        turned = rotations_onto(direction / np.linalg.norm(direction))
-        return _about(balls, turned, middle + scale * (R[:, :2] @ x[2:]))
+        return _about(balls, direction / np.linalg.norm(direction), middle + scale * (R[:, :2] @ x[2:]))
 
     steps = np.concatenate([np.zeros((1, 4)), 0.1 * np.eye(4)])
     found = minimize(
@@ -84,7 +84,7 @@ def _candidates(balls: Balls) -> list[Array]:
     along = balls.centres[np.argmax(np.linalg.norm(balls.centres - far, axis=1))] - far
     if np.linalg.norm(along) > 0:
         axes.append(along / np.linalg.norm(along))
-    return [rotations_onto(axis) for axis in axes]
+    return list(rotations_onto(np.array(axes)))
 
 
 def _middle(balls: Balls, R: Array) -> Array:
@@ -95,9 +95,8 @@ def _middle(balls: Balls, R: Array) -> Array:
     return middle
 
 
-def _about(balls: Balls, R: Array, middle: Array) -> Enclosure:
-    """Return the smallest capsule about the line through a point along the third column of R."""
-    axis = R[:, 2]
+def _about(balls: Balls, axis: Array, middle: Array) -> Enclosure:
+    """Return the smallest capsule about the line through a point along a unit vector."""
     offset = balls.centres - middle
     along = offset @ axis
     aside = np.linalg.norm(offset - along[:, None] * axis, axis=1)

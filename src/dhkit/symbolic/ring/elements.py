@@ -98,6 +98,8 @@ class Element:
         if len(self.polynomial) == 0:
             return self
         factor = self._coerced(other)
+        if len(factor) == 0:
+            return Element(self.ring, factor)
         if len(self.polynomial) * len(factor) > MAX_PAIRS:
             raise RingError(f"a product of {len(self.polynomial)} by {len(factor)} terms: {TOO_LONG}")
         product = Element(self.ring, self.polynomial * factor).reduced()
