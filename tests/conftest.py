@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 from importlib import import_module
@@ -32,6 +33,12 @@ settings.load_profile("dhkit")
 
 def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(acceptance.Recorder(), "dhkit-laws")
+
+
+def pytest_collection_finish() -> None:
+    # Modules and tests stay until the end: a collector that visits them again and again takes 5 % of the time.
+    gc.freeze()
+    gc.set_threshold(10_000, 10, 10)
 
 
 @pytest.fixture(scope="session")
