@@ -18,6 +18,7 @@ from dhkit.control.sensors import Measuring
 from dhkit.control.timing import sampled_reference
 from dhkit.description import Array, Description
 from dhkit.description.arrays import number_array
+from dhkit.description.frames import has_same_geometry
 from dhkit.dynamics import kinetic_energy
 from dhkit.errors import SimulationError
 from dhkit.kinematics import forward_kinematics
@@ -264,7 +265,6 @@ def result_of(
 
 def _reference_poses(description: Description, plant: Plant, q: Array) -> Array:
     """Return the poses of the reference if the moving arm has another geometry, shape (N+1, 12); else shape (0, 12)."""
-    known = forward_kinematics(description, q)
-    if np.array_equal(known, forward_kinematics(plant.description, q)):
+    if has_same_geometry(description, plant.description):
         return np.zeros((0, 12))
-    return known[:, :3].reshape(-1, 12)
+    return forward_kinematics(description, q)[:, :3].reshape(-1, 12)

@@ -193,3 +193,14 @@ def world_to_tool(description: Description, q: ArrayLike) -> Array:
         Joint values, shape (..., n), rad and m.
     """
     return world_to_frames(description, q)[..., -1, :, :] @ description.numbers.T_last_tool
+
+
+GEOMETRY = ("theta", "d", "a", "alpha", "T_world_base", "T_last_tool")
+"""Fields of :class:`~dhkit.description.numbers.Numbers` that decide where the frames are."""
+
+
+def has_same_geometry(first: Description, second: Description) -> bool:
+    """Return whether all frames of two arms are at the same places for equal joint values; their bodies may differ."""
+    if first.convention is not second.convention or first.kinds != second.kinds:
+        return False
+    return all(np.array_equal(getattr(first.numbers, name), getattr(second.numbers, name)) for name in GEOMETRY)

@@ -10,6 +10,7 @@ import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.description import Array, Description
+from dhkit.description.frames import has_same_geometry
 from dhkit.lab.assignment import Assignment, Condition, JointsAt, MotionBetween, OwnScore, ToolAt
 from dhkit.lab.desk import Desk
 from dhkit.lab.motion_panel import MotionPanel
@@ -150,7 +151,7 @@ class TaskPanel(Panel):
 
 def moves_alike(first: Description, second: Description) -> bool:
     """Return whether two arms have the same table, base, tool and limits; their bodies may differ."""
-    if first.convention is not second.convention or first.kinds != second.kinds:
-        return False
-    names = ("theta", "d", "a", "alpha", "T_world_base", "T_last_tool", "lower", "upper", "velocity", "effort")
-    return all(np.array_equal(getattr(first.numbers, name), getattr(second.numbers, name)) for name in names)
+    limits = ("lower", "upper", "velocity", "effort")
+    return has_same_geometry(first, second) and all(
+        np.array_equal(getattr(first.numbers, name), getattr(second.numbers, name)) for name in limits
+    )
