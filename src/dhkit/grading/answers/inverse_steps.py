@@ -9,13 +9,15 @@ from fractions import Fraction
 from itertools import pairwise
 
 from dhkit.errors import AnswerError
-from dhkit.expressions.syntax import Name, Number, Product, Sum, Tree
+from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 from dhkit.grading.answers.pose_entries import with_pose_entries
 from dhkit.grading.answers.reading import answer_tokens, meaning_of, read_answer
-from dhkit.grading.answers.rewriting import to_plain_grammar
 from dhkit.grading.answers.sheet_values import InverseStep
 from dhkit.grading.answers.tokens import nesting, quote
-from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Vocabulary
+from dhkit.grading.answers.typeset import typeset_equations
+from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Meaning, Vocabulary, plain_name
+from dhkit.grading.judging.changed_formulas import equal_parts, operands, replaced_everywhere, with_operands
+from dhkit.grading.judging.numeric import names_of
 
 EQUALS = re.compile(r"&?\s*(?<![<>!=:])==?(?!=)\s*&?")
 """What stands between the two sides of an equation."""
@@ -35,9 +37,15 @@ TURNED_BACK = re.compile(
     re.DOTALL,
 )
 """A formula whose whole turns are taken off, which changes nothing."""
+SQUARE_OF_NAME = re.compile(r"^\s*(\\?[A-Za-z]\w*)\s*(?:\^|\*\*)\s*(?:2|\{2\}|\(2\))\s*$", re.ASCII)
+"""The square of a name, on a side of its own: r^2 = px^2 + py^2 defines r."""
+FUNCTION_OF_NAME = re.compile(r"^\s*\\?(cos|tan)\s*\(?\s*(\\?[A-Za-z]\w*)\s*\)?\s*$", re.ASCII)
+"""A function of a name on a side of its own: cos(gamma) = ... and tan(beta) = y/x define angles."""
 ANOTHER = re.compile(r"[,;]\s*(?:where|with)?\s*(?=[^,;=()]*=)")
 """What stands between a formula and the definition of a quantity in it."""
 COMMA = re.compile(",")
+JOINT_LETTERS = ("q", "th", "Th", "varth")
+"""Beginnings of names that are a joint's variable and nothing else: q1, theta_1, th1."""
 
 
 @dataclass(frozen=True)
@@ -64,22 +72,31 @@ class GivenStep:
     solutions: tuple[Tree, ...] = ()
     error: str = ""
 
+    @property
+    def read_as(self) -> tuple[str, str]:
+        """The step as it was read, in the robot's own names, as plain text and as LaTeX; empty if it is too long."""
+        joint = Name(f"q{self.joint + 1}", 0)
+        return typeset_equations([*self.equations, *((joint, formula) for formula in self.solutions)])
+
 
 def given_steps(steps: Sequence[InverseStep], vocabulary: Vocabulary) -> list[GivenStep]:
     """Return the steps of a sheet; one that cannot be read says why.
 
-    An equation ``D = ...`` of an unknown name defines it, for its own step and those behind.
+    An equation ``D = ...`` of a name that is no joint's defines it, for its own step and those behind; ``r^2 = ...``
+    defines the length r. A name with two signs, ``S = ±sqrt(1 - D^2)``, holds for its own step.
     """
     given: list[GivenStep] = []
     for step in steps:
         text = "; ".join([*step.equations, *(_titled(step.joint, formula) for formula in step.solutions)])
+        reading = _Reading(step.joint, vocabulary)
         try:
             if step.joint - 1 in [other.joint for other in given if not other.error]:
                 raise AnswerError(f"joint {step.joint} has a step already; expected all of its formulas in one")
-            given.append(_Reading(step.joint, vocabulary).step(step, text))
+            given.append(reading.step(step, text))
         except AnswerError as error:
             hint = "; a quantity of your own is defined by an equation, D = ..." if "unknown name" in str(error) else ""
             given.append(GivenStep(step.joint - 1, text, error=f"{error}{hint}"))
+        reading.forget_signs()
     return given
 
 
@@ -99,16 +116,24 @@ class _Reading:
     """
 
     def __init__(self, joint: int, vocabulary: Vocabulary) -> None:
-        self.joint, self.vocabulary = joint, vocabulary
+        self.joint = joint
+        self.vocabulary = vocabulary
+        self.has_solutions = False
+        self.signed: dict[str, dict[str, Meaning]] = {}
+        """Names that are defined with two signs, and what they stand for with each."""
+        self.sides: list[tuple[Tree, dict[str, Tree]]] = []
+        """Functions of the joint that an equation gives, cos(q2) = D, and what they are equal to with each sign."""
 
     def step(self, step: InverseStep, text: str) -> GivenStep:
         equations, solutions = list[tuple[Tree, Tree]](), list[Tree]()
+        self.has_solutions = bool(step.solutions)
         for equation in step.equations:
             for left, right in self._equations(self._plain(equation)):
                 if not step.solutions and self._is_solution(left, right):
                     solutions += self._both_signs(right)
                 else:
                     equations.append(self._equation(left, right))
+                    self._keep_function(left, right)
         for formula in step.solutions:
             solutions += self._solutions(self._plain(formula))
         if not equations and not solutions:
@@ -121,8 +146,40 @@ class _Reading:
             raise AnswerError(f"{quote(text)}: '+-' may be ± or a minus; write ± or +(-...)")
         return with_pose_entries(EQUATION_NUMBER.sub("", text), self.vocabulary)
 
-    def _read(self, text: str) -> Tree:
-        return read_answer(text, self.vocabulary)
+    def forget_signs(self) -> None:
+        """Take the names with two signs back: which sign a later step means is not known."""
+        for name in self.signed:
+            self.vocabulary.refuse(name, f"it has two signs; write the sine or cosine of q{self.joint} in its place")
+
+    def _read(self, text: str, sign: str = "+") -> Tree:
+        """Return the tree of a formula, with ± as a sign."""
+        for name, meanings in self.signed.items():
+            self.vocabulary.redefine(name, meanings[sign])
+        return _without_squared_roots(read_answer(_with_sign(text, sign), self.vocabulary))
+
+    def _meaning(self, text: str, sign: str) -> Meaning:
+        for name, meanings in self.signed.items():
+            self.vocabulary.redefine(name, meanings[sign])
+        return meaning_of(_with_sign(text, sign), self.vocabulary)
+
+    def _keep_function(self, left: str, right: str) -> None:
+        """Keep what a function of the joint is equal to: cos(q2) = D makes atan2(sqrt(1 - c2^2), c2) one of D."""
+        own = f"q{self.joint}"
+        for one, other in ((left, right), (right, left)):
+            function = self._read(one)
+            if EITHER_SIGN.search(one) or not isinstance(function, Call) or own not in names_of(function):
+                continue
+            values = {sign: self._with_values(self._read(other, sign), sign) for sign in "+-"}
+            if not any(own in names_of(value) for value in values.values()):
+                self.sides.append((function, values))
+                return
+
+    def _with_values(self, tree: Tree, sign: str) -> Tree:
+        """Return a tree with the values that equations give in place of functions of the joint."""
+        for function, values in self.sides:
+            places = equal_parts([function, tree])[id(function)]
+            tree = replaced_everywhere(tree, places, values[sign])
+        return tree
 
     def _sides(self, text: str) -> list[str]:
         """Return the sides of a chain of equations; those that are names without a meaning are defined, and left out.
@@ -134,22 +191,68 @@ class _Reading:
         new = [name for name in map(self._new_name, sides) if name]
         known = [side for side in sides if not self._new_name(side)]
         if new and known:
-            if EITHER_SIGN.search(known[-1]):
-                raise AnswerError(f"{quote(text)}: defines {quote(new[0])} with two signs; write ± where it is used")
             for name in new:
-                self.vocabulary.redefine(name, meaning_of(known[-1], self.vocabulary))
-        return known if new else sides
+                self._define(name, known[-1])
+            return known
+        if len(sides) == 2 and self._defines_by_function(*sides):
+            return sides[1:]
+        return sides
+
+    def _defines_by_function(self, left: str, right: str) -> bool:
+        """Define the name on the left side of r^2 = ..., cos(gamma) = ... or tan(beta) = y/x; whether there is one.
+
+        A length is positive, and an angle of a triangle between 0 and pi; that of a quotient is in the quadrant of its
+        numerator and denominator.
+        """
+        square, function = SQUARE_OF_NAME.match(left), FUNCTION_OF_NAME.match(left)
+        if square and self._new_name(square[1]):
+            self._define(square[1], f"sqrt({right})")
+        elif function and function[1] == "cos" and self._new_name(function[2]):
+            self._define(function[2], f"acos({right})")
+        elif function and self._new_name(function[2]):
+            numerator, slash, denominator = right.partition("/")
+            is_quotient = slash and "/" not in denominator and not any(map(nesting, numerator + denominator))
+            self._define(function[2], f"atan2({numerator}, {denominator})" if is_quotient else f"atan({right})")
+        else:
+            return False
+        return True
+
+    def _define(self, name: str, text: str) -> None:
+        """Let a name stand for a formula."""
+        plus, minus = (self._meaning(text, sign) for sign in "+-")
+        if plus != minus:
+            self.signed[name] = {"+": plus, "-": minus}
+        self.vocabulary.redefine(name, plus)
 
     def _new_name(self, side: str) -> str:
-        """Return the name that a side consists of, if it has no meaning yet; else nothing."""
+        """Return the name that a side consists of, if the side defines it; else nothing.
+
+        A definition is not of a joint's variable, a parameter or the pose; names that are only spelled as one of these
+        may be anything, such as phi1, theta23 = theta2 + theta3, s and D beside a parameter d.
+        """
         try:
             tokens = answer_tokens(side.strip(), self.vocabulary)
         except AnswerError:
             return ""
-        if len(tokens) != 1 or tokens[0].kind != "name" or tokens[0].text in FUNCTION_NAMES:
+        if len(tokens) != 1 or tokens[0].kind != "name":
             return ""
         name = tokens[0].text
-        return "" if self.vocabulary.knows(name) and not self.vocabulary.is_alias(name) else name
+        if name in FUNCTION_NAMES and len(name) > 1:
+            return ""
+        if not self.vocabulary.knows(name) or self.vocabulary.is_alias(name):
+            return name
+        is_free = not self.vocabulary.is_own(plain_name(name)) and self._is_no_joint(name)
+        return name if is_free else ""
+
+    def _is_no_joint(self, name: str) -> bool:
+        """Whether a name that is spelled as a joint's variable may be something else."""
+        tree = self._read(name)
+        if isinstance(tree, Call):
+            return False  # c2 and s23 are a cosine and a sine
+        if not isinstance(tree, Name) or not self.vocabulary.is_position(name):
+            return True
+        is_found_here = tree.text == f"q{self.joint}" and not self.has_solutions
+        return not plain_name(name).startswith(JOINT_LETTERS) and not is_found_here
 
     def _equations(self, text: str) -> list[tuple[str, str]]:
         """Return the sides of the equations of a text: a chain has several, a definition none."""
@@ -165,19 +268,19 @@ class _Reading:
         own = f"q{self.joint}"
         if EITHER_SIGN.search(left) or not _is_name(self._read(left), own):
             return False
-        plain = _with_sign(right, "+")
-        return own not in [
-            x.text for x in to_plain_grammar(answer_tokens(plain, self.vocabulary), self.vocabulary, plain)
-        ]
+        return own not in names_of(self._with_values(self._read(right), "+"))
 
     def _equation(self, left: str, right: str) -> tuple[Tree, Tree]:
-        """Return both sides; with two signs the product of both equations, each less its right side, and zero."""
-        if not EITHER_SIGN.search(left + right):
-            return self._read(left), self._read(right)
-        differences = [
-            Sum(((True, self._read(_with_sign(left, sign))), (False, self._read(_with_sign(right, sign)))))
-            for sign in "+-"
-        ]
+        """Return both sides; with two signs those of one equation that holds with either.
+
+        It is left^2 = X for left = ±sqrt(X), else the product of both equations, each less its right side, and zero.
+        """
+        plus, minus = ((self._read(left, sign), self._read(right, sign)) for sign in "+-")
+        if plus == minus:
+            return plus
+        if plus[0] == minus[0] and (square := _square_of_both(plus[1], minus[1])):
+            return Power(plus[0], Number(Fraction(2), "2", 0), 0), square
+        differences = [Sum(((True, left), (False, right))) for left, right in (plus, minus)]
         return Product(tuple((True, difference) for difference in differences)), Number(Fraction(0), "0", 0)
 
     def _both_signs(self, text: str) -> list[Tree]:
@@ -185,9 +288,8 @@ class _Reading:
         text = EQUATION_NUMBER.sub("", text)
         if wrapped := TURNED_BACK.match(text):
             text = wrapped[1]
-        if not EITHER_SIGN.search(text):
-            return [self._read(text)]
-        return [self._read(_with_sign(text, sign)) for sign in "+-"]
+        plus, minus = (self._with_values(self._read(text, sign), sign) for sign in "+-")
+        return [plus] if plus == minus else [plus, minus]
 
     def _solutions(self, text: str) -> list[Tree]:
         """Return the formulas of a solution; definitions may stand behind it, and the joint's name in front."""
@@ -204,6 +306,26 @@ class _Reading:
 
 def _is_name(tree: Tree, text: str) -> bool:
     return isinstance(tree, Name) and tree.text == text
+
+
+def _without_squared_roots(tree: Tree) -> Tree:
+    """Return a formula with X in place of sqrt(X)^2: r is a root where r^2 = X is given."""
+    tree = with_operands(tree, [_without_squared_roots(child) for child in operands(tree)])
+    match tree:
+        case Power(Call("sqrt", (radicand,)), Number(value)) if value == 2:
+            return radicand
+    return tree
+
+
+def _square_of_both(plus: Tree, minus: Tree) -> Tree | None:
+    """Return X if two formulas are sqrt(X) and -sqrt(X); else None."""
+    match plus, minus:
+        case (
+            Call("sqrt", (radicand,)) | Sum(((True, Call("sqrt", (radicand,))),)),
+            Sum(((False, Call("sqrt", (other,))),)),
+        ) if radicand == other:
+            return radicand
+    return None
 
 
 def _with_sign(text: str, sign: str) -> str:

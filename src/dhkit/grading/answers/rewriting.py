@@ -209,7 +209,8 @@ class _Rewriting:
             self._refuse_shorthand(tokens, k)
             is_known = token.text in self.vocabulary.own or token.text in self.vocabulary.symbols
             is_called = following == "(" or (following == "^" and not is_known)
-            if token.text in FUNCTION_NAMES and (meaning is None or is_called):
+            is_refused = plain_name(token.text) in self.vocabulary.refused
+            if token.text in FUNCTION_NAMES and (meaning is None or is_called) and not is_refused:
                 plain.append(Token("function", FUNCTION_NAMES[token.text], token.at))
             elif meaning is not None:
                 plain += _written_out(meaning, token.at)

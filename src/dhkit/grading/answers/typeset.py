@@ -40,6 +40,23 @@ def typeset(tree: Tree) -> tuple[str, str]:
     return text.write(tree), latex.write(tree)
 
 
+def typeset_equations(equations: Sequence[tuple[Tree, Tree]]) -> tuple[str, str]:
+    r"""Return equations, pairs of their sides, as plain text and as LaTeX; both empty where one is too long.
+
+    Examples
+    --------
+    >>> from dhkit.expressions import read
+    >>> typeset_equations([(read("q1"), read("atan2(py, px)")), (read("q2"), read("pz"))])
+    ('q1 = atan2(py, px); q2 = pz', 'q_{1} = \mathrm{atan2}(p_{y}, p_{x}), \quad q_{2} = p_{z}')
+    """
+    sides = [(typeset(left), typeset(right)) for left, right in equations]
+    if not all(text for side in sides for text, _ in side):
+        return "", ""
+    plain = "; ".join(f"{left[0]} = {right[0]}" for left, right in sides)
+    latex = r", \quad ".join(f"{left[1]} = {right[1]}" for left, right in sides)
+    return plain, latex
+
+
 @dataclass(frozen=True)
 class _Writer:
     """One notation."""

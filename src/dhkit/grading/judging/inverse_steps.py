@@ -153,7 +153,18 @@ class _Judge(StepContext):
         found = [self._diagnosis(k, step, part) for part in parts if not part.verdict.passes and part.mistakes]
         difference = next((part.difference for part in parts if part.difference), None)
         witness = next((part.witness for part in parts if part.witness), None)
-        entry = Entry("ik", (k,), worst.verdict, step.text, statement=statement, difference=difference, witness=witness)
+        read, latex = step.read_as
+        entry = Entry(
+            "ik",
+            (k,),
+            worst.verdict,
+            step.text,
+            latex,
+            statement,
+            difference=difference,
+            witness=witness,
+            read=read,
+        )
         return entry, found, notes
 
     def _diagnosis(self, k: int, step: GivenStep, part: Part) -> Diagnosis:

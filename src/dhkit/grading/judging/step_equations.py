@@ -60,6 +60,8 @@ class Equations:
         for tree in self.differences:
             if strange := sorted(names_of(tree) - known):
                 raise AnswerError(f"equation: unknown name {strange[0]!r}")
+        if own_factor := next(filter(None, map(self._factor_of_other_roots, self.differences)), None):
+            return own_factor
         statements = []
         remarks: list[str] = []
         verdict = Verdict.CORRECT
@@ -86,6 +88,26 @@ class Equations:
             what = f", as {', '.join(later)} {'is' if len(later) == 1 else 'are'} not known yet" if later else ""
             return Part(Verdict.INCOMPLETE, f"the equation is right, but does not determine {own}{what}")
         return Part(verdict, f"equation: {statements[0]}", remark="; ".join(dict.fromkeys(remarks)))
+
+    def _factor_of_other_roots(self, tree: Tree) -> Part | None:
+        """Return the part of a product that is zero since one factor is, where another has roots that are no solution.
+
+        The product (c2 - D) (c2 - px) = 0 holds for every solution, as its first factor does alone; the second one adds
+        roots, so that the equation does not determine q2. A factor that does not depend on the joint adds none.
+        """
+        own = f"q{self.step.joint + 1}"
+        factors = _factors_of_zero(tree)
+        if len(factors) < 2:
+            return None
+        is_zero = [bool(np.max(np.abs(self.residual(factor))) < ZERO) for factor in factors]
+        others = [f for f, zero in zip(factors, is_zero, strict=True) if not zero and own in names_of(f)]
+        if not any(is_zero) or not others:
+            return None
+        return Part(
+            Verdict.INCOMPLETE,
+            f"the equation is a product, and holds since one factor is zero; another factor with {own} is zero for "
+            f"other values of {own}, so that the equation does not determine {own}",
+        )
 
     def _identity(self, tree: Tree) -> tuple[Verdict, str, str | None]:
         """Return whether a difference is zero for the pose of the arm, why, and what it is if not."""
@@ -300,3 +322,24 @@ def _ranks(J: Array) -> NDArray[np.int_]:
 def _shown(element: Element) -> str:
     text = plain_text(element)
     return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."
+
+
+def _factors_of_zero(difference: Tree) -> list[Tree]:
+    """Return the factors of an equation's side where the other is zero; none where no side is."""
+    match difference:
+        case Sum(((True, one), (False, other))):
+            sides = [side for side in (one, other) if not (isinstance(side, Number) and side.value == 0)]
+            return _factors(sides[0]) if len(sides) == 1 else []
+    return []
+
+
+def _factors(tree: Tree) -> list[Tree]:
+    """Return the factors of a numerator, without their powers."""
+    match tree:
+        case Sum(((_, term),)):
+            return _factors(term)
+        case Product(factors):
+            return [one for multiplied, factor in factors if multiplied for one in _factors(factor)]
+        case Power(base, Number(value)) if value > 0:
+            return _factors(base)
+    return [tree]

@@ -42,10 +42,13 @@ class Choice:
         Which solutions of the arm have the values chosen, shape (S, B).
     q
         Values of the joints found, shape (S, n), rad and m; NaN of others, and where no solution has the values.
+    root
+        Which of two formulas was taken in the last step that has two, 0 or 1; None before such a step.
     """
 
     alive: Mask
     q: Array
+    root: int | None = None
 
     @property
     def rows(self) -> Mask:
@@ -74,6 +77,8 @@ class Trial:
         Share of the poses at which each formula is right after each choice, shape (formulas, choices); 1 without poses.
     right_within_limits
         The same at poses that joint values within the limits give.
+    in_pairs
+        Whether each of two formulas was tried only after the same of the two formulas of an earlier step.
     """
 
     choices: Hypothesis
@@ -81,6 +86,7 @@ class Trial:
     following: list[list[Choice]]
     right: Array
     right_within_limits: Array
+    in_pairs: bool = False
 
 
 class Solutions:
@@ -144,6 +150,8 @@ class Solutions:
             self.skip(step.joint)
             return part, None
         trials = [self._trial(hypothesis, step) for hypothesis in self.hypotheses]
+        # q1 = phi - gamma follows q2 = +..., and q1 = phi + gamma follows q2 = -...: phi ∓ gamma is right as a pair.
+        trials += [self._trial(each, step, in_pairs=True) for each in self.hypotheses if _has_pairs(each, step)]
         least = 1.0 if self.context.poses.has_closed_form else 1.0 - MISSED_SHARE
         for beyond in (True, False):
             right = [
@@ -154,12 +162,15 @@ class Solutions:
             if right:
                 break
         else:
-            trial = max(trials, key=lambda one: float(np.min(one.right_within_limits)))
+            alone = [trial for trial in trials if not trial.in_pairs]
+            trial = max(alone, key=lambda one: float(np.min(one.right_within_limits)))
             self.skip(step.joint)
             return self._wrong(trial, step, before), None
+        right = [trial for trial in right if trial.in_pairs == right[0].in_pairs]
         first = right[0]
         count = self._count(first.choices, step.joint)
-        if (same := self._same(first.values, step.joint)) is not None:
+        same = None if first.in_pairs else self._same(first.values, step.joint)
+        if same is not None:
             self.skip(step.joint)
             return Part(Verdict.WRONG, f"solution {same}: gives the same as another", [("duplicate_branch", "")]), None
         self._hypotheses = [tuple(chain(*trial.following)) for trial in right]
@@ -170,6 +181,8 @@ class Solutions:
         else:
             where = " within the joint limits"
             remark = f"right{where}; beyond them at {100 * float(np.min(first.right)):.3g} % of the poses tried"
+        if first.in_pairs:
+            remark = "; ".join(filter(None, ["its signs are taken with those of the step before, + with +", remark]))
         statement = f"solution: right at {np.sum(tried)} poses{where} given the joints before; tried, not proved"
         verdict = Verdict.CORRECT if self.context.poses.has_closed_form else Verdict.UNDECIDED
         return Part(verdict, statement, remark=remark), (len(step.solutions), count)
@@ -201,7 +214,7 @@ class Solutions:
             for function in (np.sin, np.cos) if self.context.description.kinds[j] == "R" else (np.sign,):
                 for sign in (1.0, -1.0):
                     chosen = function(truths[..., j]) * sign > 0
-                    parts = [self._by_values(Choice(one.alive & chosen, one.q), joints) for one in hypothesis]
+                    parts = [self._by_values(replace(one, alive=one.alive & chosen), joints) for one in hypothesis]
                     yield tuple(choice for part in parts for choice in part.values())
         for b in range(truths.shape[1]):
             yield tuple(parts[b] for parts in divided if b in parts)
@@ -217,27 +230,30 @@ class Solutions:
                 continue
             q = choice.q.copy()
             q[:, joints] = np.where(alive.any(axis=1)[:, None], values[:, b], np.nan)
-            parts[b] = Choice(alive, q)
+            parts[b] = Choice(alive, q, choice.root)
         return parts
 
     # Formulas
 
-    def _trial(self, hypothesis: Hypothesis, step: GivenStep) -> Trial:
+    def _trial(self, hypothesis: Hypothesis, step: GivenStep, in_pairs: bool = False) -> Trial:
         values: list[list[Array]] = []
         following: list[list[Choice]] = []
         shares = np.ones((2, len(step.solutions), len(hypothesis)))
         for k, tree in enumerate(step.solutions):
             values.append([])
             following.append([])
+            root = k if len(step.solutions) == 2 else None
             for c, choice in enumerate(hypothesis):
+                if in_pairs and choice.root != root:
+                    continue
                 x = self._evaluated(tree, choice)
-                after = self._after(choice, step.joint, x)
+                after = self._after(choice, step.joint, x, root)
                 for share, rows in zip(shares, (choice.rows, choice.rows & self.context.within_limits), strict=True):
                     if np.any(rows):
                         share[k, c] = np.mean(after.rows[rows])
                 values[-1].append(x)
                 following[-1].append(after)
-        return Trial(hypothesis, values, following, *shares)
+        return Trial(hypothesis, values, following, shares[0], shares[1], in_pairs)
 
     def _evaluated(self, tree: Tree, choice: Choice) -> Array:
         given = {f"q{j + 1}": column for j, column in enumerate(choice.q.T)}
@@ -246,13 +262,13 @@ class Solutions:
         x[~np.isfinite(x)] = np.nan
         return x
 
-    def _after(self, choice: Choice, joint: int, x: Array) -> Choice:
+    def _after(self, choice: Choice, joint: int, x: Array, root: int | None) -> Choice:
         """Return a choice with a value of one more joint, x (S,), rad or m."""
         gaps = self.context.solved_poses.gaps(x[:, None], self.truths[..., joint], joint)
         alive = choice.alive & (gaps < MATCHES)
         q = choice.q.copy()
         q[:, joint] = np.where(alive.any(axis=1), x, np.nan)
-        return Choice(alive, q)
+        return Choice(alive, q, choice.root if root is None else root)
 
     def _reached(self, trial: Trial) -> bool:
         """Whether there are poses at which the formulas were tried."""
@@ -335,3 +351,8 @@ class Solutions:
             return part.verdict.passes
 
         return SolutionMistakes(self.context, branch, step.joint).mistake(is_right_for)
+
+
+def _has_pairs(hypothesis: Hypothesis, step: GivenStep) -> bool:
+    """Whether a step has two formulas, and an earlier one has too."""
+    return len(step.solutions) == 2 and {choice.root for choice in hypothesis} == {0, 1}
