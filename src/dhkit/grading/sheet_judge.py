@@ -14,7 +14,7 @@ import numpy as np
 
 from dhkit.description import Description
 from dhkit.errors import AnswerError, DescriptionError, DhkitError
-from dhkit.expressions.syntax import Tree
+from dhkit.expressions.syntax import Name, Tree
 from dhkit.grading.answers.given import (
     Given,
     given_branches,
@@ -26,7 +26,7 @@ from dhkit.grading.answers.given import (
 from dhkit.grading.answers.quantity_names import QuantityNames
 from dhkit.grading.answers.sheet import ALIASES, quantity_names, shape_of
 from dhkit.grading.answers.sheet_values import AnswerSheet
-from dhkit.grading.answers.typeset import typeset
+from dhkit.grading.answers.typeset import typeset, typeset_equations
 from dhkit.grading.answers.vocabulary import Vocabulary
 from dhkit.grading.judging.consistency import Consistency
 from dhkit.grading.judging.functions import judge_function
@@ -279,9 +279,14 @@ def _judge_rows(
     """Judge rows of a table, or branches of inverse kinematics; all are unreadable if an entry cannot be read."""
     texts = [", ".join(entry.text for entry in row) for row in rows]
     if all(entry.tree is not None for row in rows for entry in row):
-        judgement = judge([[entry.tree for entry in row if entry.tree is not None] for row in rows])
-        pairs = zip(judgement.entries, texts, strict=True)
-        return replace(judgement, entries=tuple(replace(entry, answer=text) for entry, text in pairs))
+        trees = [[entry.tree for entry in row if entry.tree is not None] for row in rows]
+        judgement = judge(trees)
+        entries = []
+        for entry, text, row in zip(judgement.entries, texts, trees, strict=True):
+            joints = [(Name(f"q{k + 1}", 0), tree) for k, tree in enumerate(row)]
+            read, latex = typeset_equations(joints) if name == "ik" else ("", "")
+            entries.append(replace(entry, answer=text, read=read, latex=latex))
+        return replace(judgement, entries=tuple(entries))
     errors = [next((e.error for e in row if e.error), "not judged: another row cannot be read") for row in rows]
     return KinematicJudgement(
         tuple(

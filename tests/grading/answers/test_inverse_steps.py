@@ -152,3 +152,8 @@ def test_how_steps_were_read_is_shown():
     root = "acos((px^2 + py^2 - l1^2 - l2^2)/(2*l1*l2))"
     assert report.entries[0].read == f"cos(q2) = {root[5:-1]}; q2 = {root}; q2 = -{root}"
     assert report.entries[0].latex.startswith(r"\cos(q_{2}) = \frac")
+
+
+def test_how_branches_were_read_is_shown():
+    report = PLANAR.grade(ik=[[Q1, f"acos({COSINE})"]])
+    assert report.entries[0].read.endswith("; q2 = acos((px^2 + py^2 - l1^2 - l2^2)/(2*l1*l2))")
