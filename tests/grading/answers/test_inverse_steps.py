@@ -155,5 +155,5 @@ def test_how_steps_were_read_is_shown():
 
 
 def test_how_branches_were_read_is_shown():
-    report = PLANAR.grade(ik=[[Q1, f"acos({COSINE})"]])
+    report = PLANAR.grade(ik={"branches": [[Q1, f"acos({COSINE})"]]})
     assert report.entries[0].read.endswith("; q2 = acos((px^2 + py^2 - l1^2 - l2^2)/(2*l1*l2))")
