@@ -17,6 +17,7 @@ from dhkit.errors import AnswerError, DescriptionError, DhkitError
 from dhkit.expressions.syntax import Name, Tree
 from dhkit.grading.answers.given import (
     Given,
+    SheetMatrices,
     given_branches,
     given_quantity,
     given_rows,
@@ -143,7 +144,9 @@ class _SheetJudge:
         refused: dict[str, DhkitError] = {}
         names = QuantityNames(self.truth.description)
         read: dict[str, tuple[Given, ...]] = {}
-        for name, value in with_entries_gathered(self.sheet.answers, names).items():
+        answers = with_entries_gathered(self.sheet.answers, names)
+        matrix_of = SheetMatrices(answers, self.vocabulary, names)
+        for name, value in answers.items():
             if _is_empty(value):
                 continue
             try:
@@ -151,9 +154,10 @@ class _SheetJudge:
                 if callable(value):
                     judged[name] = judge_function(name, value, self.truth, self.seed)
                 elif name == "J":
-                    read[name] = self._jacobian(value, names)
+                    read[name] = self._jacobian(value, names, matrix_of)
                 else:
-                    read[name] = given_quantity(name, value, shape_of(name, names.n), self.vocabulary, names)
+                    shape = shape_of(name, names.n)
+                    read[name] = given_quantity(name, value, shape, self.vocabulary, names, matrix_of.without(name))
             except (AnswerError, DescriptionError) as error:
                 refused[name] = self._refusal(error)
         letters = frozenset(self.truth.description.parameters)
@@ -174,18 +178,19 @@ class _SheetJudge:
             return error
         return AnswerError(f"{self.sheet.file}: answer: {error}")
 
-    def _jacobian(self, value: object, names: QuantityNames) -> tuple[Given, ...]:
+    def _jacobian(self, value: object, names: QuantityNames, matrix_of: SheetMatrices) -> tuple[Given, ...]:
         """Return the entries of a Jacobian: of six rows, or of the two or three rows that an arm's motion has.
 
         Of an arm in a plane these are the two positions in it, with the angle about its normal or without; of others
         three rows are those of the position.
         """
         try:
-            return given_quantity("J", value, shape_of("J", names.n), self.vocabulary, names)
+            return given_quantity("J", value, shape_of("J", names.n), self.vocabulary, names, matrix_of.without("J"))
         except AnswerError as error:
             for rows in self._rows_of_few():
                 try:
-                    given = given_quantity("J", value, (len(rows), names.n), self.vocabulary, names)
+                    size = (len(rows), names.n)
+                    given = given_quantity("J", value, size, self.vocabulary, names, matrix_of.without("J"))
                 except AnswerError:
                     continue
                 return tuple(replace(entry, index=(rows[entry.index[0]], entry.index[1])) for entry in given)

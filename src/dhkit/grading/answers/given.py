@@ -17,11 +17,12 @@ from dhkit.grading.answers.documents.latex_statements import has_relation
 from dhkit.grading.answers.documents.statements import Statement
 from dhkit.grading.answers.indices import first_index
 from dhkit.grading.answers.matrices import read_matrix
+from dhkit.grading.answers.matrix_algebra import MatrixOf, Rows, is_algebra, no_names, read_algebra
 from dhkit.grading.answers.objects import entry_tree, is_entry
 from dhkit.grading.answers.pose_entries import other_names, with_pose_entries
 from dhkit.grading.answers.pretty import is_pretty
 from dhkit.grading.answers.quantity_names import QuantityNames, Target
-from dhkit.grading.answers.reading import meaning_of
+from dhkit.grading.answers.reading import meaning_of, read_answer
 from dhkit.grading.answers.sheet_values import AnswerSheet, Chain, Entries, Refusal
 from dhkit.grading.answers.tokens import quote
 from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
@@ -146,7 +147,12 @@ def _texts(value: object) -> Iterator[str]:
 
 
 def given_quantity(
-    name: str, value: Answer, shape: tuple[int, ...], vocabulary: Vocabulary, names: QuantityNames
+    name: str,
+    value: Answer,
+    shape: tuple[int, ...],
+    vocabulary: Vocabulary,
+    names: QuantityNames,
+    matrix_of: MatrixOf = no_names,
 ) -> tuple[Given, ...]:
     """Return all entries of a quantity, those that were not handed in among them.
 
@@ -162,6 +168,8 @@ def given_quantity(
         What names mean.
     names
         Which names stand in front of an answer: ``tau_1 = ...``.
+    matrix_of
+        Which names stand for matrices: other answers of the sheet.
 
     Raises
     ------
@@ -173,7 +181,9 @@ def given_quantity(
     if isinstance(value, str) and shape:
         value = _system(name, value, names)
     if isinstance(value, Chain):
-        return _chained([given_quantity(name, formula, shape, vocabulary, names) for formula in value.formulas])
+        return _chained(
+            [given_quantity(name, formula, shape, vocabulary, names, matrix_of) for formula in value.formulas]
+        )
     places = list(np.ndindex(shape))
     entries: Iterable[tuple[tuple[int, ...], Answer]]
     if isinstance(value, Entries):
@@ -183,12 +193,59 @@ def given_quantity(
                 raise AnswerError(f"{name}: found {Target(name, index)}; expected {size} entries, counted from 1")
         entries = [(index, value.texts.get(index, "")) for index in places]
     elif isinstance(value, str) and shape and (len(places) != 1 or BRACKETED.match(value)):
-        given = _from_one_text(name, _without_head(name, value), shape, vocabulary)
+        given = _from_one_text(name, _without_head(name, value), shape, vocabulary, matrix_of)
         return _mirrored(given) if name == "M" else given
+    elif isinstance(value, str) and is_algebra(_without_head(name, value), vocabulary, matrix_of):
+        return _from_algebra(name, _without_head(name, value), shape or (1, 1), vocabulary, matrix_of)
     else:
         entries = [(places[0], value)] if isinstance(value, str) else _flat(name, value, shape, ())
     given = tuple(_entry(Target(name, index), text, vocabulary, names) for index, text in entries)
     return _mirrored(given) if name == "M" else given
+
+
+class SheetMatrices:
+    """The matrices that names stand for on a sheet: its own answers, and the vectors of the joints' state.
+
+    Parameters
+    ----------
+    answers
+        The sheet's answers by quantity.
+    vocabulary
+        What names mean; a name that has a meaning of its own is no matrix.
+    names
+        Which names stand for quantities.
+    """
+
+    def __init__(self, answers: Mapping[str, Answer], vocabulary: Vocabulary, names: QuantityNames) -> None:
+        self.answers = answers
+        self.vocabulary = vocabulary
+        self.names = names
+        self._read: dict[str, Rows] = {}
+
+    def without(self, *quantities: str) -> MatrixOf:
+        """Return which names stand for matrices, where some quantities are not known yet."""
+        return lambda name: self._matrix(name, quantities)
+
+    def _matrix(self, name: str, unknown: tuple[str, ...]) -> Rows | None:
+        vocabulary, quantity = self.vocabulary, self.names.quantity(name)
+        # G is taken for a parameter g only where it is no answer.
+        is_answer = quantity and quantity in self.answers and not vocabulary.is_own(plain_name(name))
+        if vocabulary.knows(name) and not is_answer:
+            return None
+        if vocabulary.is_state(f"{name}1"):
+            return [[read_answer(f"{name}{i + 1}", vocabulary)] for i in range(self.names.n)]
+        if quantity in unknown or not isinstance(self.answers.get(quantity), str | list | Entries):
+            return None
+        if quantity not in self._read:
+            shape = self.names.shape(quantity)
+            value = self.answers[quantity]
+            given = given_quantity(quantity, value, shape, vocabulary, self.names, self.without(*unknown, quantity))
+            if unread := next((entry for entry in given if entry.tree is None), None):
+                raise AnswerError(f"{name}: {Target(quantity, unread.index)} is not read: {unread.error}")
+            trees = [entry.tree for entry in given if entry.tree is not None]
+            columns = shape[1] if len(shape) == 2 else 1
+            self._read[quantity] = [trees[k : k + columns] for k in range(0, len(trees), columns)]
+        return self._read[quantity]
 
 
 def with_entries_gathered(answers: Mapping[str, Answer], names: QuantityNames) -> dict[str, Answer]:
@@ -395,8 +452,34 @@ def _flat(
     raise AnswerError(f"{place}: found {kind}; expected {expected}")
 
 
-def _from_one_text(name: str, text: str, shape: tuple[int, ...], vocabulary: Vocabulary) -> tuple[Given, ...]:
+def _from_algebra(
+    name: str, text: str, shape: tuple[int, ...], vocabulary: Vocabulary, matrix_of: MatrixOf
+) -> tuple[Given, ...]:
+    """Return the entries of a formula with several matrices; each has the whole text."""
+    try:
+        value = read_algebra(text, vocabulary, matrix_of)
+    except AnswerError as error:
+        raise AnswerError(f"{name}: {error}") from None
+    rows: Rows = value if isinstance(value, list) else [[value]]
+    shown = text.strip()[:MAX_SHOWN]
+    if len(shape) == 1 or shape == (1, 1):
+        entries = [entry for row in rows for entry in row] if min(len(rows), len(rows[0])) == 1 else []
+        if len(entries) != shape[0]:
+            expected = f"{shape[0]} entries" if shape[0] > 1 else "a number"
+            raise AnswerError(f"{name}: found {len(rows)} rows of {len(rows[0])}; expected {expected}")
+        places = list(np.ndindex(shape)) if len(shape) == 1 else [()]
+        return tuple(Given(index, shown, tree) for index, tree in zip(places, entries, strict=True))
+    if (len(rows), len(rows[0])) != shape:
+        raise AnswerError(f"{name}: found {len(rows)} rows of {len(rows[0])}; expected {shape[0]} of {shape[1]}")
+    return tuple(Given((i, j), shown, tree) for i, row in enumerate(rows) for j, tree in enumerate(row))
+
+
+def _from_one_text(
+    name: str, text: str, shape: tuple[int, ...], vocabulary: Vocabulary, matrix_of: MatrixOf
+) -> tuple[Given, ...]:
     """Return the entries of a matrix, or of a vector, that stands in one text."""
+    if is_algebra(text, vocabulary, matrix_of):
+        return _from_algebra(name, text, shape, vocabulary, matrix_of)
     try:
         rows = read_matrix(text, vocabulary)
     except AnswerError as error:

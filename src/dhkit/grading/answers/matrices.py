@@ -67,11 +67,7 @@ def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]
     AnswerError
         As for :func:`read_answer`, or no matrix.
     """
-    text = _with_row_signs(without_comments(in_one_line(unicodedata.normalize("NFD", text))))
-    tokens = answer_tokens(text, vocabulary)
-    check_depth(tokens, text)
-    while tokens and tokens[-1].text in (";", ",", "."):
-        tokens.pop()
+    tokens, text = _tokens(text, vocabulary)
     places = [token.at for token in tokens]
     tokens = _with_diagonal(_unwrap(_with_column_brackets(tokens, text), text), text)
     start = next((k for k, token in enumerate(tokens) if token.text == "["), len(tokens))
@@ -95,6 +91,44 @@ def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]
         [(_typed(entry, places, text), answer_tree(with_factors(entry), vocabulary, text)) for entry in row]
         for row in rows
     ]
+
+
+def matrix_tokens(text: str, vocabulary: Vocabulary) -> tuple[list[Token], str]:
+    """Return the tokens of a formula with matrices, all of them in square brackets, and the text of their places.
+
+    Raises
+    ------
+    AnswerError
+        As for :func:`read_answer`.
+    """
+    tokens, text = _tokens(text, vocabulary)
+    tokens = _unwrap(_with_column_brackets(tokens, text), text)
+    while any(begins_with(tokens, k, "diag", "(") for k in range(len(tokens))):
+        tokens = _with_diagonal(tokens, text)
+    return tokens, text
+
+
+def matrix_rows(tokens: Sequence[Token], text: str) -> list[list[list[Token]]]:
+    """Return the entries of a matrix in square brackets by rows, each as its tokens.
+
+    Raises
+    ------
+    AnswerError
+        More than ``MAX_ENTRIES``, or brackets that do not match.
+    """
+    if sum(token.text in (*COLUMN_SIGNS, *ROW_SIGNS) for token in tokens) > MAX_ENTRIES:
+        raise AnswerError(f"a matrix of more than {MAX_ENTRIES} entries")
+    return _rows(tokens, text)
+
+
+def _tokens(text: str, vocabulary: Vocabulary) -> tuple[list[Token], str]:
+    """Return the tokens of a text without signs at its end, and the text of their places."""
+    text = _with_row_signs(without_comments(in_one_line(unicodedata.normalize("NFD", text))))
+    tokens = answer_tokens(text, vocabulary)
+    check_depth(tokens, text)
+    while tokens and tokens[-1].text in (";", ",", "."):
+        tokens.pop()
+    return tokens, text
 
 
 def _with_row_signs(text: str) -> str:

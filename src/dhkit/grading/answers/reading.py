@@ -105,7 +105,7 @@ def answer_tokens(text: str, vocabulary: Vocabulary) -> list[Token]:
         return from_mathematica(split_tokens(plain, places, text, allowed="{}\\"), text)
     if is_latex(plain):
         return latex_tokens(plain, vocabulary.knows)
-    return from_maxima(split_tokens(STORAGE.sub("", plain), places, text, allowed="{}%$"))
+    return from_maxima(split_tokens(STORAGE.sub("", plain), places, text, allowed="{}%$@"))
 
 
 def answer_tree(entry: Sequence[Token], vocabulary: Vocabulary, text: str) -> Tree:

@@ -1,0 +1,286 @@
+"""Sums, products, transposes and powers of matrices in one text: M1 + m2*[a, b; b, c], J'*M*J, A1*A2, Y*theta.
+
+The grammar is that of :mod:`dhkit.expressions.syntax`, with matrices among the factors of a product::
+
+    sum     = product (("+" | "-") product)*
+    product = factor (("*" | "/" | nothing) factor)*
+    factor  = (matrix | "(" sum with a matrix ")" | name of a matrix) (transpose | "^" number)*
+            | formula of numbers
+
+A vector of one row in a place where only a column fits is a column.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import TypeAlias
+
+from dhkit.errors import AnswerError
+from dhkit.expressions.syntax import Number, Product, Sum, Token, Tree
+from dhkit.grading.answers.matrices import TRANSPOSES, matrix_rows, matrix_tokens
+from dhkit.grading.answers.reading import answer_tree
+from dhkit.grading.answers.tokens import begins_with, closing_bracket, fail, nesting, quote
+from dhkit.grading.answers.vocabulary import Vocabulary
+
+Rows: TypeAlias = list[list[Tree]]
+"""A matrix by rows."""
+Value: TypeAlias = Tree | Rows
+"""A number, or a matrix."""
+MatrixOf: TypeAlias = Callable[[str], Rows | None]
+"""Matrix that a name stands for; None for another name."""
+
+TIMES, OVER = ("*", "@", "\\,"), ("/",)
+NUMPY = re.compile(r"\b(?:np|numpy)\b|\barray\s*\(")
+"""Text in numpy's notation, in which * multiplies matrices entry by entry."""
+MAX_PRODUCTS = 20_000
+"""Largest number of products of two entries in an answer."""
+MAX_POWER = 8
+"""Largest power of a matrix."""
+
+
+def no_names(name: str) -> Rows | None:
+    """Return None: no name stands for a matrix."""
+    del name
+    return None
+
+
+def is_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_names) -> bool:
+    """Whether a text has more than one matrix, or names of matrices."""
+    try:
+        tokens, _ = matrix_tokens(text, vocabulary)
+    except AnswerError:
+        return False
+    depth, outermost = 0, 0
+    for token in tokens:
+        outermost += token.text == "[" and depth == 0
+        depth += {"[": 1, "]": -1}.get(token.text, 0)
+    return outermost > 1 or any(token.kind == "name" and matrix_of(token.text) is not None for token in tokens)
+
+
+def read_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_names) -> Value:
+    """Read a formula with matrices.
+
+    Parameters
+    ----------
+    text
+        What a student typed; never evaluated.
+    vocabulary
+        What names mean.
+    matrix_of
+        Which names stand for matrices.
+
+    Returns
+    -------
+    Value
+        Entries by rows, which share what is used several times, or a number.
+
+    Raises
+    ------
+    AnswerError
+        Sizes that do not fit, an operation that matrices do not have, or a formula that cannot be read.
+    """
+    tokens, plain = matrix_tokens(text, vocabulary)
+    return _Reader(vocabulary, plain, matrix_of).value(tokens)
+
+
+class _Reader:
+    def __init__(self, vocabulary: Vocabulary, text: str, matrix_of: MatrixOf) -> None:
+        self.vocabulary = vocabulary
+        self.text = text
+        self.matrix_of = matrix_of
+        self.products = 0
+
+    def value(self, tokens: Sequence[Token]) -> Value:
+        """Return the value of a sum."""
+        terms = [(added, self._product(term)) for added, term in self._terms(tokens)]
+        if len(terms) == 1 and terms[0][0]:
+            return terms[0][1]
+        if not any(isinstance(value, list) for _, value in terms):
+            return Sum(tuple((added, value) for added, value in terms if not isinstance(value, list)))
+        matrices = [(added, _as_matrix(value)) for added, value in terms]
+        sizes = {_size(rows) for _, rows in matrices}
+        if len(sizes) > 1 and _are_vectors(sizes):
+            matrices = [(added, _as_column(rows)) for added, rows in matrices]
+            sizes = {_size(rows) for _, rows in matrices}
+        if len(sizes) > 1:
+            found = " and ".join(f"{m} x {n}" for m, n in sorted(sizes))
+            is_gravity = any(token.text == "g" for token in tokens) and (1, 1) in sizes
+            hint = "; g is the parameter, write G for the answer to g" if is_gravity else ""
+            raise AnswerError(f"{quote(self.text)}: a sum of matrices of {found}{hint}")
+        ((m, n),) = sizes
+        return [[Sum(tuple((added, rows[i][j]) for added, rows in matrices)) for j in range(n)] for i in range(m)]
+
+    def _terms(self, tokens: Sequence[Token]) -> list[tuple[bool, list[Token]]]:
+        """Split a sum at the signs between its terms: each is added or subtracted."""
+        terms: list[tuple[bool, list[Token]]] = [(True, [])]
+        depth = 0
+        for token in tokens:
+            depth += nesting(token.text)
+            added, term = terms[-1]
+            is_sign = depth == 0 and token.kind == "sign" and token.text in "+-"
+            if is_sign and not term:
+                terms[-1] = added == (token.text == "+"), term
+            elif is_sign and not (term[-1].kind == "sign" and term[-1].text in (*TIMES, *OVER, "^")):
+                terms.append((token.text == "+", []))
+            else:
+                term.append(token)
+        if not terms[-1][1]:
+            raise AnswerError(f"{quote(self.text)}: ends where a term is expected")
+        return terms
+
+    def _product(self, tokens: Sequence[Token]) -> Value:
+        """Return the value of a product."""
+        result: Value | None = None
+        run: list[Token] = []
+        k = 0
+        while k < len(tokens):
+            token = tokens[k]
+            end = closing_bracket(tokens, k) if token.text in ("[", "(") else k
+            inside = tokens[k : end + 1]
+            matrix = self._matrix(inside)
+            if matrix is None:
+                run += inside
+                k = end + 1
+                continue
+            self._refuse_entrywise(result, run, matrix)
+            result = self._times(result, self._numbers(run, is_before_matrix=True))
+            run = []
+            matrix, k = self._with_postfix(matrix, tokens, end + 1)
+            result = self._times(result, matrix)
+        result = self._times(result, self._numbers(run, is_before_matrix=False))
+        if result is None:
+            raise AnswerError(f"{quote(self.text)}: a term is empty")
+        return result
+
+    def _matrix(self, tokens: Sequence[Token]) -> Value | None:
+        """Return the value of one factor if it is, or contains, a matrix; None of numbers."""
+        first = tokens[0]
+        if first.text == "[":
+            rows = [[self._entry(entry, first) for entry in row] for row in matrix_rows(tokens, self.text)]
+            if len(set(map(len, rows))) != 1:
+                fail(self.text, first.at, "a matrix whose rows have different lengths")
+            return rows
+        if first.text == "(" and any(token.text == "[" or self._named(token) for token in tokens):
+            return self.value(tokens[1:-1])
+        return self._named(first)
+
+    def _named(self, token: Token) -> Rows | None:
+        return self.matrix_of(token.text) if token.kind == "name" else None
+
+    def _entry(self, entry: Sequence[Token], first: Token) -> Tree:
+        if not entry:
+            fail(self.text, first.at, "a matrix with an empty entry")
+        return answer_tree(entry, self.vocabulary, self.text)
+
+    def _with_postfix(self, value: Value, tokens: Sequence[Token], k: int) -> tuple[Value, int]:
+        """Return a factor with the transposes and powers behind it, and where they end."""
+        before = tokens[k - 1]
+        if begins_with(tokens, k, "'") and before.kind == "name" and self.vocabulary.is_position(f"{before.text}1"):
+            name = before.text
+            fail(
+                self.text, before.at, f"{name}' may be the transpose of {name} or its rate; write transpose({name}): it"
+            )
+        while k < len(tokens):
+            transpose = next((texts for texts in TRANSPOSES if begins_with(tokens, k, *texts)), None)
+            if transpose is not None and isinstance(value, list):
+                value = [list(column) for column in zip(*value, strict=True)]
+                k += len(transpose)
+            elif tokens[k].text == "^":
+                power = tokens[k + 1] if k + 1 < len(tokens) else tokens[k]
+                if self._is_entrywise(tokens[k]):
+                    fail(self.text, tokens[k].at, "'.^' raises entry by entry; write ^ for the power of the matrix: it")
+                if power.kind != "number" or not power.text.isdecimal() or not 1 <= int(power.text[:3]) <= MAX_POWER:
+                    fail(self.text, tokens[k].at, "a power of a matrix that is no small whole number")
+                base, result = value, value
+                for _ in range(int(power.text) - 1):
+                    result = self._times(result, base) or result
+                value, k = result, k + 2
+            else:
+                break
+        return value, k
+
+    def _refuse_entrywise(self, left: Value | None, signs: Sequence[Token], right: Value) -> None:
+        """Refuse * between numpy's arrays, and signs of products entry by entry."""
+        if left is None or _is_number(left) or _is_number(right):
+            return
+        is_of_numpy = [token.text for token in signs] == ["*"] and NUMPY.search(self.text)
+        if is_of_numpy or (len(signs) == 1 and self._is_entrywise(signs[0])):
+            fail(self.text, signs[0].at, f"{signs[0].text!r} multiplies entry by entry; write @ for the product: it")
+
+    def _is_entrywise(self, token: Token) -> bool:
+        """Whether a sign was typed with MATLAB's dot: .* and .^ are those of entries."""
+        return self.text[token.at : token.at + 1] == "."
+
+    def _numbers(self, run: Sequence[Token], is_before_matrix: bool) -> Tree | None:
+        """Return the factor of the numbers between matrices, with the signs beside them; None if there is none."""
+        run = list(run)
+        if run and run[0].text in TIMES:
+            del run[0]
+        elif run and run[0].text in OVER:
+            run.insert(0, Token("number", "1", run[0].at))
+        if is_before_matrix and run and run[-1].text in TIMES:
+            del run[-1]
+        elif run and run[-1].text in OVER:
+            fail(self.text, run[-1].at, "a division by a matrix")
+        return answer_tree(run, self.vocabulary, self.text) if run else None
+
+    def _times(self, left: Value | None, right: Value | None) -> Value | None:
+        """Return a product; None stands for nothing."""
+        if left is None or right is None:
+            return right if left is None else left
+        if not isinstance(left, list) and not isinstance(right, list):
+            return Product(((True, left), (True, right)))
+        if _is_number(left) or _is_number(right):
+            number, rows = (left, right) if _is_number(left) else (right, left)
+            factor = number[0][0] if isinstance(number, list) else number
+            return [[Product(((True, factor), (True, entry))) for entry in row] for row in _as_matrix(rows)]
+        return self._product_of(_as_matrix(left), _as_matrix(right))
+
+    def _product_of(self, left: Rows, right: Rows) -> Rows:
+        if len(left[0]) != len(right) and len(right) == 1 and len(right[0]) == len(left[0]):
+            right = _as_column(right)
+        if len(left[0]) != len(right):
+            (m, n), (p, q) = _size(left), _size(right)
+            raise AnswerError(f"{quote(self.text)}: a product of matrices of {m} x {n} and {p} x {q}")
+        self.products += len(left) * len(right) * len(right[0])
+        if self.products > MAX_PRODUCTS:
+            raise AnswerError(f"{quote(self.text)}: more than {MAX_PRODUCTS} products of entries")
+        columns = list(zip(*right, strict=True))
+        return [[_dot(row, column) for column in columns] for row in left]
+
+
+def _dot(row: Sequence[Tree], column: Sequence[Tree]) -> Tree:
+    """Return sum_k row_k column_k, without the products that are zero."""
+    terms = tuple(
+        (True, Product(((True, a), (True, b))))
+        for a, b in zip(row, column, strict=True)
+        if not _is_zero(a) and not _is_zero(b)
+    )
+    return Sum(terms) if terms else Number(Fraction(0), "0", 0)
+
+
+def _is_zero(tree: Tree) -> bool:
+    return isinstance(tree, Number) and tree.value == 0
+
+
+def _is_number(value: Value) -> bool:
+    return not isinstance(value, list) or _size(value) == (1, 1)
+
+
+def _as_matrix(value: Value) -> Rows:
+    return value if isinstance(value, list) else [[value]]
+
+
+def _as_column(rows: Rows) -> Rows:
+    return [[entry] for row in rows for entry in row]
+
+
+def _are_vectors(sizes: set[tuple[int, int]]) -> bool:
+    """Whether sizes are those of rows and columns of equal length."""
+    return all(min(size) == 1 for size in sizes) and len({m * n for m, n in sizes}) == 1
+
+
+def _size(rows: Rows) -> tuple[int, int]:
+    return len(rows), len(rows[0])
