@@ -36,6 +36,8 @@ NUMPY = re.compile(r"\b(?:np|numpy)\b|\barray\s*\(")
 """Text in numpy's notation, in which * multiplies matrices entry by entry."""
 MAX_PRODUCTS = 20_000
 """Largest number of products of two entries in an answer."""
+MAX_CHAIN = 64
+"""Largest number of products of matrices in an answer, powers written out."""
 MAX_POWER = 8
 """Largest power of a matrix."""
 
@@ -47,7 +49,7 @@ def no_names(name: str) -> Rows | None:
 
 
 def is_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_names) -> bool:
-    """Whether a text has more than one matrix, or names of matrices."""
+    """Whether a text has more than one matrix, a power of one, or names of matrices."""
     try:
         tokens, _ = matrix_tokens(text, vocabulary)
     except AnswerError:
@@ -56,7 +58,9 @@ def is_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_names
     for token in tokens:
         outermost += token.text == "[" and depth == 0
         depth += {"[": 1, "]": -1}.get(token.text, 0)
-    return outermost > 1 or any(token.kind == "name" and matrix_of(token.text) is not None for token in tokens)
+    is_power = any(begins_with(tokens, k, "]", "^") and tokens[k + 2].kind == "number" for k in range(len(tokens) - 2))
+    is_named = any(token.kind == "name" and matrix_of(token.text) is not None for token in tokens)
+    return outermost > 1 or is_power or is_named
 
 
 def read_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_names) -> Value:
@@ -91,6 +95,7 @@ class _Reader:
         self.text = text
         self.matrix_of = matrix_of
         self.products = 0
+        self.chain = 0
 
     def value(self, tokens: Sequence[Token]) -> Value:
         """Return the value of a sum."""
@@ -244,9 +249,10 @@ class _Reader:
         if len(left[0]) != len(right):
             (m, n), (p, q) = _size(left), _size(right)
             raise AnswerError(f"{quote(self.text)}: a product of matrices of {m} x {n} and {p} x {q}")
+        self.chain += 1
         self.products += len(left) * len(right) * len(right[0])
-        if self.products > MAX_PRODUCTS:
-            raise AnswerError(f"{quote(self.text)}: more than {MAX_PRODUCTS} products of entries")
+        if self.chain > MAX_CHAIN or self.products > MAX_PRODUCTS:
+            raise AnswerError(f"{quote(self.text)}: more than {MAX_CHAIN} products of matrices, or too large ones")
         columns = list(zip(*right, strict=True))
         return [[_dot(row, column) for column in columns] for row in left]
 
