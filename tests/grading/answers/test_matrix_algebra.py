@@ -183,7 +183,7 @@ def test_wrong_ones_are_wrong_and_named():
         ({"g": "sin([1;2])*[1 2]"}, "sin without an argument"),
         ({"g": "[1 2;3]*[1;2]"}, "rows have different lengths"),
         ({"g": f"{'[1 0;0 1]^8*' * 800}[1;2]"}, "more than 64 products"),
-        ({"M": f"{'(' * 9}[m1 l1;l2 m2]{'^8)' * 9}"}, "more than 64 products"),
+        ({"M": f"{'(' * 10}[m1 l1;l2 m2]{'^8)' * 10}"}, "more than 64 products"),
     ],
 )
 def test_what_cannot_be_read_says_why(answers, message):
