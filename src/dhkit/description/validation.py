@@ -91,7 +91,17 @@ def check(description: RobotData) -> tuple[str, ...]:
     if base.body is not None:
         warnings += _check_only_body(base.body, "base", value)
     warnings += _check_configurations(description, value)
+    warnings += shapes_left_out(description.notes)
     return tuple(warnings)
+
+
+SHAPE_LEFT_OUT = "; this shape is left out"
+"""End of a line of notes on a shape of the file that a description comes from, which the description does not have."""
+
+
+def shapes_left_out(notes: str) -> tuple[str, ...]:
+    """Return the lines of notes on shapes that a description lacks: its links reach farther than its shapes say."""
+    return tuple(line for line in notes.splitlines() if line.endswith(SHAPE_LEFT_OUT))
 
 
 def _number(where: str, expression: Expression, values: Mapping[str, Expression]) -> float:

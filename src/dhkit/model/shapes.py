@@ -19,6 +19,7 @@ from dhkit.description.mesh_files import is_mesh_file
 from dhkit.description.numbers import matrix
 from dhkit.description.parameters import resolved
 from dhkit.description.traversal import with_values
+from dhkit.description.validation import shapes_left_out
 from dhkit.display import repr_line
 from dhkit.model.drawing import Drawing, Solid
 
@@ -62,10 +63,11 @@ class Part:
 def link_parts(description: Description) -> tuple[Part, ...]:
     """Return the solids of an arm's links, from the base to the tool.
 
-    A link with shapes in its description has those. Without, or with a mesh whose file is missing or unreadable, it
-    is drawn from the table, and so is the tool: a gripper that reaches along the tool's z (along x_n where the arm has
-    no tool and ends in a common normal, as planar arms do) and opens along its x. A description that is not ``drawn``,
-    such as one from a URDF with its own shapes, gets none of that unless it has no shape at all.
+    A link with shapes in its description has those, without meshes whose files are missing or unreadable, see
+    :func:`missing_shapes`. A link without any is drawn from the table, and so is the tool: a gripper that reaches along
+    the tool's z (along x_n where the arm has no tool and ends in a common normal, as planar arms do) and opens along
+    its x. A description that is not ``drawn``, such as one from a URDF with its own shapes, gets none of that unless it
+    has no shape at all.
 
     Examples
     --------
@@ -116,6 +118,28 @@ def links_without_shapes(description: Description) -> tuple[int, ...]:
     return tuple(link for link in range(1, description.n + 1) if link not in shown)
 
 
+def missing_shapes(description: Description) -> tuple[str, ...]:
+    """Return, in words, the shapes that an arm has and its parts do not: of meshes that cannot be read.
+
+    Beside those of the description these are shapes of the file that it comes from, which its notes name.
+    """
+    places = ["the base", *(f"link {i + 1}" for i in range(description.n)), "the tool"]
+    own = (description.base.shapes, *(joint.shapes for joint in description.joints), description.tool.shapes)
+    found = [
+        f"mesh {shape.geometry.path!r} of {place}, which cannot be read"
+        for place, shapes in zip(places, own, strict=True)
+        for shape in shapes
+        if isinstance(shape.geometry, Mesh) and _mesh_file(description, shape.geometry) is None
+    ]
+    return (*found, *shapes_left_out(description.notes))
+
+
+def _mesh_file(description: Description, mesh: Mesh) -> Path | None:
+    """Return the file of a mesh; None if it is missing or cannot be read."""
+    file = inside(description.mesh_folder, mesh.path, "shape.mesh")
+    return file if file is not None and is_mesh_file(file) else None
+
+
 def with_drawn_shapes(description: Description) -> Description:
     """Return the same arm with the solids that are drawn from its table as shapes of its links.
 
@@ -128,7 +152,7 @@ def with_drawn_shapes(description: Description) -> Description:
         solids = tuple(
             Shape(part.geometry, placement_of_pose(part.T_link_part, "shape"), part.color) for part in others
         )
-        explicit.append(given if here else solids)
+        explicit.append(given if here else (*given, *solids))  # meshes that cannot be read stay missing
     base, *links, at_tool = explicit
     if not described[-1]:  # drawn in the frame of the last link
         links[-1], at_tool = (*links[-1], *at_tool), ()
@@ -175,16 +199,16 @@ def _tool_parts(description: Description, last_link: Sequence[Part]) -> list[Par
 
 
 def _described_parts(description: Description, shapes: Sequence[Shape], link: int, color: str) -> list[Part]:
-    """Return shapes of a link as parts; none if a mesh's file is missing."""
+    """Return shapes of a link as parts, without meshes whose files are missing or unreadable."""
     values = resolved(description.parameters)
     poses = {frame: matrix(frame, values) for frame in dict.fromkeys(shape.frame for shape in shapes)}
     parts: list[Part] = []
     for shape in shapes:
         geometry, file = shape.geometry, None
         if isinstance(geometry, Mesh):
-            file = inside(description.mesh_folder, geometry.path, "shape.mesh")
-            if file is None or not is_mesh_file(file):
-                return []
+            file = _mesh_file(description, geometry)
+            if file is None:
+                continue
         T_body_part = matrix(shape.placement, values)
         own_color = shape.color or color
         T_link_body = poses[shape.frame]

@@ -205,7 +205,7 @@ def certify(
     if avoidance:
         avoidance = avoidance.between(description, motion.q(0.0), motion.q(motion.duration))
     checker = Checker(loaded(description, carried), limits, friction=chosen, avoidance=avoidance, points=points)
-    certificate = replace(checker.check(motion), not_checked=_not_checked(description, limits, avoidance))
+    certificate = checker.check(motion)
     if not independent:
         return certificate
     claims = avoidance.claims(description) if avoidance else ()
@@ -222,7 +222,13 @@ def _not_checked(description: Description, limits: Limits, avoidance: CollisionA
     if avoidance:
         found += not_checked(description, avoidance.obstacles, avoidance.self_collision, avoidance.clearance)
         kept_in_part = [each for each in avoidance.reduced if min(each.start, each.goal) > 0]
-        found += [f"all of the clearance near the ends: {each}" for each in kept_in_part]
+        where = "during the whole motion" if avoidance.is_reduced_throughout else "near the ends"
+        found += [f"all of the clearance {where}: {each}" for each in kept_in_part]
+        found += [
+            f"all of the clearance during the whole motion: {each}"
+            for each in avoidance.by_shapes
+            if each.kept < avoidance.clearance
+        ]
     return tuple(found)
 
 
@@ -308,6 +314,7 @@ class Checker:
             active=tuple(active),
             any_active=min(float(share @ anywhere), 1.0),
             sampled=tuple(sampled),
+            not_checked=_not_checked(self.description, self.limits, self.avoidance),
         )
 
     def _check_of_torques(

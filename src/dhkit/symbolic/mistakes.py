@@ -157,6 +157,8 @@ MISTAKES: Mapping[str, Mistake] = catalogue(
     _energy(
         ANGULAR_VELOCITY,
         omega_relative="the angular velocity is that of the joint alone, without the joints before it",
+        omega_unturned="the angular velocity is not turned by the joints' angles into the link's axes, about which its "
+        "inertia is given",
     ),
     _energy(
         INERTIA,

@@ -358,12 +358,29 @@ class _MovingBody:
     def omega(self, axes: list[Elements]) -> Elements:
         """Sum the axes of the revolute joints up to this link, each times its rate."""
         ring = self.arm.ring
+        if self.has("omega_unturned"):
+            return self._unturned_omega()
         joints = range(self.i, self.i + 1) if self.has("omega_relative") else range(self.i + 1)
         total = np.array([ring.zero] * 3, dtype=object)
         for j in joints:
             if ring.kinds[j] == "R":
                 total = total + (self.at.R.T @ axes[j]) * ring.rate(j)
         return total
+
+    def _unturned_omega(self) -> Elements:
+        """Pass the angular velocity from link to link, turned by the constant angles of the table alone.
+
+        omega_j = R_j^T (omega_(j-1) + qd_j z) in the standard convention, R_j^T omega_(j-1) + qd_j z in the modified.
+        """
+        ring = self.arm.ring
+        omega = np.array([ring.zero] * 3, dtype=object)
+        for j in range(self.i + 1):
+            R = _transform(self.arm, self.arm.rows[j])[0]
+            turning = ring.kinds[j] == "R"
+            R_still = _with_joints_still(R, [j]) if turning else R
+            own = np.array([ring.zero, ring.zero, ring.rate(j) if turning else ring.zero], dtype=object)
+            omega = R_still.T @ (omega + own) if self.arm.is_standard else R_still.T @ omega + own
+        return omega
 
     def inertia(self) -> Elements:
         """Return the tensor about the centre of mass, in the link's axes."""

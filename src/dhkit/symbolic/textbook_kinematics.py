@@ -193,7 +193,7 @@ class TextbookKinematics:
 
     @cached_property
     def _pose(self) -> Elements:
-        return _product(self.frames[-1], self.tool, self._has("translations_unrotated"))
+        return _product(self.frames[-1], self.tool, self._has("translations_unrotated", self.arm.n))
 
     @property
     def _standard(self) -> bool:
@@ -313,7 +313,7 @@ def derive_kinematics(
         The robot; links may lack bodies.
     mistakes
         Of :data:`KINEMATIC_MISTAKES`, by identity where they are made throughout; those of :data:`LINK_MISTAKES` at
-        one link as ``MadeAt(identity, link)``.
+        one link as ``MadeAt(identity, link)``; ``translations_unrotated`` at link n + 1 is that of the tool.
     symbols
         See :func:`dhkit.symbolic.exact_arm`.
 
@@ -361,7 +361,8 @@ def check_kinematic_mistake(made: object, n: int) -> None:
     ValueError
         No such mistake, no such link, or a link given for a mistake that concerns the whole arm.
     """
-    check_mistake(made, n, KINEMATIC_MISTAKES)
+    of_tool = isinstance(made, MadeAt) and made.identity == "translations_unrotated"
+    check_mistake(made, n + of_tool, KINEMATIC_MISTAKES)
     if isinstance(made, MadeAt) and made.link is not None and made.identity not in LINK_MISTAKES:
         raise ValueError(f"mistake {made.identity!r} concerns the whole arm, no single link")
 

@@ -53,7 +53,9 @@ def reached(arm, formulas, T):
         ((1, 2), f"atan2(py,px) + {BETA}", f"acos({REACH})", 2),
         ((1, 2), f"atan2(py,px) + {BETA}", f"-acos({REACH})", None),
         ((2, 1), f"±acos({REACH})", f"atan2(py,px) ± {BETA}", 2),
-        ((2, 1), f"±acos({REACH})", f"atan2(py,px) ∓ {BETA}", 2),
+        # Signs of textbooks belong together: + with the first, - with the second.
+        ((2, 1), f"±acos({REACH})", f"atan2(py,px) ∓ {BETA}", None),
+        ((2, 1), f"∓acos({REACH})", f"atan2(py,px) ± {BETA}", None),
         ((2, 1), f"±acos({REACH})", "atan2(py,px) - atan2(l2*s2, l1+l2*c2)", None),
         ((2, 1), f"acos({REACH})", "atan2(py,px) - atan2(l2*s2, l1+l2*c2)", None),
     ],
@@ -127,7 +129,7 @@ def test_a_factor_of_zero_determines_nothing(equation):
     [
         ("ax12_arm", "c1 = px/sqrt(px^2+py^2)", Verdict.UNDECIDED),
         ("ax12_arm", "px*c1 + py*s1 = sqrt(px^2+py^2)", Verdict.UNDECIDED),
-        ("ax12_arm", "px*c1 + py*s1 = ±sqrt(px^2+py^2)", Verdict.UNDECIDED),
+        ("ax12_arm", "px*c1 + py*s1 = ±sqrt(px^2+py^2)", Verdict.CORRECT),
         ("ax12_arm", "s1 = sqrt(1-c1^2)", Verdict.INCOMPLETE),
         ("ax12_arm", "s1 = ±sqrt(1-c1^2)", Verdict.INCOMPLETE),
         ("ax12_arm", "px*c1 + py*s1 = 2*sqrt(px^2+py^2)", Verdict.WRONG),

@@ -19,6 +19,7 @@ from typing import TypeAlias
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Number, Product, Sum, Token, Tree
+from dhkit.grading.answers.latex import is_latex
 from dhkit.grading.answers.matrices import TRANSPOSES, matrix_rows, matrix_tokens
 from dhkit.grading.answers.reading import answer_tree
 from dhkit.grading.answers.tokens import begins_with, closing_bracket, fail, nesting, quote
@@ -54,13 +55,40 @@ def is_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_names
         tokens, _ = matrix_tokens(text, vocabulary)
     except AnswerError:
         return False
-    depth, outermost = 0, 0
-    for token in tokens:
-        outermost += token.text == "[" and depth == 0
-        depth += {"[": 1, "]": -1}.get(token.text, 0)
-    is_power = any(begins_with(tokens, k, "]", "^") and tokens[k + 2].kind == "number" for k in range(len(tokens) - 2))
-    is_named = any(token.kind == "name" and matrix_of(token.text) is not None for token in tokens)
-    return outermost > 1 or is_power or is_named
+    outermost, is_power, k = 0, False, 0
+    while k < len(tokens):
+        if is_named_matrix(tokens, k, matrix_of):
+            return True
+        if not begins_matrix(tokens, k, text):
+            k += 1
+            continue
+        outermost += 1
+        k = closing_bracket(tokens, k) + 1
+        is_power |= begins_with(tokens, k, "^") and k + 1 < len(tokens) and tokens[k + 1].kind == "number"
+    return outermost > 1 or is_power
+
+
+def begins_matrix(tokens: Sequence[Token], k: int, text: str) -> bool:
+    """Whether the bracket at k encloses a matrix: q[0] is an index, and Sin[q1[t]] a call of Mathematica's."""
+    return tokens[k].text == "[" and (k == 0 or tokens[k - 1].kind != "name" or is_latex(text))
+
+
+def is_named_matrix(tokens: Sequence[Token], k: int, matrix_of: MatrixOf) -> bool:
+    """Whether the token at k is the name of a whole matrix, and not of one of its entries, as in qd(1)."""
+    if tokens[k].kind != "name" or matrix_of(tokens[k].text) is None:
+        return False
+    is_before_bracket = begins_with(tokens, k + 1, "(") or begins_with(tokens, k + 1, "[")
+    return not is_before_bracket or end_of_arguments(tokens, k, matrix_of) > k + 1
+
+
+def end_of_arguments(tokens: Sequence[Token], k: int, matrix_of: MatrixOf) -> int:
+    """Return where the name at k ends with its arguments, as in M(q) and C(q, qd); the place behind it without."""
+    if not begins_with(tokens, k + 1, "("):
+        return k + 1
+    end = closing_bracket(tokens, k + 1)
+    arguments = tokens[k + 2 : end]
+    are_vectors = all(x.text == "," or (x.kind == "name" and matrix_of(x.text) is not None) for x in arguments)
+    return end + 1 if arguments and are_vectors else k + 1
 
 
 def read_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_names) -> Value:
@@ -143,8 +171,10 @@ class _Reader:
         while k < len(tokens):
             token = tokens[k]
             end = closing_bracket(tokens, k) if token.text in ("[", "(") else k
+            if is_named_matrix(tokens, k, self.matrix_of):
+                end = end_of_arguments(tokens, k, self.matrix_of) - 1
             inside = tokens[k : end + 1]
-            matrix = self._matrix(inside)
+            matrix = self._matrix(tokens, k, inside)
             if matrix is None:
                 run += inside
                 k = end + 1
@@ -159,20 +189,21 @@ class _Reader:
             raise AnswerError(f"{quote(self.text)}: a term is empty")
         return result
 
-    def _matrix(self, tokens: Sequence[Token]) -> Value | None:
-        """Return the value of one factor if it is, or contains, a matrix; None of numbers."""
-        first = tokens[0]
-        if first.text == "[":
-            rows = [[self._entry(entry, first) for entry in row] for row in matrix_rows(tokens, self.text)]
+    def _matrix(self, tokens: Sequence[Token], k: int, inside: Sequence[Token]) -> Value | None:
+        """Return the value of the factor at k if it is, or contains, a matrix; None of numbers."""
+        first = tokens[k]
+        if begins_matrix(tokens, k, self.text):
+            rows = [[self._entry(entry, first) for entry in row] for row in matrix_rows(inside, self.text)]
             if len(set(map(len, rows))) != 1:
                 fail(self.text, first.at, "a matrix whose rows have different lengths")
             return rows
-        if first.text == "(" and any(token.text == "[" or self._named(token) for token in tokens):
-            return self.value(tokens[1:-1])
-        return self._named(first)
+        if first.text == "(" and self._contains_matrix(inside):
+            return self.value(inside[1:-1])
+        return self.matrix_of(first.text) if is_named_matrix(tokens, k, self.matrix_of) else None
 
-    def _named(self, token: Token) -> Rows | None:
-        return self.matrix_of(token.text) if token.kind == "name" else None
+    def _contains_matrix(self, tokens: Sequence[Token]) -> bool:
+        places = range(len(tokens))
+        return any(begins_matrix(tokens, k, self.text) or is_named_matrix(tokens, k, self.matrix_of) for k in places)
 
     def _entry(self, entry: Sequence[Token], first: Token) -> Tree:
         if not entry:

@@ -15,7 +15,7 @@ from dhkit.grading.judging.numeric import general_state, state_arrays
 from dhkit.grading.judging.quantities import Index, place_of
 from dhkit.grading.judging.quotients import varying
 from dhkit.grading.judging.truth import DYNAMICS, Truth, kinematic_quantity
-from dhkit.grading.mistakes.energy_variants import energy_variants
+from dhkit.grading.mistakes.energy_variants import energy_variants, table_variants
 from dhkit.grading.mistakes.equation_variants import equation_variants, lagrangian_sum
 from dhkit.grading.mistakes.parameter_variants import parameter_variants
 from dhkit.grading.mistakes.sums_of_angles import derivatives_of_cosines, sums_of_angles
@@ -68,6 +68,7 @@ class Variants:
             *energy_variants(self.truth),
             *equation_variants(self.truth),
             *parameter_variants(self.truth),
+            *table_variants(self.truth),
         ]
         return sorted(variants, key=lambda variant: variant.rarity)
 
@@ -80,10 +81,12 @@ class Variants:
         made = [(MadeAt(name), "") for name in names]
         if n > 1:
             made += [(MadeAt(name, i), f"link {i}") for name in LINK_MISTAKES for i in range(1, n + 1)]
+        made.append((MadeAt("translations_unrotated", n + 1), "tool"))
         right = partial(kinematic_quantity, truth.kinematics)
         return [
             derivatives_of_cosines(truth),
             *(Variant(at, _kinematic_change(truth, at), place, is_kinematic=True) for at, place in made),
+            *_columns_exchanged(truth),
             *sums_of_angles(truth.kinematics.arm, right, is_kinematic=True),
         ]
 
@@ -189,6 +192,19 @@ def _kinematic_change(truth: Truth, made: MadeAt) -> Make:
     """Return what a mistake adds to A1 ... An, T and J; the derivation is made once, when first asked for."""
     wrong = cache(lambda: derive_kinematics(truth.description, {made}))
     return lambda quantity: kinematic_quantity(wrong(), quantity) - kinematic_quantity(truth.kinematics, quantity)
+
+
+def _columns_exchanged(truth: Truth) -> Iterator[Variant]:
+    """Yield exchanges of two columns of the Jacobian."""
+    for i, j in combinations(range(truth.description.n), 2):
+        order = [*range(truth.description.n)]
+        order[i], order[j] = j, i
+
+        def change(quantity: str, order: list[int] = order) -> Elements:
+            right = kinematic_quantity(truth.kinematics, quantity)
+            return right[:, order] - right if quantity == "J" else right * 0
+
+        yield Variant(MadeAt("columns_exchanged"), change, f"columns {i + 1} and {j + 1}", 1, is_kinematic=True)
 
 
 @dataclass(eq=False)

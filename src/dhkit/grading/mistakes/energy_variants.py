@@ -31,7 +31,7 @@ OF_TURNING = frozenset(("velocity_at_joint", "inertia_about_joint", "inertia_abo
     ("velocity_relative_angle", "height_relative_angle")
 )
 """Mistakes with the angle of a revolute joint, or with the inertia about its axis."""
-RARER = frozenset(("inertia_axes", "com_rotation_transposed", "gravity_axis", "gravity_axis_back"))
+RARER = frozenset(("omega_unturned", "inertia_axes", "com_rotation_transposed", "gravity_axis", "gravity_axis_back"))
 """Mistakes of the textbook that are rarer than others which give the same answers."""
 INERTIA_MISTAKES = ("inertia_forgotten", "inertia_about_joint", "inertia_about_com_at_joint", "inertia_doubled")
 """Mistakes that may be made at some links alone, because the first link only turns about its own axis."""
@@ -85,7 +85,6 @@ def energy_variants(truth: Truth) -> Iterator[Variant]:
     yield from _shapes(textbook)
     yield from _drives(textbook)
     yield from _slides(textbook)
-    yield from _tables(textbook)
 
 
 def _textbook(textbook: TextbookDerivation) -> Iterator[Variant]:
@@ -272,7 +271,7 @@ def _slides(textbook: TextbookDerivation) -> Iterator[Variant]:
         for i in range(k, ring.n):
             place = f"link {i + 1}, q{k + 1}" if ring.n > 1 else ""
             make = make_lazily(_without_slide, textbook, textbook.links[i].bodies, k)
-            yield Variant(MadeAt("slide_forgotten", i + 1), make, place, 2)
+            yield Variant(MadeAt("slide_forgotten", i + 1), make, place, 1)
         for part in _parts(textbook):
             if part.name is not None and part.link > k:
                 make = make_lazily(_without_slide, textbook, [part.motion], k)
@@ -295,7 +294,9 @@ def _without_slide(textbook: TextbookDerivation, motions: Iterable[BodyMotion], 
 # The table behind the dynamics
 
 
-def _tables(textbook: TextbookDerivation) -> Iterator[Variant]:
+def table_variants(truth: Truth) -> Iterator[Variant]:
+    """Yield mistakes in the table that the equations come from."""
+    textbook = derive(truth.description)
     description = textbook.arm.description
     standard = description.convention is Convention.STANDARD
     other = replace(description, convention=Convention.MODIFIED if standard else Convention.STANDARD)

@@ -88,6 +88,9 @@ JACOBIAN = _catalogue(
         (Subject.JACOBIAN, "Look again at the derivatives: d/dq cos(q) = -sin(q)."): {
             "derivative_of_cosine": "the derivative of a cosine lacks its minus sign",
         },
+        (Subject.JACOBIAN, "Look again at the order of the columns: which joint does each belong to?"): {
+            "columns_exchanged": "two columns are exchanged: column i is the velocity per rate of joint i",
+        },
     }
 )
 
@@ -263,6 +266,7 @@ EQUATION = _catalogue(
         (Subject.EQUATION, "Look again at the terms one by one."): {
             "inertial_torques_missing": "the terms with accelerations are missing",
             "velocity_torques_missing": "all terms with products of rates are missing",
+            "rates_missing": "the rates are missing: an entry of C is of the first degree in them, of h of the second",
             "gravity_torques_missing": "the terms of gravity are missing",
             "term_missing": "a term is missing",
             "term_sign": "a term has the wrong sign",

@@ -24,7 +24,7 @@ def parameter_variants(truth: Truth) -> Iterator[Variant]:
     ring = lag.arm.ring
     symbols = [name for name in lag.arm.parameters if name in ring.constants]
     kinds = _kinds(truth.description)
-    yield from _factors(truth, symbols)
+    yield from _factors(truth, symbols, kinds)
     yield from _tilts(truth)
     yield from _units(truth, [name for name in symbols if kinds.get(name) == "length"])
     alike = [pair for pair in combinations(symbols, 2) if _are_alike(*pair, kinds)]
@@ -47,11 +47,12 @@ def parameter_variants(truth: Truth) -> Iterator[Variant]:
             yield Variant(MadeAt("links_exchanged"), _replaced(truth, swapped), f"links {i} and {j}", 1)
 
 
-def _factors(truth: Truth, symbols: list[str]) -> Iterator[Variant]:
+def _factors(truth: Truth, symbols: list[str], kinds: Mapping[str, str]) -> Iterator[Variant]:
     ring = truth.lagrangian.arm.ring
     for identity, factor in PARAMETER_FACTORS.items():
-        rarity = 1 if factor > 0 else 2
         for name in symbols:
+            # A length has the wrong sign where an offset is on the other side; a mass or an inertia has none.
+            rarity = 1 if factor > 0 or kinds.get(name) == "length" else 2
             yield Variant(MadeAt(identity), _replaced(truth, {name: ring.constant(name) * factor}), name, rarity)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fractions import Fraction
@@ -28,6 +29,7 @@ DEGREE_FACTORS = (Fraction(1, 180), Fraction(180))
 """Factors, besides pi and 1/pi, of angles that are confused with degrees."""
 ZEROS = {"h": "velocity_torques_missing", "C": "velocity_torques_missing", "g": "gravity_torques_missing"}
 """By quantity: the mistake if all its entries are zero."""
+RATE = re.compile(r"qd\d+")
 MIN_DIGITS = 2
 """Smallest number of significant digits of decimals that count as too short rather than wrong."""
 
@@ -105,6 +107,22 @@ def zeros(truth: Truth, left: Mapping[str, JudgedQuantity], following: set[str])
             continue
         identity = ZEROS.get(name, "entry_zero") if len(quantity.given) > 1 else "entry_zero"
         diagnoses[(name,)] = replace(diagnosis_of_whole(quantity, identity), equivalent=equivalent(truth, quantity))
+    return diagnoses
+
+
+def without_rates(
+    truth: Truth, left: Mapping[str, JudgedQuantity], following: set[str]
+) -> dict[tuple[str, ...], Diagnosis]:
+    """Find C and h without any rate, which are not zero."""
+    del truth
+    diagnoses: dict[tuple[str, ...], Diagnosis] = {}
+    for name in ("C", "h"):
+        quantity = left.get(name)
+        if quantity is None or name in following or quantity.is_zero:
+            continue
+        trees = [entry.tree for entry in quantity.given if entry.tree is not None]
+        if trees and not any(RATE.fullmatch(text) for tree in trees for text in names_of(tree)):
+            diagnoses[(name,)] = diagnosis_of_whole(quantity, "rates_missing")
     return diagnoses
 
 

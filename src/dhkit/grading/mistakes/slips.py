@@ -113,7 +113,17 @@ def _replaced(ring: PolynomialRing, missing: Terms, new: Terms) -> Slip | None:
     """Return the slip if terms replace others, all of them by the same exchange of generators."""
     pairs = _paired(missing, new)
     if pairs is None:
-        return None
+        turned = _paired(missing, {m: -c for m, c in new.items()})
+        slip = _of_pairs(ring, turned, missing, new) if turned else None
+        # Of two changes at once, one of them a sign, squares of rates are certain enough to be named.
+        return slip if slip is not None and slip.identity == "centrifugal_index" else None
+    return _of_pairs(ring, pairs, missing, new)
+
+
+def _of_pairs(
+    ring: PolynomialRing, pairs: Mapping[tuple[int, ...], tuple[int, ...]], missing: Terms, new: Terms
+) -> Slip | None:
+    """Return the slip if new terms stand in place of missing ones by the same exchange of generators."""
     exchanges = {tuple(b - a for a, b in zip(old, new, strict=True)) for old, new in pairs.items()}
     if len(exchanges) != 1:
         return None
@@ -154,7 +164,8 @@ def _identity(
     if kinds <= {"sine", "cosine"}:
         return "term_angle"
     if kinds <= {"rate", "acceleration"}:
-        return "term_rate"
+        of_squares = [(generator.kind, exponent) for generator, exponent in (*removed, *added)]
+        return "centrifugal_index" if of_squares == [("rate", 2)] * 2 else "term_rate"
     if kinds == {"constant"}:
         return "term_parameter"
     return "term_replaced"

@@ -13,7 +13,7 @@ from dhkit.description import Array, Convention, Description, Mesh, Shape
 from dhkit.description.assets import inside
 from dhkit.description.mesh_files import check_mesh_file
 from dhkit.description.table import DHTable
-from dhkit.description.validation import MAX_JOINTS, MAX_SHAPES
+from dhkit.description.validation import MAX_JOINTS, MAX_SHAPES, SHAPE_LEFT_OUT
 from dhkit.display import html_block, html_lines, html_table, repr_line
 from dhkit.errors import DhkitError, ModelError
 from dhkit.model.extraction.draft import UNROUNDED, Draft, Rounding, allowed_name
@@ -180,11 +180,13 @@ def _shapes(chain: Chain, meshes: MeshFinder, notes: list[str]) -> tuple[tuple[t
     for group in chain.groups:
         shapes = [shape for link in group for shape in _link_shapes(chain, link, meshes, left_out, has_visuals)]
         if len(shapes) > MAX_SHAPES:
-            notes.append(f"{len(shapes)} shapes move with link {group[0]!r}; the first {MAX_SHAPES} are shown")
+            notes.append(
+                f"link {group[0]!r}: shape {MAX_SHAPES + 1} of {len(shapes)} and all behind it{SHAPE_LEFT_OUT}"
+            )
         groups.append(tuple(shapes[:MAX_SHAPES]))
     notes += left_out[:MAX_LISTED_MESHES]
     if len(left_out) > MAX_LISTED_MESHES:
-        notes.append(f"{len(left_out) - MAX_LISTED_MESHES} more meshes left out")
+        notes.append(f"{len(left_out) - MAX_LISTED_MESHES} more meshes, as above{SHAPE_LEFT_OUT}")
     return tuple(groups)
 
 
@@ -204,7 +206,7 @@ def _link_shapes(
                 # Folders are left out of paths: others read the notes of a robot file.
                 is_root = folder == folder.parent
                 text = str(error) if is_root else str(error).replace(f"{folder}/", "").replace(str(folder), folder.name)
-                left_out.append(f"link {name!r}: {text}; left out")
+                left_out.append(f"link {name!r}: {text}{SHAPE_LEFT_OUT}")
                 continue
             geometry = replace(geometry, path=path)
         yield Shape(geometry, color=shape.color), chain.zero_poses[name] @ shape.T_link_shape

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Box, Description, joint_array, takes_robot
 from dhkit.display import counted, repr_line
-from dhkit.model.shapes import links_without_shapes
+from dhkit.model.shapes import links_without_shapes, missing_shapes
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, link_name, world_axes
 from dhkit.planning.obstacles.link_shapes import shape_distances
 from dhkit.planning.obstacles.pairs import Pair, capsules_beside, ends_above, link_pairs, pair_text, standing
@@ -147,6 +147,7 @@ def not_checked(
     """
     bare = [link_name(link) for link in links_without_shapes(description)]
     words = [f"{', '.join(bare)} without a shape"] if bare else []
+    words += missing_shapes(description)
     for obstacle in obstacles:
         for link, gap in standing(description, obstacle):
             if gap < nearer_than:

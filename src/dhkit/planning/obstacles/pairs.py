@@ -31,7 +31,7 @@ MOST_JOINTS = 2
 GRID = 256
 """Number of values of a joint on that grid."""
 STILL = 1e-9
-"""Largest travel, as a share of the size of the space in which the links move, that is rounding."""
+"""Largest travel, as a share of a capsule's largest coordinate, that is rounding."""
 LEAST_TURN, LEAST_STROKE = 0.2, 0.1
 """Ranges of joints, rad and as a share of the reach, that are sampled at least."""
 STANDING_SAMPLES = 400
@@ -76,7 +76,7 @@ class LinkPairs:
     - Every two links that no joint connects are checked by their capsules, or by their shapes where the capsules are
       too wide: where they overlap in more than 40 % of 4,000 random configurations.
     - Left out are capsules whose distance changes by less than 1 mm and is proved to stay above 0, see
-      :func:`_always_apart`: those of a wrist's first and third link, for example.
+      :func:`_least_of_turns`: those of a wrist's first and third link, for example.
     - Links that a joint connects touch each other by construction. Where their shapes do not touch in all of 200 random
       configurations, they are checked like the others.
     - Other links whose shapes overlap in all of these 200 are not checked, such as those of a spherical wrist whose
@@ -130,7 +130,9 @@ def _checked_pairs(description: Description, meshes: MeshVersions) -> CheckedPai
         return CheckedPairs((), (), 0.0)
     size = float(np.ptp(axes.reshape(-1, 3), axis=0).max())
     travels = np.ptp(axes, axis=0)  # of each end of each capsule along x, y and z
-    moves = travels > STILL * size
+    # Each beside its own coordinates: a slide without sensible limits takes others a million kilometres away.
+    rounding = STILL * np.abs(axes).max(axis=(0, 2, 3), initial=0.0)
+    moves = travels > rounding[:, None, None]
     return CheckedPairs(
         moving=tuple(int(i) for i in np.flatnonzero(moves.any(axis=(1, 2)))),
         heights=tuple((i, end) for i, end in np.argwhere(moves[:, :, 2]).tolist()),
@@ -172,10 +174,10 @@ def _link_pairs(description: Description, meshes: MeshVersions) -> LinkPairs:
             gap = segment_distances(axes[:, i], axes[:, j]) - capsules[i].radius - capsules[j].radius
             if np.mean(gap < 0) > OVERLAP_SHARE:
                 has_wide = True
-            elif np.ptp(gap) > STEADY or not _always_apart(description, i, j):
+            elif np.ptp(gap) > STEADY or (least := _least_of_turns(description, i, j)) is None:
                 narrow.append((i, j))
             else:
-                same = min(same, float(gap.min()))
+                same = min(same, float(gap.min()), least)
         overlaps = has_wide and bool((shape_distances(description, q[:SHAPE_SAMPLES], (a, b), enough=0.0) < 0).all())
         touches_by_construction = overlaps and are_connected
         if touches_by_construction:
@@ -226,8 +228,11 @@ def _sampled_axes(description: Description, count: int = SAMPLES) -> Array:
     return axes
 
 
-def _always_apart(description: Description, i: int, j: int) -> bool:
-    """Return whether two capsules are proved to be apart in all configurations: at most two revolute joints between.
+def _least_of_turns(description: Description, i: int, j: int) -> float | None:
+    """Return the distance of two capsules, m, that no turn of the joints between them changes; None if there is none.
+
+    It changes by less than ``STEADY`` over whole turns, also beyond the limits, and is proved to stay above 0: of at
+    most two revolute joints between.
 
     The distance depends on the joints between the links alone, and is computed on a grid of their whole turns. From the
     axis of joint k, whose own offset d_k lies along it, a point of the outer link is at most
@@ -241,9 +246,9 @@ def _always_apart(description: Description, i: int, j: int) -> bool:
     numbers = description.numbers
     joints = range(inner, outer)
     if not joints:
-        return True  # locked together: not even one configuration differs from another
+        return np.inf  # locked together: not even one configuration differs from another
     if len(joints) > MOST_JOINTS or numbers.prismatic[inner:outer].any():
-        return False
+        return None
     values = np.linspace(-np.pi, np.pi, GRID, endpoint=False)
     q = np.zeros((GRID ** len(joints), description.n))
     q[:, inner:outer] = np.stack(np.meshgrid(*[values] * len(joints)), axis=-1).reshape(-1, len(joints))
@@ -255,7 +260,8 @@ def _always_apart(description: Description, i: int, j: int) -> bool:
     half_step = np.pi / GRID
     levers = [abs(float(numbers.a[k])) + float(lengths[k + 1 : outer].sum()) + end for k in joints]
     change = sum(levers) * half_step
-    return bool(gap.min() > change)
+    is_steady = np.ptp(gap) <= STEADY and gap.min() > change
+    return float(gap.min()) if is_steady else None
 
 
 def capsules_beside(description: Description, obstacle: Obstacle) -> tuple[int, ...]:
