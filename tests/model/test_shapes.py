@@ -18,7 +18,7 @@ from dhkit.description.library import library_robot, robots
 from dhkit.description.numbers import matrix
 from dhkit.description.table_rows import from_dh
 from dhkit.expressions import ZERO, exact, parse
-from dhkit.model.shapes import link_parts
+from dhkit.model.shapes import link_parts, missing_shapes
 
 ROUNDING = 1e-12  # of a product of a few matrices
 TOUCH = 2e-6  # share of the reach: sizes are rounded to six digits
@@ -209,10 +209,16 @@ def test_given_shapes_keep_their_place_color_and_parameters():
 
 def test_a_link_whose_mesh_is_missing_is_drawn_from_the_table(tmp_path: Path):
     arm = from_dh([(0, 0.4, 0, "pi/2"), (0, 0, 0.3, 0)])
-    shapes = (Shape(Sphere(exact(0.1))), Shape(Mesh("arm.stl", (exact(0.001),) * 3), color="#c8102e"))
+    shapes = (Shape(Mesh("arm.stl", (exact(0.001),) * 3), color="#c8102e"),)
     meshed = replace(arm, joints=(replace(arm.joints[0], shapes=shapes), arm.joints[1]), mesh_folder=tmp_path)
     for one, other in zip(link_parts(meshed), link_parts(arm), strict=True):
         assert one.geometry == other.geometry and one.color == other.color
+    assert missing_shapes(meshed) == ("mesh 'arm.stl' of link 1, which cannot be read",)
+    # What it has beside the mesh stays, and is all that is drawn.
+    beside = (Shape(Sphere(exact(0.1))), *shapes)
+    with_ball = replace(meshed, joints=(replace(arm.joints[0], shapes=beside), arm.joints[1]))
+    assert [part.geometry for part in link_parts(with_ball) if part.link == 1] == [Sphere(exact(0.1))]
+    assert missing_shapes(with_ball) == missing_shapes(meshed)
     (tmp_path / "arm.stl").write_text("solid arm\nfacet normal 0 0 1\nendfacet\nendsolid\n")
     files = [part.file for part in link_parts(meshed) if isinstance(part.geometry, Mesh)]
     assert files == [tmp_path / "arm.stl"]

@@ -10,9 +10,10 @@ import trimesh
 import dhkit
 from acceptance import different_robots_first
 from dhkit.description import asset, library_robot, pose, robots
-from dhkit.errors import PlanningError
+from dhkit.errors import DescriptionError, PlanningError
 from dhkit.model.shapes import link_parts
-from dhkit.planning import Obstacle
+from dhkit.planning import Floor, Obstacle
+from dhkit.trajectories import joint_path, tool_line
 from mesh_shapes import ONE_LINK_WITH_A_MESH
 
 START, GOAL = np.array([-0.8, -0.5, 0.5, 0, 0, 0.0]), np.array([0.8, -0.5, 0.5, 0, 0, 0])
@@ -48,7 +49,9 @@ def test_a_link_whose_mesh_is_missing_is_named(tmp_path):
     (tmp_path / "bare.urdf").write_text(UR5[:begin] + link + UR5[end:])
     arm = dhkit.Arm.load(tmp_path / "bare.urdf")
     report = planned(arm, Obstacle.sphere(0.05, (2.0, 2.0, 2.0))).report
-    assert report.not_checked == ("link 3 without a shape",)
+    assert report.not_checked[0] == "link 3 without a shape"
+    assert report.not_checked[1:] == arm.description.warnings
+    assert "link 'link3': mesh 'forearm.stl' is not there; this shape is left out" in arm.description.warnings
     assert "not checked for collisions: link 3 without a shape" in str(report)
     whole = planned(dhkit.Arm.load("ur5"), Obstacle.sphere(0.05, (2.0, 2.0, 2.0))).report
     assert whole.not_checked == ()
@@ -146,3 +149,154 @@ def test_a_mesh_that_is_replaced_is_read_again(tmp_path):
     large = arm.distance([0.0], [ball]).distance
     assert small - large > 0.1
     assert dhkit.Arm.load(tmp_path / "box.toml").distance([0.0], [ball]).distance == large
+
+
+# Found by a review from outside
+
+THREE_LINKS = """format = 1
+name = "three"
+convention = "standard"
+[base]
+shape = {base}
+[[joint]]
+type = "revolute"
+a = 0
+alpha = "pi/2"
+d = 0.5
+theta = 0
+[[joint]]
+type = "revolute"
+a = 0.6
+alpha = 0
+d = 0
+theta = 0
+shape = [{{ box = [0.6, 0.4, 0.4], xyz = [-0.3, 0, 0] }}{mesh}]
+[[joint]]
+type = "revolute"
+a = 0.4
+alpha = 0
+d = 0
+theta = 0
+"""
+
+
+def robot_file(folder, text):
+    (folder / "robot.toml").write_text(text)
+    return dhkit.Arm.load(folder / "robot.toml")
+
+
+@pytest.mark.parametrize("content", [None, "", "solid nothing\nendsolid\n"])
+def test_shapes_beside_a_mesh_that_cannot_be_read_stay(tmp_path, content):
+    if content is not None:
+        (tmp_path / "cover.stl").write_text(content)
+    ball = Obstacle.sphere(0.05, (0.3, 0.15, 0.5), name="ball")
+    whole = robot_file(tmp_path, THREE_LINKS.format(base="[]", mesh=""))
+    arm = robot_file(tmp_path, THREE_LINKS.format(base="[]", mesh=', { mesh = "cover.stl" }'))
+    assert np.array_equal(arm.distance([0, 0, 0], [ball]).per_obstacle, whole.distance([0, 0, 0], [ball]).per_obstacle)
+    named = ("mesh 'cover.stl' of link 2, which cannot be read",)
+    assert arm.distance([0, 0, 0], [ball]).not_checked == named
+    for robot in (arm, arm.lock({2: 0.1})):
+        motion = robot.quintic([0] * robot.n, [0.02] * robot.n, duration=2)
+        certificate = robot.certify(motion, obstacles=[ball], independent=True)
+        assert not certificate.ok and set(named) <= set(certificate.not_checked)
+
+
+@pytest.mark.parametrize("place", ["base", "tool"])
+def test_missing_meshes_of_base_and_tool_are_named(tmp_path, place):
+    mesh = '[{ mesh = "gone.stl" }]'
+    text = THREE_LINKS.format(base=mesh if place == "base" else "[]", mesh="")
+    arm = robot_file(tmp_path, text if place == "base" else text.replace("[base]", f"[tool]\nshape = {mesh}\n[base]"))
+    motion = arm.quintic([0] * 3, [0.02] * 3, duration=2)
+    far = Obstacle.sphere(0.05, (3, 0, 0), name="far")
+    assert f"mesh 'gone.stl' of the {place}, which cannot be read" in arm.certify(motion, obstacles=[far]).not_checked
+
+
+def test_a_reduced_clearance_between_shapes_is_named_in_every_certificate():
+    arm = dhkit.Arm.load("cobra600")
+    q0 = np.array([-0.33, -0.24, 0.17, -1.14])
+    q1 = q0 + np.array([0, 0, -0.012, 0])
+    named = "all of the clearance during the whole motion: 40.5 mm between link 2 and link 4"
+    certificate = arm.certify(arm.quintic(q0, q1), self_collision=True, clearance=0.1)
+    assert named in certificate.not_checked
+    path = joint_path(arm.description, tool_line(arm.fk(q0), arm.fk(q1)), q0)
+    along = arm.plan_path(path, self_collision=True, clearance=0.1)
+    assert along.report.certificate.not_checked == certificate.not_checked
+
+
+def test_a_planned_motions_certificate_names_what_certify_names():
+    arm = dhkit.Arm.load("puma560")
+    motion = arm.plan("nominal", "ready", self_collision=True, compare=False, intervals=12)
+    own = motion.report.certificate.not_checked
+    assert own and own == arm.certify(motion, self_collision=True).not_checked
+
+
+def test_a_pair_that_is_steady_within_limits_alone_is_checked(tmp_path):
+    """Its distance changes beyond the file's limits, which ``limits=`` may exceed."""
+    joint = (
+        '[[joint]]\ntype = "revolute"\na = 0\nalpha = 0\nd = 0\ntheta = 0\nlimits = [{}]\n'
+        "shape = [{{ sphere = {{ radius = {} }}, xyz = [{}] }}]\n"
+    )
+    text = 'format = 1\nname = "s"\nconvention = "standard"\n[base]\n'
+    text += "shape = [{ sphere = { radius = 0.01 }, xyz = [0.12, 0, 0] }]\n"
+    text += joint.format("-0.05, 0.05", "0.005", "0, 0, 0.3") + joint.format("3.1, 3.2", "0.01", "0.06, 0, 0")
+    arm = robot_file(tmp_path, text)
+    wide = dhkit.Limits.of(arm, lower=-4, upper=4, velocity=9.0)
+    motion = arm.quintic([0, 3.14], [0, -3.14], duration=3, limits=wide)
+    assert not arm.certify(motion, wide, self_collision=True, clearance=0.05).ok
+    assert arm.distance([0.0, 0.0], [], True).distance == pytest.approx(0.04, abs=1e-9)
+
+
+@pytest.mark.parametrize("stroke", [10.0, 1e9])
+def test_a_slide_without_sensible_limits_hides_no_other_link(tmp_path, stroke):
+    text = 'format = 1\nname = "t"\nconvention = "standard"\n'
+    for kind, a, alpha, d, limits, shape in (
+        ("revolute", 0, '"pi/2"', 0.3, "-3, 3", "sphere = { radius = 0.02 }"),
+        ("revolute", 0.5, '"pi/2"', 0, "-3, 3", "box = [0.5, 0.04, 0.04], xyz = [-0.25, 0, 0]"),
+        ("prismatic", 0, 0, 0, f"{-stroke}, {stroke}", "sphere = { radius = 0.03 }"),
+    ):
+        text += f'[[joint]]\ntype = "{kind}"\na = {a}\nalpha = {alpha}\nd = {d}\ntheta = 0\n'
+        text += f"limits = [{limits}]\nshape = [{{ {shape} }}]\n"
+    arm = robot_file(tmp_path, text)
+    ball = Obstacle.sphere(0.1, (0.35, 0.35, 0.3), name="ball")
+    motion = arm.quintic([0, 0, 1], [1.5, 0, 1], duration=3)
+    assert not arm.certify(motion, obstacles=[ball]).ok
+    assert arm.distance(motion.q(1.5), [ball]).distance < -0.1
+
+
+@pytest.mark.parametrize(
+    "vertices", ["0 0 0, 1 0 0, 0 1 0, 1 1 0", "0 0 0, 1 0 0, 0 1 0", "0 0 0, 1 0 0, 2 0 0", "1 1 1"]
+)
+def test_a_flat_mesh_is_measured(tmp_path, vertices):
+    corners = vertices.split(", ")
+    corners += corners[-1:] * (3 - len(corners))
+    faces = [(1, 2, 3)] + [(2, 4, 3)] * (len(corners) == 4)
+    lines = [f"v {corner}" for corner in corners] + [f"f {a} {b} {c}" for a, b, c in faces]
+    (tmp_path / "plate.obj").write_text("\n".join(lines) + "\n")
+    text = 'format = 1\nname = "p"\nconvention = "standard"\n[[joint]]\ntype = "revolute"\na = 1\nalpha = 0\nd = 0\n'
+    arm = robot_file(tmp_path, text + 'theta = 0\nshape = { mesh = "plate.obj" }\n')
+    ball = Obstacle.sphere(0.05, (1, 0, 1), name="ball")
+    motion = arm.quintic([0.0], [0.5], duration=1)
+    certificate = arm.certify(motion, obstacles=[ball], independent=True)
+    assert certificate.ok and certificate.independent.ok
+    if len(set(corners)) == 1:
+        true = np.linalg.norm(np.array([2, 1, 1]) - [1, 0, 1]) - 0.05
+        assert arm.distance([0.0], [ball]).distance == pytest.approx(true, abs=1e-5)
+
+
+def test_a_locked_arm_keeps_its_distance_from_the_floor():
+    arm = dhkit.Arm.load("manutec_r3")
+    q = [0.41088506, -0.69063986, -1.37707943]
+    locked = arm.lock({1: q[1], 2: q[2]})
+    floor = [Floor(0.3)]
+    assert locked.distance(q[:1], floor).distance == pytest.approx(float(arm.distance(q, floor).distance), abs=1e-9)
+    assert not locked.certify(locked.quintic([0.0], [1.0], duration=3), obstacles=floor).ok
+
+
+def test_torque_limits_of_an_arm_without_bodies_are_refused():
+    arm = dhkit.Arm.from_dh([(0, 0, 0.5, 0), (0, 0, 0.4, 0)])
+    free = dhkit.Limits.of(arm, lower=-4, upper=4)
+    motion = arm.quintic([0, 0], [1, 1], duration=2, limits=free)  # a duration is given: nothing has to limit it
+    with pytest.raises(DescriptionError, match="no body, so the dynamics are unknown"):
+        arm.certify(motion, dhkit.Limits.of(arm, torque=5))
+    with pytest.raises(ValueError, match="lower of joint 1 is inf; expected a number, or -inf for none"):
+        dhkit.Limits.of(arm, lower=np.inf)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dhkit.description import Array, Description, Payload, takes_robot
+from dhkit.description.robot import require_bodies
 from dhkit.display import html_block, html_table, repr_line, value_line
 from dhkit.planning.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance, motion_constraints
 from dhkit.planning.constraints import Constraint
@@ -175,7 +176,7 @@ def certify(
     Raises
     ------
     DescriptionError
-        A motion of another robot.
+        A motion of another robot, or limits of torques of an arm without bodies.
     PlanningError
         A clearance larger than the space in which the arm moves.
     ModelError
@@ -196,6 +197,8 @@ def certify(
             raise TypeError(f"{name} is {type(value).__name__}; expected {kind.__name__}(...)")
     motion.require(description)
     limits = limits or default_limits(description)
+    if np.isfinite(limits.torque).any():
+        require_bodies(description)
     if limits.velocity.shape != (description.n,):
         raise ValueError(f"limits are of {len(limits.velocity)} joints; expected {description.n}")
     carried = motion.payload if payload is None else payload

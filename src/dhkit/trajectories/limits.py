@@ -47,10 +47,12 @@ class Limits:
             if array.shape != (n,):
                 raise ValueError(f"{item.name} has shape {array.shape}; expected ({n},)")
             bounds = item.name in ("lower", "upper")
-            wrong = np.isnan(array) if bounds else ~(array > 0)
+            nowhere = {"lower": np.inf, "upper": -np.inf}.get(item.name)  # no joint value is allowed
+            wrong = np.isnan(array) | (array == nowhere) if bounds else ~(array > 0)
             if wrong.any():
                 i = int(np.flatnonzero(wrong)[0])
-                expected = "a number" if bounds else "a positive number, or inf"
+                free = "-inf" if item.name == "lower" else "inf"
+                expected = f"a number, or {free} for none" if bounds else "a positive number, or inf"
                 raise ValueError(f"{item.name} of joint {i + 1} is {array[i]:g}; expected {expected}")
             array.flags.writeable = False
             object.__setattr__(self, item.name, array)

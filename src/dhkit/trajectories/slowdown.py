@@ -38,7 +38,14 @@ MAX_ROUNDS = 20
 ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
 
 
-def least_slowdown(trajectory: Trajectory, limits: Limits, torques: Torques | None = None, points: int = 20) -> float:
+def least_slowdown(
+    trajectory: Trajectory,
+    limits: Limits,
+    torques: Torques | None = None,
+    points: int = 20,
+    *,
+    may_be_unlimited: bool = False,
+) -> float:
     """Return the smallest c for which ``trajectory.slowed(c)`` keeps its limits; for c < 1 it may be sped up.
 
     A motion c times as slow has velocities over c, accelerations over c^2 and jerks over c^3, and torques
@@ -58,17 +65,19 @@ def least_slowdown(trajectory: Trajectory, limits: Limits, torques: Torques | No
     points
         Number of times per interval, both ends included, at which torques are checked, and more finely about the
         tightest; velocities, accelerations and jerks are checked at their extremes.
+    may_be_unlimited
+        Whether a motion that no limit slows down is no error.
 
     Returns
     -------
     float
-        0 for a motion that stands still.
+        0 for a motion that stands still, or may be as fast as one likes.
 
     Raises
     ------
     PlanningError
         The arm cannot hold itself at some state, or not while it moves; a quantity jumps whose derivative is limited;
-        or nothing limits the motion.
+        or nothing limits the motion, and that is not allowed.
     DescriptionError
         Torques are limited, and a link has no body.
     ValueError
@@ -82,7 +91,7 @@ def least_slowdown(trajectory: Trajectory, limits: Limits, torques: Torques | No
     >>> round(least_slowdown(motion, Limits.of(arm, velocity=0.5, torque=np.inf)), 12)
     3.0
     """
-    c = float(least_slowdowns([trajectory], limits, torques, points)[0])
+    c = float(least_slowdowns([trajectory], limits, torques, points, may_be_unlimited=may_be_unlimited)[0])
     if torques is not None or c == 0 or np.isinf(limits.torque).all():
         return c
     return _with_torques_between(trajectory, limits, c)
@@ -119,7 +128,12 @@ def _with_torques_between(trajectory: Trajectory, limits: Limits, c: float) -> f
 
 
 def least_slowdowns(
-    trajectories: Sequence[Trajectory], limits: Limits, torques: Torques | None = None, points: int = 20
+    trajectories: Sequence[Trajectory],
+    limits: Limits,
+    torques: Torques | None = None,
+    points: int = 20,
+    *,
+    may_be_unlimited: bool = False,
 ) -> Array:
     """Return :func:`least_slowdown` of several motions of one robot, shape (m,), their torques in one batch."""
     _check_joints(trajectories[0], limits)
@@ -128,7 +142,7 @@ def least_slowdowns(
         slowest = np.maximum(slowest, _by_torques(trajectories, limits, torques, points))
     for trajectory, c in zip(trajectories, slowest, strict=True):
         moving = np.abs(trajectory.coefficients[:, 1:]).max(axis=(0, 1), initial=0.0) > 0
-        if c == 0 and moving.any():
+        if c == 0 and moving.any() and not may_be_unlimited:
             name = trajectory.description.joints[int(np.flatnonzero(moving)[0])].name
             raise PlanningError(
                 f"nothing limits the motion: {name} moves, and has neither a velocity, acceleration, jerk nor torque"

@@ -46,7 +46,7 @@ def timed(shape: Trajectory, duration: float | None, limits: Limits | None, torq
     require_inside(shape, own)
     if duration is not None and limits is None:
         return shape.slowed(duration / shape.duration)
-    c = least_slowdown(shape, own, torques)
+    c = least_slowdown(shape, own, torques, may_be_unlimited=duration is not None)
     if duration is None:
         if c == 0:
             raise ValueError("the motion ends where it begins; expected a duration")

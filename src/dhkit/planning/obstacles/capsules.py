@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import combinations
+from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +21,8 @@ MERGE_RATIO = 1.25
 """Largest ratio of volumes, of a common capsule over two capsules, with which the two are merged."""
 RIM_CORNERS = 24
 """Number of corners of the polygon around a cylinder's rim, which is 0.9 % wider than the rim."""
+THICKNESS, LEAST_THICKNESS = 1e-6, 1e-6
+"""Thickness of a flat mesh: share of its size, and at least this, m."""
 
 
 class LinkBody(NamedTuple):
@@ -182,6 +184,14 @@ def _rims(radius: float, length: float) -> Array:
     return np.concatenate([np.stack([x, y, np.full(RIM_CORNERS, z)], axis=1) for z in (-length / 2, length / 2)])
 
 
+def _thickened(vertices: Array) -> Array:
+    """Return the corners of small cubes about the vertices of a flat mesh, whose hull contains that of the mesh."""
+    edge = max(THICKNESS * float(np.ptp(vertices, axis=0).max(initial=0.0)), LEAST_THICKNESS)
+    cube = np.array(list(product((-edge / 2, edge / 2), repeat=3)))
+    thick: Array = (np.unique(vertices, axis=0)[:, None] + cube).reshape(-1, 3)
+    return thick
+
+
 def convex_hull(part: Part) -> tuple[Array, NDArray[np.int_]]:
     """Return the corners of a mesh's convex hull, shape (c, 3), m, and the triangles between them, shape (f, 3).
 
@@ -195,8 +205,9 @@ def convex_hull(part: Part) -> tuple[Array, NDArray[np.int_]]:
     vertices = read_part(part).vertices
     try:
         hull = ConvexHull(vertices)
-    except QhullError:  # flat: joggled by a billionth of its size
-        hull = ConvexHull(vertices, qhull_options="QJ")
+    except QhullError:  # flat: a plate, one triangle, or less
+        vertices = _thickened(vertices)
+        hull = ConvexHull(vertices)
     place = np.full(len(vertices), -1)
     place[hull.vertices] = np.arange(len(hull.vertices))
     return vertices[hull.vertices], place[hull.simplices]

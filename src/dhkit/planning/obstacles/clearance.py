@@ -44,9 +44,9 @@ class Distances:
 
     def __repr__(self) -> str:
         if self.pair is None:
-            what = "nothing to check" if np.isinf(self.distance).all() else "no finite state"
-            return repr_line("Distances", counted(self.distance.size, "state"), what)
-        least = f"least {np.nanmin(self.distance):.4g} m, {self.pair[0]} and {self.pair[1]}"
+            least = "nothing to check" if np.isinf(self.distance).all() else "no finite state"
+        else:
+            least = f"least {np.nanmin(self.distance):.4g} m, {self.pair[0]} and {self.pair[1]}"
         if self.not_checked:
             least += f", not checked: {'; '.join(self.not_checked)}"
         return repr_line("Distances", counted(self.distance.size, "state"), least)

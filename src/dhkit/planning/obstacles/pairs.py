@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dhkit.description import Array, Convention, Description
+from dhkit.description import Array, Convention, Description, world_to_frames
 from dhkit.model.shapes import MeshVersions, link_parts, mesh_versions
 from dhkit.planning.obstacles.capsules import LinkBody, link_capsules, world_axes
 from dhkit.planning.obstacles.link_shapes import shape_distances
@@ -201,30 +201,49 @@ def _chain_order(description: Description) -> dict[LinkBody, int]:
     return {body: place for place, body in enumerate(bodies)}
 
 
-def _sampled_axes(description: Description, count: int = SAMPLES) -> Array:
-    """Return the axes of capsules in random configurations, shape (count, m, 2, 3), m.
+def _sampled_axes(description: Description) -> Array:
+    """Return the axes of capsules in random configurations, shape (SAMPLES, m, 2, 3), m."""
+    return _axes_with_locked_joints_turned(description, _configurations(description))
 
-    Joints that were locked to the base turn too, and count as joints that turn if they slid: so what moves beside an
-    obstacle is the same in a locked arm and in the whole arm.
+
+def _axes_in_whole_turns(description: Description) -> Array:
+    """Return the axes of capsules in configurations that do not depend on limits, shape (STANDING_SAMPLES, m, 2, 3)."""
+    q = _configurations(description, whole_turns=True)[:STANDING_SAMPLES]
+    return _axes_with_locked_joints_turned(description, q)
+
+
+def _axes_with_locked_joints_turned(description: Description, q: Array) -> Array:
+    """Return the axes of capsules at q, shape (N, n), of which locked joints turn at random.
+
+    They count as joints that turn if they slid: so what moves beside an obstacle or a floor is the same in a locked arm
+    and in the whole arm.
     """
     from scipy.spatial.transform import Rotation
 
-    axes = world_axes(description, _configurations(description)[:count]).copy()
-    T_world_base = description.numbers.T_world_base
-    frames = {part.body: T_world_base @ part.T_link_body for part in link_parts(description) if part.link == 0}
+    count = len(q)
+    axes = world_axes(description, q).copy()
+    links = world_to_frames(description, q)
+    frames = {(part.link, part.body): part.T_link_body for part in link_parts(description)}
     bodies = [capsule.body for capsule in link_capsules(description)]
     rng = np.random.default_rng(SEED)
-    for joint in range(max(frames, default=0), 0, -1):
-        # Joint k turns about z of frame k - 1, in the modified convention about z of frame k.
-        T = frames.get(joint - 1 if description.convention is Convention.STANDARD else joint)
-        carried = [i for i, body in enumerate(bodies) if body.link > 0 or body.number >= joint]
+    last = {link: max(number for other, number in frames if other == link) for link, _ in frames}
+    locked = [(link, k) for link in sorted(last, reverse=True) for k in range(last[link], 0, -1)]
+    # From the tip to the base, so that no axis has been moved before it turns what is behind it.
+    for link, joint in locked:
+        # Joint k of a link's bodies turns about z of body k - 1, in the modified convention about z of body k.
+        T = frames.get((link, joint - 1 if description.convention is Convention.STANDARD else joint))
+        carried = [
+            i for i, body in enumerate(bodies) if body.link > link or (body.link == link and body.number >= joint)
+        ]
         if T is None:  # of a link without shapes: its axis is not known, and everything behind it moves
             size = float(np.ptp(axes.reshape(-1, 3), axis=0).max(initial=0.0)) or 1.0
-            axes[:, carried] += rng.uniform(-size, size, (len(axes), 1, 1, 3))
+            axes[:, carried] += rng.uniform(-size, size, (count, 1, 1, 3))
         else:
-            turns = rng.uniform(-np.pi, np.pi, len(axes))
-            R = Rotation.from_rotvec(np.outer(turns, T[:3, 2])).as_matrix()
-            axes[:, carried] = (axes[:, carried] - T[:3, 3]) @ np.swapaxes(R, -1, -2)[:, None] + T[:3, 3]
+            T_world = links[:, link] @ T
+            turns = rng.uniform(-np.pi, np.pi, (count, 1))
+            R = Rotation.from_rotvec(turns * T_world[:, :3, 2]).as_matrix()
+            point = T_world[:, None, None, :3, 3]
+            axes[:, carried] = (axes[:, carried] - point) @ np.swapaxes(R, -1, -2)[:, None] + point
     return axes
 
 
@@ -276,7 +295,7 @@ def capsules_beside(description: Description, obstacle: Obstacle) -> tuple[int, 
 @lru_cache(maxsize=MAX_OBSTACLES)
 def _capsules_beside(description: Description, meshes: MeshVersions, obstacle: Obstacle) -> tuple[int, ...]:
     capsules = link_capsules(description)
-    axes = _sampled_axes(description, STANDING_SAMPLES)
+    axes = _axes_in_whole_turns(description)
 
     def stands_in(i: int) -> bool:
         radius = capsules[i].radius
@@ -302,7 +321,7 @@ def ends_above(description: Description, height: float) -> tuple[tuple[int, int]
 @lru_cache(maxsize=256)
 def _ends_above(description: Description, meshes: MeshVersions, height: float) -> tuple[tuple[int, int], ...]:
     capsules = link_capsules(description)
-    axes = _sampled_axes(description, STANDING_SAMPLES)
+    axes = _axes_in_whole_turns(description)
 
     def stands_in(i: int, end: int) -> bool:
         radius, lowest = capsules[i].radius, axes[:, i, end, 2]
@@ -350,7 +369,8 @@ def _standing(description: Description, meshes: MeshVersions, obstacle: Obstacle
     return tuple(Standing(link, gap) for link, gap in sorted(found.items()))
 
 
-def _configurations(description: Description) -> Array:
+def _configurations(description: Description, whole_turns: bool = False) -> Array:
+    """Return random configurations, shape (SAMPLES, n), inside the limits, or of whole turns about their middle."""
     numbers = description.numbers
     span = np.where(numbers.prismatic, max(description.reach, 1.0), np.pi)
     lower = np.where(np.isfinite(numbers.lower), numbers.lower, -span)
@@ -358,6 +378,8 @@ def _configurations(description: Description) -> Array:
     low, high = np.minimum(lower, upper), np.maximum(lower, upper)
     # A joint whose range is a point may move by the limits of a motion.
     least = np.where(numbers.prismatic, LEAST_STROKE * max(description.reach, LEAST_STROKE), LEAST_TURN)
+    if whole_turns:
+        least = np.where(numbers.prismatic, least, 2 * np.pi)
     widened = np.maximum(least - (high - low), 0.0) / 2
     low, high = low - widened, high + widened
     return np.random.default_rng(SEED).uniform(low, high, (SAMPLES, description.n))

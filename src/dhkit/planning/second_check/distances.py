@@ -32,6 +32,8 @@ SAME_SHARE, FIXED_SHARE = 1e-3, 0.1
 """Share of the spread of distances below which two are the same, and of configurations in which they must be."""
 CURVED = 1.1
 """A path between two states is at most so many times as long as the straight line."""
+FLAT = 1e-6
+"""Thickness of a mesh, as a share of its size and at least in m, below which it is made so thick."""
 FAILED, SHIFT = -1e300, np.array([3e-8, 1e-8, 2e-8])
 """What coal returns for some symmetric penetrations, and a move, m, of one solid with which it is asked again."""
 
@@ -190,6 +192,11 @@ class DrawnArm:
             case Capsule(radius, length):
                 return coal.Capsule(float(radius), float(length))
         vertices = np.unique(read_part(part).vertices.astype(float), axis=0)
+        spread = np.linalg.svd(vertices - vertices.mean(axis=0), compute_uv=False)
+        if len(vertices) < 4 or spread[2] <= FLAT * spread[0]:
+            # qhull needs a volume, and crashes without: copies of the corners around each give one.
+            shift = max(FLAT * spread[0], FLAT)
+            vertices = np.concatenate([vertices + sign * shift * axis for axis in np.eye(3) for sign in (-1, 1)])
         surface = coal.BVHModelOBBRSS()
         surface.beginModel(0, len(vertices))
         surface.addVertices(vertices)
