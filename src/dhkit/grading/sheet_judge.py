@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import secrets
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,18 +18,19 @@ from dhkit.errors import AnswerError, DescriptionError, DhkitError
 from dhkit.expressions.syntax import Name, Tree
 from dhkit.grading.answers.given import (
     Given,
-    SheetMatrices,
     given_branches,
     given_quantity,
     given_rows,
     vocabulary_of,
     with_entries_gathered,
 )
-from dhkit.grading.answers.quantity_names import QuantityNames
+from dhkit.grading.answers.matrix_algebra import MatrixOf, Rows
+from dhkit.grading.answers.quantity_names import QuantityNames, Target
+from dhkit.grading.answers.reading import read_answer
 from dhkit.grading.answers.sheet import ALIASES, quantity_names, shape_of
-from dhkit.grading.answers.sheet_values import AnswerSheet
+from dhkit.grading.answers.sheet_values import AnswerSheet, Entries
 from dhkit.grading.answers.typeset import typeset, typeset_equations
-from dhkit.grading.answers.vocabulary import Vocabulary
+from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
 from dhkit.grading.judging.consistency import Consistency
 from dhkit.grading.judging.functions import judge_function
 from dhkit.grading.judging.numeric import names_of
@@ -145,7 +147,7 @@ class _SheetJudge:
         names = QuantityNames(self.truth.description)
         read: dict[str, tuple[Given, ...]] = {}
         answers = with_entries_gathered(self.sheet.answers, names)
-        matrix_of = SheetMatrices(answers, self.vocabulary, names)
+        matrix_of = _SheetMatrices(answers, self.vocabulary, names)
         for name, value in answers.items():
             if _is_empty(value):
                 continue
@@ -178,7 +180,7 @@ class _SheetJudge:
             return error
         return AnswerError(f"{self.sheet.file}: answer: {error}")
 
-    def _jacobian(self, value: object, names: QuantityNames, matrix_of: SheetMatrices) -> tuple[Given, ...]:
+    def _jacobian(self, value: object, names: QuantityNames, matrix_of: _SheetMatrices) -> tuple[Given, ...]:
         """Return the entries of a Jacobian: of six rows, or of the two or three rows that an arm's motion has.
 
         Of an arm in a plane these are the two positions in it, with the angle about its normal or without; of others
@@ -276,6 +278,55 @@ class _SheetJudge:
             return judged
         values = tuple(f"{name} = {value:.6g}" for name, value in other.numbers.values.items())
         return replace(elsewhere, notes=(*elsewhere.notes, Note(NoteKind.ONLY_AT_VALUES, "ik", values)))
+
+
+VECTOR = re.compile(r"(?:d|dd|dot|ddot|d2)?(?:q|th|theta|Theta|vartheta)(?:d|dd|dot|ddot)?")
+"""Names of the columns of joint values, rates and accelerations; t is the time."""
+
+
+class _SheetMatrices:
+    """The matrices that names stand for on a sheet: its own answers, and the vectors of the joints' state.
+
+    Parameters
+    ----------
+    answers
+        The sheet's answers by quantity.
+    vocabulary
+        What names mean; a name that has a meaning of its own is no matrix.
+    names
+        Which names stand for quantities.
+    """
+
+    def __init__(self, answers: Mapping[str, object], vocabulary: Vocabulary, names: QuantityNames) -> None:
+        self.answers = answers
+        self.vocabulary = vocabulary
+        self.names = names
+        self._read: dict[str, Rows] = {}
+
+    def without(self, *quantities: str) -> MatrixOf:
+        """Return which names stand for matrices, where some quantities are not known yet."""
+        return lambda name: self._matrix(name, quantities)
+
+    def _matrix(self, name: str, unknown: tuple[str, ...]) -> Rows | None:
+        vocabulary, quantity = self.vocabulary, self.names.quantity(name)
+        # G is taken for a parameter g only where it is no answer.
+        is_answer = quantity and quantity in self.answers and not vocabulary.is_own(plain_name(name))
+        if vocabulary.knows(name) and not is_answer:
+            return None
+        if VECTOR.fullmatch(plain_name(name)) and vocabulary.is_state(f"{name}1"):
+            return [[read_answer(f"{name}{i + 1}", vocabulary)] for i in range(self.names.n)]
+        if quantity in unknown or not isinstance(self.answers.get(quantity), str | list | Entries):
+            return None
+        if quantity not in self._read:
+            shape = self.names.shape(quantity)
+            value = self.answers[quantity]
+            given = given_quantity(quantity, value, shape, vocabulary, self.names, self.without(*unknown, quantity))
+            if unread := next((entry for entry in given if entry.tree is None), None):
+                raise AnswerError(f"{name}: {Target(quantity, unread.index)} is not read: {unread.error}")
+            trees = [entry.tree for entry in given if entry.tree is not None]
+            columns = shape[1] if len(shape) == 2 else 1
+            self._read[quantity] = [trees[k : k + columns] for k in range(0, len(trees), columns)]
+        return self._read[quantity]
 
 
 def _judge_rows(

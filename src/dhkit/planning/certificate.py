@@ -224,14 +224,7 @@ def _not_checked(description: Description, limits: Limits, avoidance: CollisionA
         found.append(f"torques, as the links of {', '.join(bare)} have no body")
     if avoidance:
         found += not_checked(description, avoidance.obstacles, avoidance.self_collision, avoidance.clearance)
-        kept_in_part = [each for each in avoidance.reduced if min(each.start, each.goal) > 0]
-        where = "during the whole motion" if avoidance.is_reduced_throughout else "near the ends"
-        found += [f"all of the clearance {where}: {each}" for each in kept_in_part]
-        found += [
-            f"all of the clearance during the whole motion: {each}"
-            for each in avoidance.by_shapes
-            if each.kept < avoidance.clearance
-        ]
+        found += avoidance.kept_in_part
     return tuple(found)
 
 

@@ -150,6 +150,14 @@ class CollisionAvoidance:
             "is_clearance_reduced_throughout": self.is_reduced_throughout,
         }
 
+    @property
+    def kept_in_part(self) -> tuple[str, ...]:
+        """Where less than the clearance is kept, in words."""
+        where = "during the whole motion" if self.is_reduced_throughout else "near the ends"
+        near_ends = (f"all of the clearance {where}: {one}" for one in self.reduced if min(one.start, one.goal) > 0)
+        by_shapes = (pair for pair in self.by_shapes if pair.kept < self.clearance)
+        return (*near_ends, *(f"all of the clearance during the whole motion: {pair}" for pair in by_shapes))
+
     def between(self, description: Description, start: Array, goal: Array) -> CollisionAvoidance:
         """Return the settings for a motion between two configurations (n,), with the reduced clearances of its ends.
 

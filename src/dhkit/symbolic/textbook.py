@@ -314,7 +314,8 @@ class _MovingBody:
         return mistake in self.mistakes
 
     def motion(self, axes: list[Elements]) -> BodyMotion:
-        velocity, omega = self.velocity(), self.omega(axes)
+        velocity = self.velocity()
+        omega = self._unturned_omega() if self.has("omega_unturned") else self.omega(axes)
         K = self.kinetic(velocity, omega)
         return BodyMotion(self.body, self.place("velocity_relative_angle"), velocity, omega, K, self.potential())
 
@@ -358,8 +359,6 @@ class _MovingBody:
     def omega(self, axes: list[Elements]) -> Elements:
         """Sum the axes of the revolute joints up to this link, each times its rate."""
         ring = self.arm.ring
-        if self.has("omega_unturned"):
-            return self._unturned_omega()
         joints = range(self.i, self.i + 1) if self.has("omega_relative") else range(self.i + 1)
         total = np.array([ring.zero] * 3, dtype=object)
         for j in joints:
@@ -374,12 +373,12 @@ class _MovingBody:
         """
         ring = self.arm.ring
         omega = np.array([ring.zero] * 3, dtype=object)
-        for j in range(self.i + 1):
-            R = _transform(self.arm, self.arm.rows[j])[0]
-            turning = ring.kinds[j] == "R"
-            R_still = _with_joints_still(R, [j]) if turning else R
-            own = np.array([ring.zero, ring.zero, ring.rate(j) if turning else ring.zero], dtype=object)
-            omega = R_still.T @ (omega + own) if self.arm.is_standard else R_still.T @ omega + own
+        for j, row in enumerate(self.arm.rows[: self.i + 1]):
+            R, own = _transform(self.arm, row)[0], np.array([ring.zero] * 3, dtype=object)
+            if ring.kinds[j] == "R":
+                R = _with_joints_still(R, [j])
+                own[2] = ring.rate(j)
+            omega = R.T @ (omega + own) if self.arm.is_standard else R.T @ omega + own
         return omega
 
     def inertia(self) -> Elements:

@@ -109,8 +109,7 @@ def test_random_formulas_are_read_as_numpy_computes_them(law):
         text = written(formula, notations[k % len(notations)])
         if not is_algebra(text, vocabulary):
             continue
-        read = read_algebra(text, vocabulary)
-        rows = read if isinstance(read, list) else [[read]]
+        rows = read_algebra(text, vocabulary)
         found = np.array([[float(doubles(entry, VALUES)) for entry in row] for row in rows])
         assert found.shape == expected.shape, text
         error = np.max(np.abs(found - expected)) / max(1.0, np.abs(expected).max())

@@ -17,12 +17,12 @@ from dhkit.grading.answers.documents.latex_statements import has_relation
 from dhkit.grading.answers.documents.statements import Statement
 from dhkit.grading.answers.indices import first_index
 from dhkit.grading.answers.matrices import read_matrix
-from dhkit.grading.answers.matrix_algebra import MatrixOf, Rows, is_algebra, no_names, read_algebra
+from dhkit.grading.answers.matrix_algebra import MatrixOf, is_algebra, no_names, read_algebra
 from dhkit.grading.answers.objects import entry_tree, is_entry
 from dhkit.grading.answers.pose_entries import other_names, with_pose_entries
 from dhkit.grading.answers.pretty import is_pretty
 from dhkit.grading.answers.quantity_names import QuantityNames, Target
-from dhkit.grading.answers.reading import meaning_of, read_answer
+from dhkit.grading.answers.reading import meaning_of
 from dhkit.grading.answers.sheet_values import AnswerSheet, Chain, Entries, Refusal
 from dhkit.grading.answers.tokens import quote
 from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
@@ -196,56 +196,11 @@ def given_quantity(
         given = _from_one_text(name, _without_head(name, value), shape, vocabulary, matrix_of)
         return _mirrored(given) if name == "M" else given
     elif isinstance(value, str) and is_algebra(_without_head(name, value), vocabulary, matrix_of):
-        return _from_algebra(name, _without_head(name, value), shape or (1, 1), vocabulary, matrix_of)
+        return _from_one_text(name, _without_head(name, value), shape, vocabulary, matrix_of)
     else:
         entries = [(places[0], value)] if isinstance(value, str) else _flat(name, value, shape, ())
     given = tuple(_entry(Target(name, index), text, vocabulary, names) for index, text in entries)
     return _mirrored(given) if name == "M" else given
-
-
-class SheetMatrices:
-    """The matrices that names stand for on a sheet: its own answers, and the vectors of the joints' state.
-
-    Parameters
-    ----------
-    answers
-        The sheet's answers by quantity.
-    vocabulary
-        What names mean; a name that has a meaning of its own is no matrix.
-    names
-        Which names stand for quantities.
-    """
-
-    def __init__(self, answers: Mapping[str, Answer], vocabulary: Vocabulary, names: QuantityNames) -> None:
-        self.answers = answers
-        self.vocabulary = vocabulary
-        self.names = names
-        self._read: dict[str, Rows] = {}
-
-    def without(self, *quantities: str) -> MatrixOf:
-        """Return which names stand for matrices, where some quantities are not known yet."""
-        return lambda name: self._matrix(name, quantities)
-
-    def _matrix(self, name: str, unknown: tuple[str, ...]) -> Rows | None:
-        vocabulary, quantity = self.vocabulary, self.names.quantity(name)
-        # G is taken for a parameter g only where it is no answer.
-        is_answer = quantity and quantity in self.answers and not vocabulary.is_own(plain_name(name))
-        if vocabulary.knows(name) and not is_answer:
-            return None
-        if vocabulary.is_state(f"{name}1"):
-            return [[read_answer(f"{name}{i + 1}", vocabulary)] for i in range(self.names.n)]
-        if quantity in unknown or not isinstance(self.answers.get(quantity), str | list | Entries):
-            return None
-        if quantity not in self._read:
-            shape = self.names.shape(quantity)
-            value = self.answers[quantity]
-            given = given_quantity(quantity, value, shape, vocabulary, self.names, self.without(*unknown, quantity))
-            if unread := next((entry for entry in given if entry.tree is None), None):
-                raise AnswerError(f"{name}: {Target(quantity, unread.index)} is not read: {unread.error}")
-            trees = [entry.tree for entry in given if entry.tree is not None]
-            columns = shape[1] if len(shape) == 2 else 1
-            self._read[quantity] = [trees[k : k + columns] for k in range(0, len(trees), columns)]
-        return self._read[quantity]
 
 
 def with_entries_gathered(answers: Mapping[str, Answer], names: QuantityNames) -> dict[str, Answer]:
@@ -452,44 +407,24 @@ def _flat(
     raise AnswerError(f"{place}: found {kind}; expected {expected}")
 
 
-def _from_algebra(
-    name: str, text: str, shape: tuple[int, ...], vocabulary: Vocabulary, matrix_of: MatrixOf
-) -> tuple[Given, ...]:
-    """Return the entries of a formula with several matrices; each has the whole text."""
-    try:
-        value = read_algebra(text, vocabulary, matrix_of)
-    except AnswerError as error:
-        raise AnswerError(f"{name}: {error}") from None
-    rows: Rows = value if isinstance(value, list) else [[value]]
-    shown = text.strip()[:MAX_SHOWN]
-    if len(shape) == 1 or shape == (1, 1):
-        entries = [entry for row in rows for entry in row] if min(len(rows), len(rows[0])) == 1 else []
-        if len(entries) != shape[0]:
-            expected = f"{shape[0]} entries" if shape[0] > 1 else "a number"
-            raise AnswerError(f"{name}: found {len(rows)} rows of {len(rows[0])}; expected {expected}")
-        places = list(np.ndindex(shape)) if len(shape) == 1 else [()]
-        return tuple(Given(index, shown, tree) for index, tree in zip(places, entries, strict=True))
-    if (len(rows), len(rows[0])) != shape:
-        raise AnswerError(f"{name}: found {len(rows)} rows of {len(rows[0])}; expected {shape[0]} of {shape[1]}")
-    return tuple(Given((i, j), shown, tree) for i, row in enumerate(rows) for j, tree in enumerate(row))
-
-
 def _from_one_text(
     name: str, text: str, shape: tuple[int, ...], vocabulary: Vocabulary, matrix_of: MatrixOf
 ) -> tuple[Given, ...]:
-    """Return the entries of a matrix, or of a vector, that stands in one text."""
-    if is_algebra(text, vocabulary, matrix_of):
-        return _from_algebra(name, text, shape, vocabulary, matrix_of)
+    """Return the entries of a matrix, a vector or a number that stands in one text, of one matrix or of several."""
     try:
-        rows = read_matrix(text, vocabulary)
+        if is_algebra(text, vocabulary, matrix_of):
+            shown = text.strip()[:MAX_SHOWN]
+            rows = [[(shown, tree) for tree in row] for row in read_algebra(text, vocabulary, matrix_of)]
+        else:
+            rows = read_matrix(text, vocabulary)
     except AnswerError as error:
         raise AnswerError(f"{name}: {error}") from None
-    if len(shape) == 1:
-        entries = [entry for row in rows for entry in row]
-        if len(entries) != shape[0]:
-            raise AnswerError(f"{name}: found {len(entries)} entries; expected {shape[0]}")
-        return tuple(Given((k,), *entry) for k, entry in enumerate(entries))
-    if [len(row) for row in rows] != [shape[1]] * shape[0]:
-        columns = len(rows[0]) if rows else 0
-        raise AnswerError(f"{name}: found {len(rows)} rows of {columns}; expected {shape[0]} of {shape[1]}")
-    return tuple(Given((i, j), *entry) for i, row in enumerate(rows) for j, entry in enumerate(row))
+    places = list(np.ndindex(shape))
+    found = f"found {len(rows)} rows of {len(rows[0]) if rows else 0}"
+    if len(shape) == 2 and [len(row) for row in rows] != [shape[1]] * shape[0]:
+        raise AnswerError(f"{name}: {found}; expected {shape[0]} of {shape[1]}")
+    entries = [entry for row in rows for entry in row]
+    if len(entries) != len(places):
+        expected = f"expected {len(places)} entries" if shape else "expected a number"
+        raise AnswerError(f"{name}: {found if not shape else f'found {len(entries)} entries'}; {expected}")
+    return tuple(Given(place, *entry) for place, entry in zip(places, entries, strict=True))

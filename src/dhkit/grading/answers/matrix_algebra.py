@@ -70,7 +70,11 @@ def is_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_names
 
 def begins_matrix(tokens: Sequence[Token], k: int, text: str) -> bool:
     """Whether the bracket at k encloses a matrix: q[0] is an index, and Sin[q1[t]] a call of Mathematica's."""
-    return tokens[k].text == "[" and (k == 0 or tokens[k - 1].kind != "name" or is_latex(text))
+    if tokens[k].text != "[":
+        return False
+    before = tokens[k - 1] if k else None
+    is_behind_operand = before is not None and (before.kind == "name" or before.text in ("'", ")", "]"))
+    return not is_behind_operand or is_latex(text)
 
 
 def is_named_matrix(tokens: Sequence[Token], k: int, matrix_of: MatrixOf) -> bool:
@@ -91,8 +95,8 @@ def end_of_arguments(tokens: Sequence[Token], k: int, matrix_of: MatrixOf) -> in
     return end + 1 if arguments and are_vectors else k + 1
 
 
-def read_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_names) -> Value:
-    """Read a formula with matrices.
+def read_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_names) -> Rows:
+    """Read a formula with matrices; a number is one row of one entry.
 
     Parameters
     ----------
@@ -105,8 +109,8 @@ def read_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_nam
 
     Returns
     -------
-    Value
-        Entries by rows, which share what is used several times, or a number.
+    Rows
+        Entries by rows, which share what is used several times.
 
     Raises
     ------
@@ -114,7 +118,7 @@ def read_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_nam
         Sizes that do not fit, an operation that matrices do not have, or a formula that cannot be read.
     """
     tokens, plain = matrix_tokens(text, vocabulary)
-    return _Reader(vocabulary, plain, matrix_of).value(tokens)
+    return _as_matrix(_Reader(vocabulary, plain, matrix_of).value(tokens))
 
 
 class _Reader:
