@@ -66,6 +66,8 @@ ROTATIONS = POSE_NAMES[3:]
 ARCS = ("acos", "asin", "atan")
 ROOTS = ("sqrt", "acos", "asin")
 """Functions that give one of two signs."""
+SAME_LENGTH = 1e-9
+"""Share of a length by which it differs from itself by rounding."""
 MIN_MEASURE = 10
 """Smallest number that is taken for degrees or millimetres; smaller ones are factors and exponents."""
 MAX_LAW_TERMS = 8
@@ -106,11 +108,18 @@ class Lengths:
         Possible missing offsets: parameters, and those lengths of table, base and tool that are no parameters; m.
     values
         Their absolute values, m; may be empty.
+    of_tool
+        Absolute lengths behind the last joint, of its row and of the tool, m.
     """
 
     parameters: tuple[str, ...]
     trees: tuple[Name | Number, ...]
     values: tuple[float, ...] = ()
+    of_tool: tuple[float, ...] = ()
+
+    def is_of_tool(self, k: int) -> bool:
+        """Whether the length of ``trees[k]`` is one behind the last joint."""
+        return any(abs(self.values[k] - size) <= SAME_LENGTH * size for size in self.of_tool)
 
 
 def edits(
@@ -180,7 +189,8 @@ def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, di
     known = [length for length in lengths.trees if leaf_text(length) in names | numbers]
     for first, second in combinations(known[:MAX_LENGTHS], 2):
         yield "lengths_exchanged", {leaf_text(first): second, leaf_text(second): first}
-    for length in lengths.trees[:MAX_LENGTHS]:
+    for place, length in enumerate(lengths.trees[:MAX_LENGTHS]):
+        forgotten = "tool_length_forgotten" if lengths.is_of_tool(place) else "length_forgotten"
         for subtracted in (True, False):
             for p in POSITIONS:
                 if p in names:
@@ -191,8 +201,8 @@ def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, di
                     for i, p in enumerate(POSITIONS, start=1)
                 }
                 if names & {*POSITIONS}:
-                    yield "tool_length_forgotten", tool
-                if names & {*POSITIONS} and leaf_text(length) in names | numbers:
+                    yield forgotten, tool
+                if names & {*POSITIONS} and lengths.is_of_tool(place) and leaf_text(length) in names | numbers:
                     twice = {p: times(Number(Fraction(2), "2", 0), length) for p in POSITIONS}
                     yield (
                         "tool_length_added",

@@ -206,7 +206,9 @@ def lengths_of(description: Description) -> Lengths:
             seen.add(size)
             sizes.append(size)
             trees.append(Number(Fraction(str(size)), str(size), 0))
-    return Lengths(parameters, tuple(trees), tuple(sizes))
+    behind_last_joint = (numbers.d[-1], numbers.a[-1], *numbers.T_last_tool[:3, 3])
+    of_tool = tuple(abs(float(x)) for x in behind_last_joint if abs(x) > 0)
+    return Lengths(parameters, tuple(trees), tuple(sizes), of_tool)
 
 
 def _edited(branch: Branch, joint: int, edit: Edit) -> Explanation:

@@ -85,7 +85,7 @@ class StepContext:
             if not np.any(np.isclose(value, named, rtol=1e-9))
         ]
         trees_of_all = (*(Name(name, 0) for name in values), *(tree for tree, _ in others))
-        return Lengths(tuple(values), trees_of_all, (*named, *(value for _, value in others)))
+        return Lengths(tuple(values), trees_of_all, (*named, *(value for _, value in others)), every.of_tool)
 
     @cached_property
     def solved_poses(self) -> Poses:
