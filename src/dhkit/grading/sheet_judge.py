@@ -37,6 +37,7 @@ from dhkit.grading.judging.numeric import names_of
 from dhkit.grading.judging.quantities import JudgedQuantity, judge_quantity
 from dhkit.grading.judging.quotients import RingReader
 from dhkit.grading.judging.truth import Truth, truth_of
+from dhkit.grading.mistakes.entries import shown_in_own_angles
 from dhkit.grading.mistakes.explaining import explain as explain_mistakes
 from dhkit.grading.remarks import Note, NoteKind
 from dhkit.grading.report import (
@@ -90,7 +91,7 @@ def judge_sheet(
             AnswerError(f"{sheet.file}: answer: every entry is empty; expected at least one quantity"),
         )
     follows, agreement, diagnosis = _explain(truth, judged, digits) if explain else ({}, [], [])
-    entries = [entry for name, quantity in judged.items() for entry in _entries(quantity, follows.get(name, {}))]
+    entries = [entry for name, quantity in judged.items() for entry in _entries(truth, quantity, follows.get(name, {}))]
     notes = [Note(NoteKind.PROGRAM, values=(text,)) for text in sheet.notes]
     notes += [*_notes(truth, judged, vocabulary), *agreement]
     entries += [Entry(name, (), Verdict.UNREADABLE, statement=str(error)) for name, error in refused.items()]
@@ -374,9 +375,9 @@ def _is_empty(value: object) -> bool:
     return isinstance(value, str) and not value.strip()
 
 
-def _entries(quantity: JudgedQuantity, follows: Mapping[tuple[int, ...], str]) -> Iterator[Entry]:
+def _entries(truth: Truth, quantity: JudgedQuantity, follows: Mapping[tuple[int, ...], str]) -> Iterator[Entry]:
     for given in quantity.given:
-        finding = quantity.findings[given.index]
+        finding = shown_in_own_angles(truth, quantity.name, quantity.findings[given.index])
         text, latex = typeset(given.tree) if given.tree is not None else ("", "")
         yield Entry(
             quantity.name,

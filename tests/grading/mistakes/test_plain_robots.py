@@ -3,6 +3,8 @@
 Modules: plain_causes, parameter_variants, energy_variants, diagnosis.
 """
 
+import math
+
 import pytest
 
 import dhkit
@@ -165,3 +167,10 @@ def test_squares_of_absolute_rates_have_an_index():
     assert SWING.grade({"tau": right}, names=names).verdict.passes
     report = SWING.grade({"tau": wrong}, names=names)
     assert {one.mistake for one in report.diagnosis} == {"centrifugal_index"}, str(report)
+    # Difference and state are those of the student's angles: the answer at the state is the answer's value there.
+    entry = report.entries[0]
+    assert entry.difference == "m2*l1*l2*sin(q2 - q1)*qd1^2 + m2*l1*l2*sin(q2 - q1)*qd2^2"
+    values = dict(entry.witness.state)
+    plain = wrong[0].replace("phi1dd", "qdd1").replace("phi2dd", "qdd2").replace("phi1d", "qd1").replace("phi2d", "qd2")
+    plain = plain.replace("phi1", "q1").replace("phi2", "q2").replace("^", "**")
+    assert eval(plain, {"sin": math.sin, "cos": math.cos}, values) == pytest.approx(entry.witness.answer, rel=1e-9)

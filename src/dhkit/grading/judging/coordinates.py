@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -16,6 +16,9 @@ from dhkit.symbolic.ring import Element, Elements, angle_name, translated
 
 ANGLE = re.compile(r"\b([cs])(\d[\d_]*)\b", re.ASCII)
 """A sine or cosine in a printed formula: c12."""
+
+
+VARIABLE = re.compile(r"(?:q|qd|qdd)\d+", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -102,6 +105,18 @@ class Coordinates:
             return f"{'cos' if match[1] == 'c' else 'sin'}({angle})" if angle else match[0]
 
         return ANGLE.sub(written, text)
+
+    def own_state(self, state: Mapping[str, float]) -> dict[str, float]:
+        """Return a state given by the robot's q1, qd1 ... with the variables in their place; what it lacks is zero."""
+        if self.is_relative:
+            return dict(state)
+        own: dict[str, float] = {}
+        for kind in ("q", "qd", "qdd"):
+            names = [f"{kind}{i + 1}" for i in range(len(self.sums))]
+            if any(name in state for name in names):
+                values = [sum(state.get(names[i], 0.0) for i in joints) for joints in self.sums]
+                own |= dict(zip(names, values, strict=True))
+        return own | {name: value for name, value in state.items() if not VARIABLE.fullmatch(name)}
 
     def by_position(self, element: Element, i: int) -> Element:
         """Return the derivative by variable i."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 from dhkit.grading.judging.coordinates import ANGLE
-from dhkit.grading.judging.findings import readable
+from dhkit.grading.judging.findings import Finding, readable
 from dhkit.grading.judging.quantities import Index, JudgedQuantity, place_of
 from dhkit.grading.judging.quotients import varying
 from dhkit.grading.judging.truth import Truth
@@ -51,6 +52,20 @@ def in_own_angles(truth: Truth, text: str) -> str:
     if any(ANGLE.fullmatch(name) for name in truth.description.parameters):
         return text
     return truth.coordinates.in_own_angles(text)
+
+
+def shown_in_own_angles(truth: Truth, quantity: str, finding: Finding) -> Finding:
+    """Return a finding whose difference and state are written in the student's own angles and rates."""
+    coordinates = truth.coordinates
+    if coordinates.is_relative:
+        return finding
+    texts, witness = finding.texts, finding.witness
+    if finding.difference is not None:
+        own = readable(truth.arm(quantity), coordinates.in_own_rates(finding.difference))
+        texts = in_own_angles(truth, plain_text(own)), ""
+    if witness is not None:
+        witness = replace(witness, state=coordinates.own_state(witness.state))
+    return replace(finding, texts=texts, witness=witness)
 
 
 def slip_of_C(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None:
