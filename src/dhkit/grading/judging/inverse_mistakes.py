@@ -8,7 +8,7 @@ changes, never by time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import chain
@@ -93,6 +93,8 @@ class Search:
         self.revolute = [kind == "R" for kind in description.kinds]
         self.lengths = lengths or lengths_of(description)
         self.left = MAX_WORK
+        self.made: dict[int, set[str]] = {}
+        """Mistakes that were found in each joint's formula of the branches so far."""
 
     def explanations(self, branch: Branch) -> Iterator[Explanation]:
         """Yield the mistakes of a branch; each is corrected before the next is looked for."""
@@ -100,6 +102,8 @@ class Search:
         while current is not None and not current.is_right:
             joint = current.wrong_joint()
             explanation = self._explain_anywhere(current) if joint is None else self._explain(current, joint)
+            if explanation.mistake is not None and explanation.joint is not None:
+                self.made.setdefault(explanation.joint, set()).add(explanation.mistake)
             yield explanation
             current = explanation.repaired
 
@@ -114,28 +118,38 @@ class Search:
 
     def _explain(self, branch: Branch, joint: int) -> Explanation:
         """Return the mistake of a branch with a known first wrong joint."""
+
+        def leads_on(candidate: Explanation) -> bool:
+            following = candidate.repaired.wrong_joint() if candidate.repaired is not None else joint
+            return following is None or branch.rank(following) > branch.rank(joint)
+
+        # Branches of one sheet have the same mistakes: those of an earlier branch are tried before all others.
+        again = self._agreeing_edits(branch, joint, self.made.get(joint, set()))
+        if known := next(filter(leads_on, (_edited(branch, joint, edit) for edit in again)), None):
+            return known
         here = self._agreeing_edits(branch, joint)
         candidates = [_edited(branch, joint, edit) for edit in here]
+        partial = next(filter(leads_on, candidates), None)
         halves = [
             Explanation(mistake, other, repaired)
             for other in branch.order[: branch.rank(joint) + 1]
             for mistake, repaired in _lost_halves(branch, other, joint)
         ]
-        others = chain(self._explain_earlier(branch, joint), self._explain_several(branch, here))
+        # Where a change of this formula makes its values right, those of the formulas before it are.
+        earlier = self._explain_earlier(branch, joint) if partial is None else iter(())
+        others = chain(earlier, self._explain_several(branch, here))
         for candidate in chain(candidates, others, halves):
             if candidate.repaired is not None and candidate.repaired.is_right:
                 return candidate
-        for candidate in (*candidates, *halves):
-            following = candidate.repaired.wrong_joint() if candidate.repaired is not None else joint
-            if following is None or branch.rank(following) > branch.rank(joint):
-                return candidate
+        if found := partial or next(filter(leads_on, halves), None):
+            return found
         frequent = [_edited(branch, joint, edit) for edit in self._edits(branch, joint) if edit.mistake in FREQUENT]
         best = max((*frequent, *halves), key=_count_of_closed, default=Explanation(None, joint))
         gained = _count_of_closed(best) - int(np.sum(branch.closed))
         return best if gained > MIN_EXPLAINED_SHARE * np.sum(branch.failing) else Explanation(None, joint)
 
-    def _edits(self, branch: Branch, joint: int) -> list[Edit]:
-        """Return the changes of a joint's formula, as many as the bound on the work leaves."""
+    def _edits(self, branch: Branch, joint: int, mistakes: Collection[str] | None = None) -> list[Edit]:
+        """Return the changes of a joint's formula, all or of some mistakes, as many as the bound on the work leaves."""
         same_kind = [k for k in branch.independent(joint) if self.revolute[k] is self.revolute[joint]]
         offsets = _offsets(branch, joint)
         names = [f"q{k + 1}" for k in same_kind]
@@ -143,17 +157,22 @@ class Search:
         size = sum(1 for _ in parts_of(tree))
         if size > MAX_PARTS:
             return []
-        changes = edits(tree, self.revolute[joint], names, offsets, self.lengths)[: self.left // size]
+        changes = edits(tree, self.revolute[joint], names, offsets, self.lengths)
+        if mistakes is not None:
+            changes = [edit for edit in changes if edit.mistake in mistakes]
+        changes = changes[: self.left // size]
         self.left -= len(changes) * size
         return changes
 
-    def _agreeing_edits(self, branch: Branch, joint: int) -> list[Edit]:
+    def _agreeing_edits(self, branch: Branch, joint: int, mistakes: Collection[str] | None = None) -> list[Edit]:
         """Return the changes of a joint's formula that give a solution's values at poses that should be reached."""
+        if mistakes is not None and not mistakes:
+            return []
         formula, agreeing = branch.editable(joint), list[Edit]()
         asked = branch.reachable
         tree = branch.trees[joint]
         equal = equal_parts([tree])
-        for edit in self._edits(branch, joint):
+        for edit in self._edits(branch, joint, mistakes):
             trees = [edit.tree]
             if len(equal[id(edit.old)]) > 1:
                 trees.append(replaced_everywhere(tree, equal[id(edit.old)], edit.new))
