@@ -127,3 +127,11 @@ def test_a_second_step_of_a_joint_is_not_read_and_the_others_are():
 def test_a_solution_of_a_later_joint_is_incomplete():
     entry = judged([{"joint": 1, "solution": "q2"}]).entries[0]
     assert entry.verdict is Verdict.INCOMPLETE and "uses q2, which no earlier step finds" in entry.statement
+
+
+def test_a_mistake_beside_lost_quadrants_is_named():
+    """atan(y/x) loses a quadrant everywhere; sine and cosine are exchanged in one place besides."""
+    second = {"joint": 2, "solution": "acos((px^2 + py^2 - l1^2 - l2^2)/(2*l1*l2))"}
+    first = {"joint": 1, "solution": "atan(py/px) - atan((l2*sin(q2))/(l1 + l2*sin(q2)))"}
+    report = judged([second, first], "planar2r")
+    assert [one.mistake for one in report.diagnosis] == ["term_function"]

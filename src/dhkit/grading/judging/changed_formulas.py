@@ -99,6 +99,18 @@ def exchange_arguments(call: Call) -> Tree:
     return replace(call, arguments=call.arguments[::-1])
 
 
+def with_quadrant(call: Call) -> Call:
+    """Return atan2(y, x) for atan(y/x); a call without a quotient as it is."""
+    (argument,) = call.arguments
+    if not isinstance(argument, Product) or all(is_factor for is_factor, _ in argument.factors):
+        return call
+    y, x = (
+        product_of([(True, part) for is_factor, part in argument.factors if is_factor is wanted])
+        for wanted in (True, False)
+    )
+    return Call("atan2", (y, x), 0)
+
+
 def product_of(factors: Sequence[tuple[bool, Tree]]) -> Tree:
     """Return a product; 1 without factors."""
     return Product(tuple(factors)) if factors else Number(Fraction(1), "1", 0)

@@ -401,12 +401,8 @@ def _of_call(call: Call, in_law: bool) -> Iterator[tuple[str, Tree]]:
             yield "term_function", other
             yield "angle_zero", minus(other)
         case "atan":
-            if isinstance(first, Product) and not all(is_factor for is_factor, _ in first.factors):
-                y, x = (
-                    formulas.product_of([(True, part) for is_factor, part in first.factors if is_factor is wanted])
-                    for wanted in (True, False)
-                )
-                yield "quadrant", Call("atan2", (y, x), 0)
+            if (with_quadrant := formulas.with_quadrant(call)) is not call:
+                yield "quadrant", with_quadrant
         case "acos" | "asin":
             yield "elbow_sign", minus(call)
             is_law = any(map(formulas.is_law, parts_of(first)))

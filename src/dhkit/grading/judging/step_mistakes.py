@@ -11,6 +11,7 @@ from dhkit.description import Array, Description, world_to_frames
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.expressions import ZERO
 from dhkit.grading.answers.given import POSE_NAMES
+from dhkit.grading.judging.changed_formulas import with_calls_changed, with_quadrant
 from dhkit.grading.judging.inverse_branch import Branch
 from dhkit.grading.judging.inverse_edits import with_signs_changed
 from dhkit.grading.judging.inverse_mistakes import Search
@@ -57,6 +58,8 @@ class SolutionMistakes:
         explanation = next(search.explanations(self.branch), None)
         if explanation is not None and explanation.joint == self.joint and explanation.mistake:
             return explanation.mistake, ""
+        if mistake := self._besides_quadrants():
+            return mistake, ""
         if self._needs_another_sign():
             return "sign_lost", ""
         for mistake, values in self.context.misread(self.branch.poses):
@@ -72,6 +75,16 @@ class SolutionMistakes:
             except (AnswerError, DescriptionError):
                 continue  # it uses the length, or the arm has no closed form without it
         return None
+
+    def _besides_quadrants(self) -> str:
+        """Return the mistake that is left where atan(y/x) is read as atan2(y, x); empty if none explains the rest."""
+        tree = with_calls_changed(self.tree, ("atan",), with_quadrant)
+        if tree is self.tree:
+            return ""
+        branch = self.branch.with_tree(self.joint, tree)
+        search = Search(self.context.description, self.context.lengths([tree]))
+        explanation = next(search.explanations(branch), None)
+        return (explanation.mistake or "") if explanation is not None and explanation.joint == self.joint else ""
 
     @property
     def _joints(self) -> dict[str, Array]:
