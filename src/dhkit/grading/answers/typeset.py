@@ -47,7 +47,7 @@ def typeset_equations(equations: Sequence[tuple[Tree, Tree]]) -> tuple[str, str]
     --------
     >>> from dhkit.expressions import read
     >>> typeset_equations([(read("q1"), read("atan2(py, px)")), (read("q2"), read("pz"))])
-    ('q1 = atan2(py, px); q2 = pz', 'q_{1} = \mathrm{atan2}(p_{y}, p_{x}), \quad q_{2} = p_{z}')
+    ('q1 = atan2(py, px); q2 = pz', 'q_{1} = \\mathrm{atan2}(p_{y}, p_{x}), \\quad q_{2} = p_{z}')
     """
     sides = [(typeset(left), typeset(right)) for left, right in equations]
     if not all(text for side in sides for text, _ in side):
