@@ -155,6 +155,8 @@ class Diagnosis:
         Where to look, without naming the mistake.
     equivalent
         Other mistakes of the library that give the same answers.
+    second_hint
+        Terms that are missing, which give the answer away; empty for other mistakes.
     """
 
     mistake: str | None
@@ -163,6 +165,7 @@ class Diagnosis:
     entries: tuple[str, ...] = ()
     hint: str = ""
     equivalent: tuple[str, ...] = ()
+    second_hint: str = ""
 
     @property
     def place(self) -> str:
@@ -326,7 +329,10 @@ class GradeReport:
 
     @property
     def _diagnosis_lines(self) -> list[str]:
-        lines = [f"{diagnosis.place}: {diagnosis.sentence}" for diagnosis in self.diagnosis]
+        lines = []
+        for diagnosis in self.diagnosis:
+            lines.append(f"{diagnosis.place}: {diagnosis.sentence}")
+            lines += [f"second hint: {diagnosis.second_hint}"] if diagnosis.second_hint else []
         lines += [f"{entry.name}: {entry.statement}" for entry in self.unfinished]
         return lines + ([f"missing: {self.missing_text}"] if self.missing else [])
 

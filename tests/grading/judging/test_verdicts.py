@@ -260,7 +260,9 @@ def test_slips_in_single_terms_are_named_with_the_term():
     (found,) = ARM.grade(M=[[M[0][0] + " + m1*l1*l2", M[0][1]], M[1]]).diagnosis
     assert found.mistake == "term_extra" and found.sentence == "There is a term too much: m1*l1*l2."
     (found,) = ARM.grade(g=["m1*g*l1*c1/2 + m2*g*l1*c1", G[1]]).diagnosis
-    assert found.mistake == "term_missing" and found.sentence == "A term is missing: m2*g*l2*c12/2."
+    assert found.mistake == "term_missing"
+    assert found.sentence == "A term is missing: one with gravity, link 2." and found.second_hint == "m2*g*l2*c12/2"
+    assert found.hint == "Look again at the terms with gravity, link 2: is each there?"
 
 
 def test_answers_of_other_kinds():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 
@@ -11,7 +12,7 @@ from dhkit.grading.judging.quantities import Index, JudgedQuantity, place_of
 from dhkit.grading.judging.quotients import varying
 from dhkit.grading.judging.truth import Truth
 from dhkit.grading.mistakes.library import FACTORS, capitalize, hint_of
-from dhkit.grading.mistakes.slips import Slip, slip_in
+from dhkit.grading.mistakes.slips import Slip, kind_of_terms, slip_in
 from dhkit.grading.mistakes.wording import diagnosis_of_slip
 from dhkit.grading.report import Diagnosis, entry_name
 from dhkit.symbolic import ExactArm
@@ -44,7 +45,7 @@ def slip_between(truth: Truth, name: str, answer: Element, right: Element) -> Sl
     """Return the slip that turns the truth into an answer, in the student's own rates and angles."""
     own = truth.coordinates.in_own_rates
     slip = slip_in(truth.arm(name), own(answer), own(right))
-    return None if slip is None else Slip(slip.identity, in_own_angles(truth, slip.detail))
+    return None if slip is None else replace(slip, detail=in_own_angles(truth, slip.detail))
 
 
 def in_own_angles(truth: Truth, text: str) -> str:
@@ -126,7 +127,7 @@ def whole_factor(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
 def described(truth: Truth, quantity: JudgedQuantity, index: Index) -> Diagnosis:
     """Return a diagnosis without a mistake, which compares the terms of a wrong entry with the right ones."""
     finding, right = quantity.findings[index], quantity.right(index)
-    entry = entry_name(quantity.name, index)
+    entry, terms = entry_name(quantity.name, index), ""
     element = finding.answer.element() if finding.answer is not None else None
     if element is None:
         text = finding.statement
@@ -134,12 +135,13 @@ def described(truth: Truth, quantity: JudgedQuantity, index: Index) -> Diagnosis
         text = f"{len(element)} terms, where {len(right)} are right"
     else:
         own = truth.coordinates.in_own_rates
-        text = in_own_angles(truth, compare_terms(truth.arm(quantity.name), own(element), own(right)))
-    return Diagnosis(None, capitalize(f"{text}."), entry, (entry,), hint_of(None))
+        text, terms = compare_terms(truth.arm(quantity.name), own(element), own(right))
+    sentence = capitalize(f"{in_own_angles(truth, text)}.")
+    return Diagnosis(None, sentence, entry, (entry,), hint_of(None), second_hint=in_own_angles(truth, terms))
 
 
-def compare_terms(arm: ExactArm, answer: Element, truth: Element) -> str:
-    """Return in words how the terms of an answer differ from those of the truth.
+def compare_terms(arm: ExactArm, answer: Element, truth: Element) -> tuple[str, str]:
+    """Return in words how the terms of an answer differ from those of the truth, and those that are missing.
 
     Parameters
     ----------
@@ -164,8 +166,16 @@ def compare_terms(arm: ExactArm, answer: Element, truth: Element) -> str:
             if m in theirs and theirs[m] != c
         ],
     }
-    parts = []
-    for kind, terms in differences.items():
-        more = f" and {len(terms) - MAX_NAMED_TERMS} more" if len(terms) > MAX_NAMED_TERMS else ""
-        parts += [f"{kind}: {', '.join(terms[:MAX_NAMED_TERMS])}{more}"] if terms else []
-    return "; ".join(parts) or "the terms are the same"
+    listed = {kind: _few(terms) for kind, terms in differences.items() if terms}
+    missing = differences["missing"]
+    parts = [f"{kind}: {terms}" for kind, terms in listed.items() if kind != "missing"]
+    if missing:
+        kind = kind_of_terms(arm, ring.from_terms({m: c for m, c in ours.items() if m not in theirs}))
+        count = f"{len(missing)} terms are missing" if len(missing) > 1 else "a term is missing"
+        parts.insert(0, f"{count}, with {kind}" if kind else count)
+    return "; ".join(parts) or "the terms are the same", listed.get("missing", "")
+
+
+def _few(terms: Sequence[str]) -> str:
+    more = f" and {len(terms) - MAX_NAMED_TERMS} more" if len(terms) > MAX_NAMED_TERMS else ""
+    return ", ".join(terms[:MAX_NAMED_TERMS]) + more

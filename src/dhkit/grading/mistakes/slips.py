@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
+from dhkit.expressions import ZERO
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.exact.compact import shortened_alike
@@ -31,10 +32,13 @@ class Slip:
         Identity of the mistake.
     detail
         The term, and the term in its place.
+    kind
+        Of missing terms, of what kind they are and of which links, in words; empty for others.
     """
 
     identity: str
     detail: str
+    kind: str = ""
 
 
 def slip_in(arm: ExactArm, answer: Element, truth: Element) -> Slip | None:
@@ -48,7 +52,40 @@ def slip_in(arm: ExactArm, answer: Element, truth: Element) -> Slip | None:
         Different elements of the ring.
     """
     short_truth, short_answer, _ = shortened_alike(arm, [truth, answer, answer - truth])
-    return _slip(short_answer, short_truth) or _slip(answer, truth)
+    slip = _slip(short_answer, short_truth) or _slip(answer, truth)
+    if slip is None or slip.identity != "term_missing":
+        return slip
+    return replace(slip, kind=kind_of_terms(arm, truth - answer))
+
+
+def kind_of_terms(arm: ExactArm, terms: Element) -> str:
+    """Return in words of what kind terms are, and of which links: gravity, rates and accelerations, by parameters."""
+    description = arm.description
+    gravity = {name for component in description.gravity for name in component.symbols}
+    bodies = [(i, body) for i, joint in enumerate(description.joints, start=1) for body in joint.bodies]
+    used = [g for k, g in enumerate(terms.ring.generators) if any(monomial[k] for monomial in terms.terms)]
+    constants = {name for g in used if g.kind == "constant" for name in {g.text, *(g.meaning or ZERO).symbols}}
+    words = ["gravity"] if constants & gravity else []
+    for kind, called in (("acceleration", "acceleration"), ("rate", "rate")):
+        joints = sorted(g.joint + 1 for g in used if g.kind == kind)
+        words += [f"the {_listed(called, joints)}"] if joints else []
+    by_mass = {i for i, body in bodies if constants & set(body.mass.symbols)}
+    # Inertias may be written with lengths, which other links have too.
+    by_inertia = {i for i, body in bodies if any(constants & set(x.symbols) for x in vars(body.inertia).values())}
+    concerned = sorted(by_mass or by_inertia)
+    words += [_listed("link", concerned)] if concerned else []
+    return ", ".join(words)
+
+
+def _listed(called: str, numbers: Sequence[int]) -> str:
+    """Return link 2, links 1 and 3, rate of joint 1, rates of joints 1 and 2."""
+    plural = "s" * (len(numbers) > 1)
+    named = (
+        " and ".join(map(str, numbers))
+        if len(numbers) < 3
+        else f"{', '.join(map(str, numbers[:-1]))} and {numbers[-1]}"
+    )
+    return f"{called}{plural} {named}" if called == "link" else f"{called}{plural} of joint{plural} {named}"
 
 
 def _slip(answer: Element, truth: Element) -> Slip | None:

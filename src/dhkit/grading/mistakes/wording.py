@@ -76,8 +76,14 @@ def _clause(variant: Variant, of_C: bool) -> str:
 
 def diagnosis_of_slip(quantity: JudgedQuantity, index: Index, slip: Slip) -> Diagnosis:
     """Return the diagnosis of a slip in one entry."""
-    entry, sentence = entry_name(quantity.name, index), sentence_of(slip.identity, detail=slip.detail)
-    return Diagnosis(slip.identity, sentence, entry, (entry,), hint_of(slip.identity))
+    entry = entry_name(quantity.name, index)
+    if slip.identity != "term_missing":
+        sentence = sentence_of(slip.identity, detail=slip.detail)
+        return Diagnosis(slip.identity, sentence, entry, (entry,), hint_of(slip.identity))
+    # The term itself would be the answer: what is said first is where it comes from.
+    sentence = sentence_of(slip.identity, detail=f"one with {slip.kind}" if slip.kind else "")
+    hint = f"Look again at the terms with {slip.kind}: is each there?" if slip.kind else hint_of(slip.identity)
+    return Diagnosis(slip.identity, sentence, entry, (entry,), hint, second_hint=slip.detail)
 
 
 def diagnosis_of_whole(quantity: JudgedQuantity, identity: str) -> Diagnosis:

@@ -117,6 +117,8 @@ def diagnosis_lines(report: GradeReport, entry: Entry | None = None) -> Iterator
     for one in report.diagnosis:
         if entry is None or entry.name in one.entries:
             yield f"{plain(one.place)}: {plain(one.sentence)}" if one.place else plain(one.sentence)
+            if one.second_hint:
+                yield f"second hint: {plain(one.second_hint)}"
 
 
 def provenance(report: GradeReport) -> str:
