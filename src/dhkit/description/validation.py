@@ -295,7 +295,7 @@ def _check_mesh(mesh: Mesh, where: str, value: Value, description: RobotData) ->
         check_mesh_file(file)
     except MeshFileError as error:
         fault = "is not there" if not file.exists() else f"is no mesh that can be read ({error.reason})"
-        yield f"{where}.mesh: {mesh.path!r} {fault}; the link is drawn from the table"
+        yield f"{where}.mesh: {mesh.path!r} {fault}; the link is drawn without it"
 
 
 def _check_configurations(description: RobotData, value: Value) -> Iterator[str]:
