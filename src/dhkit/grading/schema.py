@@ -15,6 +15,7 @@ from dhkit.grading.answers.sheet import (
     CHOICES,
     COLUMNS,
     FORMAT,
+    JACOBIAN_ROWS,
     KEYS,
     MAX_BRANCHES,
     MAX_NAMES,
@@ -112,6 +113,13 @@ def _properties() -> Schema:
         "values": _switch(
             "Whether answers in numbers pass that are right at the robot file's values; true if not given."
         ),
+        "J_rows": {
+            "type": "array",
+            "description": "Rows of the Jacobian that are asked for, in the answer's order; all six unless given, or "
+            "those that a planar arm has.",
+            "items": {"enum": list(JACOBIAN_ROWS)},
+            "uniqueItems": True,
+        },
         "convention": _choice(
             "convention", "Whose Denavit-Hartenberg table it is: the standard one, or Craig's modified."
         ),

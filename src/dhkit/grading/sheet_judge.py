@@ -182,22 +182,21 @@ class _SheetJudge:
         return AnswerError(f"{self.sheet.file}: answer: {error}")
 
     def _jacobian(self, value: object, names: QuantityNames, matrix_of: _SheetMatrices) -> tuple[Given, ...]:
-        """Return the entries of a Jacobian: of six rows, or of the two or three rows that an arm's motion has.
+        """Return the entries of a Jacobian: of the task's rows, of six, or of those that an arm's motion has.
 
         Of an arm in a plane these are the two positions in it, with the angle about its normal or without; of others
         three rows are those of the position.
         """
-        try:
-            return given_quantity("J", value, shape_of("J", names.n), self.vocabulary, names, matrix_of.without("J"))
-        except AnswerError as error:
-            for rows in self._rows_of_few():
-                try:
-                    size = (len(rows), names.n)
-                    given = given_quantity("J", value, size, self.vocabulary, names, matrix_of.without("J"))
-                except AnswerError:
-                    continue
-                return tuple(replace(entry, index=(rows[entry.index[0]], entry.index[1])) for entry in given)
-            raise error from None
+        asked, errors = self.sheet.task.jacobian_rows, list[AnswerError]()
+        for rows in [asked] if asked else [(0, 1, 2, 3, 4, 5), *self._rows_of_few()]:
+            size = (len(rows), names.n)
+            try:
+                given = given_quantity("J", value, size, self.vocabulary, names, matrix_of.without("J"))
+            except AnswerError as error:
+                errors.append(error)
+                continue
+            return tuple(replace(entry, index=(rows[entry.index[0]], entry.index[1])) for entry in given)
+        raise errors[0]
 
     def _rows_of_few(self) -> list[tuple[int, ...]]:
         """Return the rows, from 0, that a Jacobian of fewer than six has."""

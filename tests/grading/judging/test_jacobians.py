@@ -127,3 +127,17 @@ def test_three_rows_of_other_arms_are_the_position():
 def test_other_numbers_of_rows_are_refused():
     with pytest.raises(AnswerError, match="J: found a list of 4; expected a list of 6"):
         Arm.load("planar2r").grade({"J": [["1", "1"]] * 4})
+
+
+def test_a_task_says_which_rows_are_asked_for():
+    arm = Arm.load("planar2r")
+    rows = [["1", "1"], ["-l1*s1 - l2*s12", "-l2*s12"], ["l1*c1 + l2*c12", "l2*c12"]]
+    task = {"J_rows": ["wz", "vx", "vy"]}
+    report = arm.grade({"J": rows}, task=task)
+    assert report.verdict is Verdict.CORRECT and report.entries[0].name == "J61"
+    assert arm.grade({"J": [rows[1], rows[0], rows[2]]}, task=task).verdict is Verdict.WRONG
+    with pytest.raises(AnswerError, match="expected a list of 3"):
+        arm.grade({"J": rows[:2]}, task=task)
+    for wrong in (["vx", "vx"], ["phi"], "vx"):
+        with pytest.raises(AnswerError, match=r"task\.J_rows"):
+            arm.grade({"J": rows}, task={"J_rows": wrong})

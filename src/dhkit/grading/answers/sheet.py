@@ -46,7 +46,7 @@ KEYS = {
     "sheet": ("format", "robot", "student", "names", "task", "answer", "rubric"),
     "task file": ("format", "robot", "names", "task", "rubric"),
     "names": ("q", "qd", "qdd", "angles", "parameters"),
-    "task": ("friction", "total_derivative", "asked", "proof", "frames", "zero", "values"),
+    "task": ("friction", "total_derivative", "asked", "proof", "frames", "zero", "values", "J_rows"),
     "dh": ("convention", "rows"),
     "ik": ("branches", "steps"),
     "step": ("joint", "equation", "solution"),
@@ -64,6 +64,9 @@ CHOICES = {
 
 COLUMNS = ("theta", "d", "a", "alpha")
 """Entries of a table's row."""
+
+JACOBIAN_ROWS = ("vx", "vy", "vz", "wx", "wy", "wz")
+"""Names of the rows of the Jacobian: linear velocities along the world's axes, then angular ones about them."""
 
 QUANTITY = re.compile(r"M|C|h|g|tau|K|V|L|T|J|dh|ik|A[1-9][0-9]?")
 """Names of quantities."""
@@ -289,6 +292,10 @@ def _requirements(checker: _Checker, data: Mapping[str, object]) -> Requirements
     for name in asked:
         if not QUANTITY.fullmatch(name):
             raise checker.error("task.asked", name, "M, C, h, g, tau, K, V, L, A1 ..., T, J, dh or ik")
+    rows = checker.texts(data.get("J_rows", []), "task.J_rows", 'a list of rows such as ["vx", "vy", "wz"]')
+    for k, row in enumerate(rows):
+        if row not in JACOBIAN_ROWS or row in rows[:k]:
+            raise checker.error("task.J_rows", row, f"each once of {', '.join(JACOBIAN_ROWS)}")
     return Requirements(
         checker.switch(data, "friction", "task."),
         checker.switch(data, "total_derivative", "task."),
@@ -297,6 +304,7 @@ def _requirements(checker: _Checker, data: Mapping[str, object]) -> Requirements
         checker.choice(data, "frames", "task.") == "given",
         checker.choice(data, "zero", "task.") == "given",
         "values" in data and not checker.switch(data, "values", "task."),
+        tuple(map(JACOBIAN_ROWS.index, rows)),
     )
 
 

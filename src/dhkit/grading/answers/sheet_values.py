@@ -89,6 +89,8 @@ class Requirements:
         Whether a table's joint variables must be zero in the file's own zero pose (``zero = "given"``).
     in_letters
         Whether answers in numbers do not pass, though they are right at the file's values (``values = false``).
+    jacobian_rows
+        Rows of the Jacobian that are asked for, from 0, in their order (``J_rows``); empty if the answer decides.
     """
 
     friction: bool = False
@@ -98,6 +100,7 @@ class Requirements:
     frames_given: bool = False
     zero_given: bool = False
     in_letters: bool = False
+    jacobian_rows: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
