@@ -11,7 +11,7 @@ from dhkit.description.robot import description_of, takes_robot
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.objects import entries_of
 from dhkit.grading.answers.sheet import quantity_names, read_sheet, sheet_of
-from dhkit.grading.answers.sheet_values import AnswerSheet, Names
+from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Names
 from dhkit.grading.answers.sources import SHEET_SUFFIXES, read_source
 from dhkit.grading.judging.truth import truth_of
 from dhkit.grading.mistakes.diagnosis import variants_of
@@ -73,7 +73,7 @@ def grade(
     else:
         if given is None:
             raise AnswerError(f"{path}: a program does not say which robot it is about; give one (--robot)")
-        sheet = read_source(path, given)
+        sheet = read_source(path, given, NO_NAMES if task is None else task.names)
     description = given or robot_of(sheet, path.parent)
     if task is not None:
         sheet = replace(sheet, task=task.task, names=_merge_names(sheet.names, task.names))

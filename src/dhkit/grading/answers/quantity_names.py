@@ -9,6 +9,7 @@ from functools import cached_property
 
 from dhkit.description import Description
 from dhkit.grading.answers.sheet import ALIASES, quantity_names, shape_of
+from dhkit.grading.answers.sheet_values import NO_NAMES, Names
 from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
 
 MAX_NAME = 40
@@ -46,12 +47,14 @@ class QuantityNames:
     ----------
     description
         The robot. Its parameters are never quantities or entries, where a formula and not a matrix is assigned.
+    names
+        The student's, or the task's, own names of the joint variables.
     """
 
-    def __init__(self, description: Description) -> None:
+    def __init__(self, description: Description, names: Names = NO_NAMES) -> None:
         self.n = description.n
         self.parameters: Mapping[str, str] = {plain_name(name): name for name in description.parameters}
-        self.vocabulary = Vocabulary(description)
+        self.vocabulary = Vocabulary(description, q=names.q, qd=names.qd, qdd=names.qdd)
 
     @cached_property
     def whole(self) -> frozenset[str]:

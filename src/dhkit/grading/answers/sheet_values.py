@@ -69,6 +69,9 @@ class Names:
     lenient: bool = False
 
 
+NO_NAMES = Names()
+
+
 @dataclass(frozen=True)
 class Requirements:
     """What the instructor asks for, where there is a choice: the table ``[task]``.

@@ -10,7 +10,7 @@ from typing import TypeAlias
 from dhkit.description import Description
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.sheet import read_text
-from dhkit.grading.answers.sheet_values import AnswerSheet
+from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Names
 
 MAX_CHARACTERS = 1_000_000
 """Largest length of code or LaTeX, in characters; a notebook may be longer, since its figures do not count."""
@@ -18,11 +18,11 @@ MAX_CHARACTERS = 1_000_000
 LineName: TypeAlias = Callable[[int], str]
 """Function from a line, from 1, to its name in messages."""
 
-Reader: TypeAlias = Callable[[str, str, LineName, Description], AnswerSheet]
-"""Function from a text, the file's name, the names of lines, and the robot to the answers."""
+Reader: TypeAlias = Callable[[str, str, LineName, Description, Names], AnswerSheet]
+"""Function from a text, the file's name, the names of lines, the robot and the task's names to the answers."""
 
 
-def read_source(path: Path, description: Description) -> AnswerSheet:
+def read_source(path: Path, description: Description, names: Names = NO_NAMES) -> AnswerSheet:
     """Return the answers that a file assigns: ``M = ...``, ``M11 = ...``, ``M(1,2) = ...``, and what they are made of.
 
     Parameters
@@ -31,6 +31,8 @@ def read_source(path: Path, description: Description) -> AnswerSheet:
         A file that ends in .py, .m, .tex or .ipynb.
     description
         The robot: its parameters and joint variables are never answers.
+    names
+        The task's names of the joint variables.
 
     Returns
     -------
@@ -55,31 +57,31 @@ def read_source(path: Path, description: Description) -> AnswerSheet:
         text, suffix, line_name, notes = notebook.code, notebook.suffix, notebook.line_name, notebook.notes
     if len(text) > MAX_CHARACTERS:
         raise AnswerError(f"{path}: more than {MAX_CHARACTERS} characters of code or LaTeX")
-    sheet = LANGUAGES[suffix](text, str(path), line_name, description)
+    sheet = LANGUAGES[suffix](text, str(path), line_name, description, names)
     return replace(sheet, notes=(*notes, *sheet.notes))
 
 
 # The readers are imported when they are used: most sheets are TOML, and `dhkit grade` must answer at once.
 
 
-def _python(text: str, file: str, line_name: LineName, description: Description) -> AnswerSheet:
+def _python(text: str, file: str, line_name: LineName, description: Description, names: Names) -> AnswerSheet:
     from dhkit.grading.answers.programs.program_answers import answers_of
     from dhkit.grading.answers.programs.python_program import python_program
 
-    return answers_of(python_program(text, file, line_name, description.n), description, file)
+    return answers_of(python_program(text, file, line_name, description.n), description, file, names)
 
 
-def _matlab(text: str, file: str, line_name: LineName, description: Description) -> AnswerSheet:
+def _matlab(text: str, file: str, line_name: LineName, description: Description, names: Names) -> AnswerSheet:
     from dhkit.grading.answers.programs.matlab_program import matlab_program
     from dhkit.grading.answers.programs.program_answers import answers_of
 
-    return answers_of(matlab_program(text, file, line_name), description, file)
+    return answers_of(matlab_program(text, file, line_name), description, file, names)
 
 
-def _latex(text: str, file: str, line_name: LineName, description: Description) -> AnswerSheet:
+def _latex(text: str, file: str, line_name: LineName, description: Description, names: Names) -> AnswerSheet:
     from dhkit.grading.answers.documents.latex_document import latex_answers
 
-    return latex_answers(text, file, line_name, description)
+    return latex_answers(text, file, line_name, description, names)
 
 
 LANGUAGES: Mapping[str, Reader] = {".py": _python, ".m": _matlab, ".tex": _latex}

@@ -14,7 +14,7 @@ from dhkit.grading.answers.latex import latex_tokens
 from dhkit.grading.answers.programs.name_resolution import NameResolver, is_same_number
 from dhkit.grading.answers.quantity_names import Target
 from dhkit.grading.answers.sheet import source_sheet
-from dhkit.grading.answers.sheet_values import AnswerSheet, Chain, Entries, Refusal
+from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Chain, Entries, Names, Refusal
 from dhkit.grading.answers.tokens import to_ascii
 from dhkit.grading.answers.vocabulary import plain_name
 
@@ -33,7 +33,9 @@ NUMBER_WITH_UNIT = re.compile(
 ENERGIES = ("K", "V", "L")
 
 
-def latex_answers(text: str, file: str, line_name: Callable[[int], str], description: Description) -> AnswerSheet:
+def latex_answers(
+    text: str, file: str, line_name: Callable[[int], str], description: Description, names: Names = NO_NAMES
+) -> AnswerSheet:
     """Return the answers of a document.
 
     Parameters
@@ -46,6 +48,8 @@ def latex_answers(text: str, file: str, line_name: Callable[[int], str], descrip
         How messages name a line, which counts from 1.
     description
         The robot.
+    names
+        The task's names of the joint variables.
 
     Raises
     ------
@@ -56,15 +60,19 @@ def latex_answers(text: str, file: str, line_name: Callable[[int], str], descrip
         statements = list(document_statements(text))
     except AnswerError as error:
         raise AnswerError(f"{file}: {error}") from None
-    return _DocumentAnswers(statements, line_name, description).sheet(file)
+    return _DocumentAnswers(statements, line_name, description, names).sheet(file)
 
 
 class _DocumentAnswers:
     def __init__(
-        self, statements: Sequence[Statement], line_name: Callable[[int], str], description: Description
+        self,
+        statements: Sequence[Statement],
+        line_name: Callable[[int], str],
+        description: Description,
+        names: Names,
     ) -> None:
         self.line_name = line_name
-        self.names = NameResolver(description)
+        self.names = NameResolver(description, names)
         self.quantities = self.names.quantities
         self.left_out: list[str] = []
         self.notes: list[str] = []

@@ -23,6 +23,7 @@ from dhkit.grading.answers.programs.bindings import (
     Use,
 )
 from dhkit.grading.answers.quantity_names import QuantityNames
+from dhkit.grading.answers.sheet_values import NO_NAMES, Names
 from dhkit.grading.answers.tokens import rate_name
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Meaning, plain_name
 
@@ -84,10 +85,12 @@ class NameResolver:
     ----------
     description
         The robot.
+    names
+        The task's names of the joint variables.
     """
 
-    def __init__(self, description: Description) -> None:
-        self.quantities = QuantityNames(description)
+    def __init__(self, description: Description, names: Names = NO_NAMES) -> None:
+        self.quantities = QuantityNames(description, names)
         self.vocabulary = self.quantities.vocabulary
         self.values = description.numbers.values
         self._resolutions: dict[tuple[int, str], Resolution] = {}
@@ -100,7 +103,7 @@ class NameResolver:
     def is_reserved(self, name: str) -> bool:
         """Whether a name belongs to the robot: a parameter, a joint variable in a usual spelling, pi."""
         plain = plain_name(name)
-        is_joint = JOINT_VARIABLE.fullmatch(plain) is not None
+        is_joint = JOINT_VARIABLE.fullmatch(plain) is not None or plain in self.vocabulary.own
         is_state = is_joint and (self.vocabulary.is_state(plain) or self.is_vector(plain))
         return plain == "pi" or self.quantities.is_parameter(name) or is_state
 

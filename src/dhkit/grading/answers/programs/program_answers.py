@@ -22,7 +22,7 @@ from dhkit.grading.answers.programs.definitions import Definition, Definitions, 
 from dhkit.grading.answers.programs.name_resolution import NameResolver, Resolution
 from dhkit.grading.answers.quantity_names import Target
 from dhkit.grading.answers.sheet import source_sheet
-from dhkit.grading.answers.sheet_values import AnswerSheet, Chain, Entries, Refusal
+from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Chain, Entries, Names, Refusal
 
 WRITTEN_BY_DHKIT = {
     "mass_matrix": "M",
@@ -83,21 +83,21 @@ class _Candidate:
         return replace(self, definition=None, problem=problem)
 
 
-def answers_of(program: Program, description: Description, file: str) -> AnswerSheet:
-    """Return the answers of a program.
+def answers_of(program: Program, description: Description, file: str, names: Names = NO_NAMES) -> AnswerSheet:
+    """Return the answers of a program; ``names`` are the task's names of the joint variables.
 
     Raises
     ------
     AnswerError
         It gives none, or answers are made of too many names.
     """
-    return _ProgramAnswers(program, description).sheet(file)
+    return _ProgramAnswers(program, description, names).sheet(file)
 
 
 class _ProgramAnswers:
-    def __init__(self, program: Program, description: Description) -> None:
+    def __init__(self, program: Program, description: Description, names: Names) -> None:
         self.program = program
-        self.names = NameResolver(description)
+        self.names = NameResolver(description, names)
         self.quantities = self.names.quantities
         self.definitions = Definitions(self.names)
         self.left_out = list(program.left_out)
