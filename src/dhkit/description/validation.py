@@ -37,6 +37,8 @@ RESERVED_NAME = re.compile(r"(world|base|tool|dh\d+|link\d+)(_fixed)?")
 """Names of links and fixed joints of our URDFs: a joint of the same name would confuse Pinocchio."""
 CONTROL_CHARACTER = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
 """Characters that XML may not hold or that a terminal would act on."""
+SHAPE_LEFT_OUT = "; this shape is left out"
+"""End of a line of notes on a shape of the file that a description comes from, which the description does not have."""
 COLOR = re.compile(r"#[0-9a-fA-F]{6}")
 
 MAX_TABLE_ANGLE, MAX_LIMIT_ANGLE = math.tau + 1e-9, 2 * math.tau + 1e-9
@@ -93,10 +95,6 @@ def check(description: RobotData) -> tuple[str, ...]:
     warnings += _check_configurations(description, value)
     warnings += shapes_left_out(description.notes)
     return tuple(warnings)
-
-
-SHAPE_LEFT_OUT = "; this shape is left out"
-"""End of a line of notes on a shape of the file that a description comes from, which the description does not have."""
 
 
 def shapes_left_out(notes: str) -> tuple[str, ...]:

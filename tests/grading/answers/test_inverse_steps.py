@@ -157,3 +157,11 @@ def test_how_steps_were_read_is_shown():
 def test_how_branches_were_read_is_shown():
     report = PLANAR.grade(ik={"branches": [[Q1, f"acos({COSINE})"]]})
     assert report.entries[0].read.endswith("; q2 = acos((px^2 + py^2 - l1^2 - l2^2)/(2*l1*l2))")
+
+
+def test_a_step_may_define_the_letters_of_an_earlier_one_anew():
+    report = planar(
+        {"equation": [f"D = {COSINE}", "S = ±sqrt(1 - D^2)"], "solution": "atan2(S, D)"},
+        {"equation": ["S = l2*sin(q2)", "D = l1 + l2*cos(q2)"], "solution": "atan2(py, px) - atan2(S, D)"},
+    )
+    assert report.verdict is Verdict.CORRECT, str(report)

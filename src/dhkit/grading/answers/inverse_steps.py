@@ -86,9 +86,10 @@ def given_steps(steps: Sequence[InverseStep], vocabulary: Vocabulary) -> list[Gi
     defines the length r. A name with two signs, ``S = ±sqrt(1 - D^2)``, holds for its own step.
     """
     given: list[GivenStep] = []
+    defined: set[str] = set()
     for step in steps:
         text = "; ".join([*step.equations, *(_titled(step.joint, formula) for formula in step.solutions)])
-        reading = _Reading(step.joint, vocabulary)
+        reading = _Reading(step.joint, vocabulary, frozenset(defined))
         try:
             if step.joint - 1 in [other.joint for other in given if not other.error]:
                 raise AnswerError(f"joint {step.joint} has a step already; expected all of its formulas in one")
@@ -97,6 +98,7 @@ def given_steps(steps: Sequence[InverseStep], vocabulary: Vocabulary) -> list[Gi
             hint = "; a quantity of your own is defined by an equation, D = ..." if "unknown name" in str(error) else ""
             given.append(GivenStep(step.joint - 1, text, error=f"{error}{hint}"))
         reading.forget_signs()
+        defined |= reading.defined
     return given
 
 
@@ -113,11 +115,15 @@ class _Reading:
         The joint that the step finds, from 1.
     vocabulary
         What names mean; definitions are added to it.
+    earlier
+        Names that earlier steps have defined: this one may define them anew.
     """
 
-    def __init__(self, joint: int, vocabulary: Vocabulary) -> None:
+    def __init__(self, joint: int, vocabulary: Vocabulary, earlier: frozenset[str]) -> None:
         self.joint = joint
         self.vocabulary = vocabulary
+        self.earlier = earlier
+        self.defined: set[str] = set()
         self.has_solutions = False
         self.signed: dict[str, dict[str, Meaning]] = {}
         """Names that are defined with two signs, and what they stand for with each."""
@@ -153,13 +159,16 @@ class _Reading:
 
     def _read(self, text: str, sign: str = "+") -> Tree:
         """Return the tree of a formula, with ± as a sign."""
-        for name, meanings in self.signed.items():
-            self.vocabulary.redefine(name, meanings[sign])
+        self._take_sign(sign)
         return _without_squared_roots(read_answer(_with_sign(text, sign), self.vocabulary))
 
-    def _meaning(self, text: str, sign: str) -> Meaning:
+    def _take_sign(self, sign: str) -> None:
+        """Let names with two signs stand for what they are with one of them."""
         for name, meanings in self.signed.items():
             self.vocabulary.redefine(name, meanings[sign])
+
+    def _meaning(self, text: str, sign: str) -> Meaning:
+        self._take_sign(sign)
         return meaning_of(_with_sign(text, sign), self.vocabulary)
 
     def _keep_function(self, left: str, right: str) -> None:
@@ -223,6 +232,7 @@ class _Reading:
         if plus != minus:
             self.signed[name] = {"+": plus, "-": minus}
         self.vocabulary.redefine(name, plus)
+        self.defined.add(plain_name(name))
 
     def _new_name(self, side: str) -> str:
         """Return the name that a side consists of, if the side defines it; else nothing.
@@ -239,7 +249,8 @@ class _Reading:
         name = tokens[0].text
         if name in FUNCTION_NAMES and len(name) > 1:
             return ""
-        if not self.vocabulary.knows(name) or self.vocabulary.is_alias(name):
+        is_old = plain_name(name) in self.earlier - self.defined
+        if is_old or not self.vocabulary.knows(name) or self.vocabulary.is_alias(name):
             return name
         is_free = not self.vocabulary.is_own(plain_name(name)) and self._is_no_joint(name)
         return name if is_free else ""

@@ -155,6 +155,7 @@ class Vocabulary:
     def redefine(self, name: str, meaning: Meaning) -> None:
         """Give a name a meaning in place of any other."""
         self.aliases.discard(plain_name(name))
+        self.refused.pop(plain_name(name), None)
         self.own[plain_name(name)] = meaning
         self._meanings.clear()
 

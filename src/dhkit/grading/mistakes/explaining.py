@@ -72,7 +72,7 @@ def explain(
     diagnoses += plain_causes.weights_on_vertical_axes(truth, left, following)
     diagnoses += plain_causes.one_entry_of_C(truth, left, following)
     _move(left, diagnoses, plain_causes.zeros(truth, left, following))
-    _move(left, diagnoses, plain_causes.without_rates(truth, left, following))
+    _move(left, diagnoses, plain_causes.without_rates(left, following))
     _move(left, diagnoses, plain_causes.in_other_units(truth, left))
     # A mistake that explains only answers which follow from wrong ones is not the sheet's first error.
     for allowed in (lambda names, rarity: rarity <= MAX_LIKELY_RARITY, lambda names, rarity: len(names) > 1):

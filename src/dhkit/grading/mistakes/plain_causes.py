@@ -110,11 +110,8 @@ def zeros(truth: Truth, left: Mapping[str, JudgedQuantity], following: set[str])
     return diagnoses
 
 
-def without_rates(
-    truth: Truth, left: Mapping[str, JudgedQuantity], following: set[str]
-) -> dict[tuple[str, ...], Diagnosis]:
+def without_rates(left: Mapping[str, JudgedQuantity], following: set[str]) -> dict[tuple[str, ...], Diagnosis]:
     """Find C and h without any rate, which are not zero."""
-    del truth
     diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     for name in ("C", "h"):
         quantity = left.get(name)
