@@ -218,7 +218,7 @@ def test_parallel_axes_leave_the_height_of_the_base_open():
 def test_another_zero_is_said():
     rows = with_entries(own_table(library_robot("puma560")), theta2="q2 + pi/2", theta3="q3 - 30*deg")
     judgement = judge("puma560", rows)
-    assert judgement.verdict is UNDECIDED
+    assert slipped(judgement)
     assert frames(judgement) == (
         "q2 is counted from another zero: there the file's q2 is 90 degrees",
         "q3 is counted from another zero: there the file's q3 is -30 degrees",
@@ -232,18 +232,18 @@ def test_another_zero_between_parallel_axes():
     """The slide's zero, and not the height of the hand: frame 4 stays where it is."""
     rows = with_entries(own_table(library_robot("cobra600")), d3="q3 + 0.1")
     judgement = judge("cobra600", rows)
-    assert judgement.verdict is UNDECIDED
+    assert slipped(judgement)
     assert "q3 is counted from another zero: there the file's q3 is 0.1 m" in frames(judgement)
     assert len(frames(judgement)) <= 2
 
 
 @pytest.mark.parametrize("name", ["puma560", "stanford", "ur5", "al5d", "panda"])
-def test_other_frames_in_the_other_convention(name):
+def test_another_zero_in_the_other_convention(name):
     description = library_robot(name)
     rows = other_table(description)
     rows[1][0] = f"{rows[1][0]} + pi/2"
     judgement = judge(description, rows, other(description.convention))
-    assert judgement.verdict is UNDECIDED
+    assert slipped(judgement)
     assert frames(judgement) == ("q2 is counted from another zero: there the file's q2 is 90 degrees",)
 
 
@@ -318,6 +318,27 @@ def test_a_missing_offset_is_another_zero_and_is_named_too(theta, mistake):
     assert mistakes(judgement) == [(mistake, 1)]
     assert slipped(judgement)
     assert len(frames(judgement)) == 1
+
+
+@pytest.mark.parametrize("theta", ["q2", "q2 + pi/2", "q2 - 90", "q2 + 1", "q2 + 0.3 - pi/2", "q2 + pi/2 - 1/3"])
+def test_another_zero_has_one_verdict_one_note_and_one_score_whatever_the_constant(theta):
+    description = library_robot("kuka_kr30_3")
+    for sensed in (theta, f"-({theta}) + 2*q2 + 0.1"):
+        judgement = judge("kuka_kr30_3", with_entries(own_table(description), theta2=sensed))
+        assert verdicts(judgement) == (CORRECT, WRONG, *[CORRECT] * (description.n - 2))
+        assert judgement.notes == (Note(NoteKind.RIGHT_IN_OTHER_FRAMES, "dh"),)
+        assert judgement.diagnosis[-1].mistake == "other_frames"
+        assert judgement.diagnosis[-1].entries == ("dh2",)
+
+
+def test_another_zero_of_several_joints_and_of_a_prismatic_one():
+    description = library_robot("stanford")
+    own = own_table(description)
+    moved = with_entries(own, theta1="q1 + 0.2", theta2=f"{own[1][0]} - 0.7", d3=f"{own[2][1]} + 1/8", theta6="q6 + 1")
+    judgement = judge(description, moved)
+    assert verdicts(judgement) == (WRONG, WRONG, WRONG, CORRECT, CORRECT, WRONG)
+    assert slipped(judgement)
+    assert judgement.moves_zero
 
 
 def test_rows_exchanged():

@@ -37,7 +37,8 @@ class TableJudgement(KinematicJudgement):
     """Judgement of a table, with one entry for each row.
 
     CORRECT is proved: A_i equals the file's. UNDECIDED: A_i agrees in doubles but is outside the exact ring, or the
-    whole table is the same arm in other frames, which is decided numerically.
+    whole table is the same arm in other frames, which is decided numerically. A table that has the file's frames and
+    counts joints from another zero is WRONG, whatever the constants, and a note says that it is the same arm.
 
     Attributes
     ----------
@@ -111,7 +112,7 @@ def _judge(table: TableRows, task: Requirements) -> TableJudgement:
     overlay = _overlay(table)
     # Without changes all frames are the file's to 1e-9: the numbers that are wrong by less belong to another arm.
     if overlay is not None and overlay.changes:
-        return _judge_in_other_frames(rows, wrong, mistakes, overlay, task, notes, at_values)
+        return _judge_in_other_frames(table, rows, wrong, mistakes, overlay, task, notes, at_values)
     diagnosis = tuple(mistake.diagnosis() for mistake in mistakes)
     if _is_of_other_convention(table):
         other, given = other_convention(table.convention).value, table.convention.value
@@ -121,6 +122,7 @@ def _judge(table: TableRows, task: Requirements) -> TableJudgement:
 
 
 def _judge_in_other_frames(
+    table: TableRows,
     rows: Sequence[JudgedRow],
     wrong: Sequence[int],
     mistakes: tuple[RowMistake, ...],
@@ -129,26 +131,44 @@ def _judge_in_other_frames(
     notes: tuple[Note, ...],
     at_values: Mapping[str, float],
 ) -> TableJudgement:
-    """Judge a table that is the same arm in other frames: a choice of frames, or a single slip.
+    """Judge a table that is the same arm in other frames.
 
-    One slip is likelier than a choice of frames that differs in one entry alone; several slips are a choice.
+    It is wrong if it has the file's frames with another zero, whatever the constants, or if a single slip explains it:
+    a slip is likelier than a choice of frames that differs in one entry alone. Otherwise the frames are a choice.
     """
-    slips = mistakes if len(mistakes) == 1 and mistakes[0].is_specific else ()
+    moves_zeros_only = all(_moves_zero_only(table, i) for i in wrong)
+    is_slip = len(mistakes) == 1 and mistakes[0].is_specific
+    named = tuple(mistake.diagnosis() for mistake in mistakes if mistake.is_specific)
     refusal = _refusal(overlay, task)
     rows = list(rows)
     for i in wrong:
         rows[i] = (
             replace(rows[i], statement=rows[i].statement + refusal)
-            if slips or refusal
+            if moves_zeros_only or is_slip or refusal
             else replace(rows[i], verdict=Verdict.UNDECIDED, statement="the same arm in other frames, numerically")
         )
     entries = _entries(rows)
-    if slips:
-        diagnosis = tuple(slip.diagnosis() for slip in slips)
+    other_frames = _diagnosis_of_table("other_frames", entries, "; ".join(map(str, overlay.changes)))
+    diagnosis: tuple[Diagnosis, ...] = (other_frames,)
+    if moves_zeros_only:
+        diagnosis = (*named, other_frames)
+    elif is_slip:
+        diagnosis = named
+    if moves_zeros_only or is_slip:
         notes = (*notes, Note(NoteKind.RIGHT_IN_OTHER_FRAMES, "dh"))
-    else:
-        diagnosis = (_diagnosis_of_table("other_frames", entries, "; ".join(map(str, overlay.changes))),)
     return TableJudgement(entries, diagnosis, notes, at_values, overlay.changes, overlay.moves_zero)
+
+
+def _moves_zero_only(table: TableRows, i: int) -> bool:
+    """Whether row i, from 0, differs from the file's only by a constant added to its joint variable."""
+    own_column = COLUMNS.index("theta" if table.description.kinds[i] == "R" else "d")
+    if not all(table.equal(i, k, truth) for k, truth in enumerate(table.reference[i]) if k != own_column):
+        return False
+    entry = table.answer.entries[i][own_column]
+    if entry is None:
+        return False
+    difference = entry - table.reference[i][own_column]
+    return not any(f"q{j + 1}" in difference.symbols for j in range(table.n))
 
 
 def _refusal(overlay: Overlay, task: Requirements) -> str:
