@@ -106,3 +106,21 @@ def test_angles_of_half_a_turn_less_a_rounded_right_angle_are_designed(tmp_path)
     file.write_text(text.replace('"1.5707963267948966', '"1.570796326589793'))
     assert "closed form, 8 branches" in str(Arm.load(file, as_designed=True).family)
     assert "as_designed=True (--as-designed)" in str(Arm.load(file).family)
+
+
+def test_a_smaller_table_as_designed_is_recommended(tmp_path):
+    file = tmp_path / "rounded.urdf"
+    advice = "as_designed=True (--as-designed) gives a smaller table"
+    for name in robots():
+        if library_robot(name).n < 2:
+            continue
+        file.write_text(with_rounded_angles(asset(f"urdf/{name}.urdf").read_text(), 3))
+        written = extract_dh(file)
+        designed = extract_dh(file, as_designed=True)
+
+        def lengths(extraction):
+            numbers = extraction.description.numbers
+            return np.count_nonzero(np.concatenate([numbers.a, numbers.d]))
+
+        assert any(advice in note for note in written.notes) == (lengths(designed) < lengths(written)), name
+        assert not any(advice in note for note in designed.notes)

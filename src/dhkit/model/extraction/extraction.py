@@ -16,11 +16,13 @@ from dhkit.description.table import DHTable
 from dhkit.description.validation import MAX_JOINTS, MAX_SHAPES, SHAPE_LEFT_OUT
 from dhkit.display import html_block, html_lines, html_table, repr_line
 from dhkit.errors import DhkitError, ModelError
+from dhkit.model.extraction.axes import Axes
 from dhkit.model.extraction.draft import UNROUNDED, Draft, Rounding, allowed_name
 from dhkit.model.extraction.residual import Original, Residual
 from dhkit.model.extraction.table import Table, chain_axes, nearly_parallel, tidiest_table, with_parallel_axes
 from dhkit.model.mesh_paths import MeshFinder
-from dhkit.model.urdf_chain import Chain, Side, only_tip, read_chain
+from dhkit.model.urdf_chain import Chain, Side, chain_of, only_tip, read_chain
+from dhkit.model.urdf_reader import read_urdf
 
 DECIMALS = (9, 10, 11, 12, 13)
 """Decimals that numbers are rounded to, the coarsest first."""
@@ -32,6 +34,8 @@ MAX_LISTED_MESHES = 5
 """Largest number of omitted meshes that are named one by one."""
 MAX_NOTES_LENGTH = 20_000
 """Characters of notes that a robot file holds."""
+LENGTH_RESOLUTION = 1e-9
+"""Lengths of a table up to this, m, count as 0 where two tables are compared; tables are written to this decimal."""
 MAX_TABLE_ERROR = 1e-6
 """Largest error of a table, as a share of the arm's size: axis tilts below the resolution of doubles give 3e-8."""
 
@@ -161,6 +165,9 @@ def extracted(
         notes.append(f"read as designed: {len(changes)} numbers; the file as written differs by {residual}")
     else:
         notes.append(f"differs from the file by {residual}")
+        lengths = np.concatenate([description.numbers.a, description.numbers.d])
+        if recommendation := _smaller_as_designed(chain, convention, int(np.count_nonzero(lengths))):
+            notes.append(recommendation)
     description = replace(description, notes="\n".join(notes)[:MAX_NOTES_LENGTH])
     return Extraction(description, residual, tuple(notes), changes, decimals, turned)
 
@@ -219,9 +226,7 @@ def _best_table(
 
     Of nearly parallel axes, taken as parallel or as skew, the table nearer to the file is returned.
     """
-    poses = np.array([chain.zero_poses[joint.child] for joint in chain.joints])
-    directions = np.array([T[:3, :3] @ joint.axis for T, joint in zip(poses, chain.joints, strict=True)])
-    axes = chain_axes(poses, directions, [joint.is_prismatic for joint in chain.joints], chain.zero_poses[chain.tip])
+    axes = _axes(chain)
     turned = 0.0
     if not exact:
         axes, made = with_parallel_axes(axes, _roundings(chain))
@@ -250,6 +255,28 @@ def _best_table(
             f"otherwise {second[0]:.1e}"
         )
     return table, turned
+
+
+def _smaller_as_designed(chain: Chain, convention: Convention, lengths: int) -> str | None:
+    """Return a recommendation of ``as_designed`` if its table has fewer lengths a and d that are not 0; None if not."""
+    tree = read_urdf(chain.path, as_designed=True)
+    if not tree.changes:
+        return None
+    table = tidiest_table(_axes(chain_of(tree, chain.base, chain.tip)), convention)
+    designed = int(np.count_nonzero(np.abs(table.rows[:, 1:3]) > LENGTH_RESOLUTION))
+    if designed >= lengths:
+        return None
+    return (
+        "as_designed=True (--as-designed) gives a smaller table: "
+        f"{designed} lengths a and d that are not 0, not {lengths}"
+    )
+
+
+def _axes(chain: Chain) -> Axes:
+    """Return the joint axes of a chain in its base, with all joints at zero."""
+    poses = np.array([chain.zero_poses[joint.child] for joint in chain.joints])
+    directions = np.array([T[:3, :3] @ joint.axis for T, joint in zip(poses, chain.joints, strict=True)])
+    return chain_axes(poses, directions, [joint.is_prismatic for joint in chain.joints], chain.zero_poses[chain.tip])
 
 
 def _roundings(chain: Chain) -> list[float]:
