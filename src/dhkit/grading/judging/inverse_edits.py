@@ -6,7 +6,7 @@ tried in the order of :data:`ORDER`: if two give the same values, the more frequ
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -123,7 +123,12 @@ class Lengths:
 
 
 def edits(
-    tree: Tree, is_revolute: bool, others: Sequence[str], offsets: Sequence[float], lengths: Lengths
+    tree: Tree,
+    is_revolute: bool,
+    others: Sequence[str],
+    offsets: Sequence[float],
+    lengths: Lengths,
+    mistakes: Collection[str] = ORDER,
 ) -> list[Edit]:
     """Return the changes of a formula in the order in which they are tried, :data:`MAX_EDITS` at most.
 
@@ -139,26 +144,27 @@ def edits(
         Possible constant errors, rad or m.
     lengths
         Lengths of the robot.
+    mistakes
+        Mistakes that are corrected; all by default.
     """
     whole = chain(_of_the_whole(tree, is_revolute, others, offsets), _with_triangle(tree, is_revolute, others, lengths))
-    changes = [*(Edit(mistake, new, tree, new) for mistake, new in whole), *edits_of_parts(tree, lengths)]
+    changes = [Edit(mistake, new, tree, new) for mistake, new in whole if mistake in mistakes]
+    changes += edits_of_parts(tree, lengths, mistakes)
     return sorted(changes, key=lambda edit: ORDER.index(edit.mistake))[:MAX_EDITS]
 
 
-def edits_of_parts(tree: Tree, lengths: Lengths) -> list[Edit]:
+def edits_of_parts(tree: Tree, lengths: Lengths, mistakes: Collection[str] = ORDER) -> list[Edit]:
     """Return the changes of parts of a formula, and of names throughout, in the order in which they are tried."""
-    exchanged = (
-        formulas.with_calls_changed(tree, ("sin", "cos"), partial(_exchanged, angle)) for angle in _angles(tree)
-    )
-    changes = [
-        *(Edit("term_function", new, tree, new) for new in exchanged),
-        *islice(_of_parts(tree, lengths, lambda part: part, formulas.is_law(tree)), 2 * MAX_EDITS),
-        *(
-            Edit(mistake, new, tree, new)
-            for mistake, change in renamings([tree], lengths)
-            if (new := formulas.renamed(tree, change)) is not tree
-        ),
-    ]
+    changes = []
+    for angle in _angles(tree) if "term_function" in mistakes else ():
+        exchanged = formulas.with_calls_changed(tree, ("sin", "cos"), partial(_exchanged, angle))
+        changes.append(Edit("term_function", exchanged, tree, exchanged))
+    of_parts = _of_parts(tree, lengths, mistakes, lambda part: part, formulas.is_law(tree))
+    changes += islice(of_parts, 2 * MAX_EDITS)
+    for mistake, change in renamings([tree], lengths):
+        new = formulas.renamed(tree, change) if mistake in mistakes else tree
+        if new is not tree:
+            changes.append(Edit(mistake, new, tree, new))
     return sorted(changes, key=lambda edit: ORDER.index(edit.mistake))[:MAX_EDITS]
 
 
@@ -304,7 +310,9 @@ def _with_triangle(
 Rebuild = Callable[[Tree], Tree]
 
 
-def _of_parts(tree: Tree, lengths: Lengths, rebuild: Rebuild, in_law: bool) -> Iterator[Edit]:
+def _of_parts(
+    tree: Tree, lengths: Lengths, mistakes: Collection[str], rebuild: Rebuild, in_law: bool
+) -> Iterator[Edit]:
     """Yield changes of a part and of the parts in it.
 
     Parameters
@@ -313,13 +321,16 @@ def _of_parts(tree: Tree, lengths: Lengths, rebuild: Rebuild, in_law: bool) -> I
         The part.
     lengths
         Lengths of the robot.
+    mistakes
+        Mistakes that are corrected.
     rebuild
         Returns the whole formula for a changed part.
     in_law
         Whether the part belongs to a law of cosines.
     """
     for mistake, new in _changes(tree, lengths, in_law):
-        yield Edit(mistake, rebuild(new), tree, new)
+        if mistake in mistakes:
+            yield Edit(mistake, rebuild(new), tree, new)
     children = formulas.operands(tree)
     for k, child in enumerate(children):
 
@@ -328,7 +339,7 @@ def _of_parts(tree: Tree, lengths: Lengths, rebuild: Rebuild, in_law: bool) -> I
 
         # A sum that is squared is a component of the point, no law of cosines of its own.
         is_inside = in_law and not (isinstance(tree, Power) and isinstance(child, Sum))
-        yield from _of_parts(child, lengths, around, is_inside or formulas.is_law(child))
+        yield from _of_parts(child, lengths, mistakes, around, is_inside or formulas.is_law(child))
 
 
 def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, Tree]]:

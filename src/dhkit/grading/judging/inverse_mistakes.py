@@ -28,7 +28,7 @@ from dhkit.grading.judging.changed_formulas import (
     with_calls_changed,
 )
 from dhkit.grading.judging.inverse_branch import Branch
-from dhkit.grading.judging.inverse_edits import Edit, Lengths, edits, renamings
+from dhkit.grading.judging.inverse_edits import ORDER, Edit, Lengths, edits, renamings
 from dhkit.grading.judging.inverse_poses import Mask
 from dhkit.grading.judging.numeric import names_of, parts_of
 
@@ -148,7 +148,7 @@ class Search:
         gained = _count_of_closed(best) - int(np.sum(branch.closed))
         return best if gained > MIN_EXPLAINED_SHARE * np.sum(branch.failing) else Explanation(None, joint)
 
-    def _edits(self, branch: Branch, joint: int, mistakes: Collection[str] | None = None) -> list[Edit]:
+    def _edits(self, branch: Branch, joint: int, mistakes: Collection[str] = ORDER) -> list[Edit]:
         """Return the changes of a joint's formula, all or of some mistakes, as many as the bound on the work leaves."""
         same_kind = [k for k in branch.independent(joint) if self.revolute[k] is self.revolute[joint]]
         offsets = _offsets(branch, joint)
@@ -157,16 +157,14 @@ class Search:
         size = sum(1 for _ in parts_of(tree))
         if size > MAX_PARTS:
             return []
-        changes = edits(tree, self.revolute[joint], names, offsets, self.lengths)
-        if mistakes is not None:
-            changes = [edit for edit in changes if edit.mistake in mistakes]
+        changes = edits(tree, self.revolute[joint], names, offsets, self.lengths, mistakes)
         changes = changes[: self.left // size]
         self.left -= len(changes) * size
         return changes
 
-    def _agreeing_edits(self, branch: Branch, joint: int, mistakes: Collection[str] | None = None) -> list[Edit]:
+    def _agreeing_edits(self, branch: Branch, joint: int, mistakes: Collection[str] = ORDER) -> list[Edit]:
         """Return the changes of a joint's formula that give a solution's values at poses that should be reached."""
-        if mistakes is not None and not mistakes:
+        if not mistakes:
             return []
         formula, agreeing = branch.editable(joint), list[Edit]()
         asked = branch.reachable

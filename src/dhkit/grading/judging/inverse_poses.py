@@ -10,7 +10,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from dhkit.description import Array, Description, world_to_tool
+from dhkit.description import Array, Description, world_to_frames, world_to_tool
+from dhkit.description.frames import carrying
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.kinematics import classify, inverse_kinematics, jacobian
 from dhkit.symbolic import table_lengths
@@ -31,8 +32,8 @@ STARTS, STEPS = 12, 30
 """Newton's method for one pose: number of random starts, and of steps from each."""
 DAMPING = 1e-9
 """Levenberg's damping, in units of squared singular values: keeps steps finite at singular poses."""
-DIFFERENCE = 1e-7
-"""Step of finite differences, rad and m; Newton's method then converges linearly, by this factor in each step."""
+ARRIVES = 1e-13
+"""Residual at which Newton's method stops: about the rounding errors of a product of ten transforms."""
 
 Mask: TypeAlias = NDArray[np.bool_]
 
@@ -138,7 +139,7 @@ class Poses:
         """Whether solutions are single points: an arm with more joints than it is asked for has curves of them."""
         if self.has_closed_form:
             return True
-        J = self._derivatives(self.q[:1], self.T[:1])[0]
+        J = self._linearised(self.q[:1], self.T[:1])[1][0]
         return int(np.linalg.matrix_rank(J, 1e-5)) == self.description.n
 
     def _search(self) -> Array:
@@ -149,24 +150,48 @@ class Poses:
         q = np.random.default_rng(0).uniform(self.lower, self.upper, (S, STARTS, n)).reshape(-1, n)
         T = np.repeat(self.T, STARTS, axis=0)
         stroke = np.where(self.description.numbers.prismatic, self.scale, 1.0)
+        # Newton's method with Levenberg's damping; starts that have arrived are left out of further steps.
+        going = np.arange(len(q))
         for _ in range(STEPS):
-            gap, J = self.residuals(q, T), self._derivatives(q, T)
+            gap, J = self._linearised(q[going], T[going])
+            is_open = ~(np.max(np.abs(gap), axis=1) <= ARRIVES)
+            going, gap, J = going[is_open], gap[is_open], J[is_open]
+            if not len(going):
+                break
+            # (J' J + DAMPING) step = -J' gap
             normal = np.swapaxes(J, 1, 2) @ J + DAMPING * np.eye(n)
             step = np.linalg.solve(normal, -np.einsum("sij,si->sj", J, gap)[..., None])[..., 0]
             longest = np.max(np.abs(step / stroke), axis=1, keepdims=True)
-            q = q + step * np.minimum(1.0, 1.0 / np.maximum(longest, 1e-300))
+            q[going] += step * np.minimum(1.0, 1.0 / np.maximum(longest, 1e-300))
         converged = np.max(np.abs(self.residuals(q, T)), axis=1) <= CLOSES
         return np.where(converged[:, None], q, np.nan).reshape(S, STARTS, n)
 
-    def _derivatives(self, q: Array, T: Array) -> Array:
-        """Return the derivatives of :meth:`residuals` by the joint values, shape (S, k, n)."""
-        at = self.residuals(q, T)
-        units = np.eye(self.description.n) * DIFFERENCE
-        return np.stack([(self.residuals(q + unit, T) - at) / DIFFERENCE for unit in units], axis=-1)
+    def _linearised(self, q: Array, T: Array) -> tuple[Array, Array]:
+        """Return :meth:`residuals` (S, k) and their derivatives by the joint values (S, k, n)."""
+        numbers = self.description.numbers
+        frames = world_to_frames(self.description, q)
+        tool = frames[:, -1] @ numbers.T_last_tool
+        joints = carrying(self.description.convention, np.moveaxis(frames, 1, 0))
+        derivatives = []
+        for joint, is_prismatic in zip(joints, numbers.prismatic, strict=True):
+            z, origin = joint[:, :3, 2], joint[:, :3, 3]
+            derivative = np.zeros_like(tool)
+            if is_prismatic:
+                derivative[:, :3, 3] = z
+            else:
+                # d/dq of the tool's axes and position: z x (x, y, z, p - o)
+                vectors = tool[:, :3].copy()
+                vectors[:, :, 3] -= origin
+                derivative[:, :3] = np.cross(z[:, :, None], vectors, axis=1)
+            derivatives.append(self._asked(derivative))
+        return self._asked(tool - T), np.stack(derivatives, axis=-1)
 
     def residuals(self, q: Array, T: Array) -> Array:
         """Return the errors (S, k) of q (S, n), rad and m, in required parts of poses; lengths over the reach."""
-        gap = world_to_tool(self.description, np.where(np.isfinite(q), q, np.nan)) - T
+        return self._asked(world_to_tool(self.description, np.where(np.isfinite(q), q, np.nan)) - T)
+
+    def _asked(self, gap: Array) -> Array:
+        """Return the required parts of differences of poses or of derivatives, (S, 4, 4), as rows (S, k)."""
         columns = [gap[:, :3, 3] / self.scale]
         if self.asks_rotation:
             columns.append(gap[:, :3, :3].reshape(-1, 9))
