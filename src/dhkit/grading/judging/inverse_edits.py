@@ -248,9 +248,8 @@ def _other_angles(names: set[str]) -> Iterator[tuple[str, dict[str, Tree]]]:
 def with_signs_changed(tree: Tree) -> Iterator[Tree]:
     """Yield a formula with the sign of one root or arc cosine changed, one after the other; then of all of them."""
     alone = Lengths((), ())
-    for edit in _of_parts(tree, alone, lambda part: part, in_law=False):
-        if edit.mistake == "elbow_sign":
-            yield edit.tree
+    for edit in _of_parts(tree, alone, ("elbow_sign",), lambda part: part, in_law=False):
+        yield edit.tree
     if formulas.has_call(tree, ROOTS):
         yield formulas.with_calls_changed(tree, ROOTS, lambda call: call if formulas.is_constant(call) else minus(call))
 
