@@ -111,10 +111,9 @@ def test_home_of_the_open_manipulator():
     assert "closed form" in str(arm.family)
 
 
-def test_numbers_as_text_are_in_the_tables_unit():
-    arm = Arm.from_dh([("0", "243.3", "0", "90"), ("0", "30", "280", "180")], angle="deg", length="mm")
-    assert arm.description.numbers.d == pytest.approx([0.2433, 0.03])
-    assert arm.description.numbers.a == pytest.approx([0, 0.28])
+def test_numbers_as_text_without_a_unit_are_refused_with_the_cure():
+    with pytest.raises(DhkitError, match=r"row 1: d: '243\.3' is text without a unit; .* 243\.3\*mm"):
+        Arm.from_dh([("0", "243.3", "0", "90"), ("0", "30", "280", "180")], angle="deg", length="mm")
 
 
 def test_a_modified_table_with_every_column_makes_the_urdf_of_its_product():
