@@ -163,13 +163,13 @@ class _SheetJudge:
                     read[name] = given_quantity(name, value, shape, self.vocabulary, names, matrix_of.without(name))
             except (AnswerError, DescriptionError) as error:
                 refused[name] = self._refusal(error)
-        letters = frozenset(self.truth.description.parameters)
         trees = [entry.tree for given in read.values() for entry in given if entry.tree is not None]
-        in_symbols = any(letters & names_of(tree) for tree in trees)
+        used = frozenset[str]().union(*map(names_of, trees))
+        letters = used & frozenset(self.truth.description.parameters)
         for name, given in read.items():
             try:
                 judged[name] = judge_quantity(
-                    name, given, self.truth, self.sheet.task, self.digits, self.seed, in_symbols=in_symbols
+                    name, given, self.truth, self.sheet.task, self.digits, self.seed, letters=letters
                 )
             except (AnswerError, DescriptionError) as error:
                 refused[name] = self._refusal(error)

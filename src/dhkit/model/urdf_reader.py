@@ -394,7 +394,9 @@ def _designed_angle(word: str, value: float) -> float:
 def _decimal_rounding(word: str) -> float:
     """Return by how much a decimal may be off: a unit of its last place, if it has three digits at least.
 
-    The difference of a right angle and its decimal, such as 3.6732e-06, is off by itself.
+    A rounded multiple of 15 degrees is off by what it differs from that, 1.571 by 2.04e-4; a hundredth more covers what
+    the product of several rotations adds. The difference of a right angle and its decimal, such as 3.6732e-06, is off
+    by itself.
     """
     value = abs(float(word))
     if value < 1e-12:
@@ -404,7 +406,9 @@ def _decimal_rounding(word: str) -> float:
     decimal = Decimal(word).as_tuple()
     if len(decimal.digits) < MIN_DIGITS or not isinstance(decimal.exponent, int) or decimal.exponent >= 0:
         return 0.0
-    return float(10.0**decimal.exponent)
+    unit = float(10.0**decimal.exponent)
+    multiple = round(value * 12 / math.pi) * math.pi / 12
+    return 1.01 * abs(value - multiple) if multiple and abs(value - multiple) <= unit else unit
 
 
 def _is_rounding_of_zero(value: float, rel_tol: float = 1e-3) -> bool:

@@ -142,7 +142,12 @@ def test_a_product_with_another_factor_does_not_determine_the_joint():
         (f"0 = (c2 - {COSINE})*s2", Verdict.INCOMPLETE),
         (f"l1*px*(c2 - {COSINE}) = 0", Verdict.CORRECT),
         (f"(c2 - {COSINE})^2 = 0", Verdict.CORRECT),
-        (f"s2^2 = 1 - ({COSINE})^2", Verdict.CORRECT),
+        (f"s2^2 = 1 - ({COSINE})^2", Verdict.INCOMPLETE),
+        (f"c2^2 = ({COSINE})^2", Verdict.INCOMPLETE),
+        (f"sin(2*q2) = 2*s2*({COSINE})", Verdict.INCOMPLETE),
+        (f"c2^3 - c2 = ({COSINE})^3 - ({COSINE})", Verdict.INCOMPLETE),
+        (f"c2^2 - c2*(px + {COSINE}) + px*({COSINE}) = 0", Verdict.INCOMPLETE),
+        ("2*l1*l2*c2 = px^2 + py^2 - l1^2 - l2^2", Verdict.CORRECT),
     ):
         assert planar({"equation": equation}).entries[0].verdict is verdict, equation
 

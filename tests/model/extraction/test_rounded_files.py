@@ -124,3 +124,56 @@ def test_a_smaller_table_as_designed_is_recommended(tmp_path):
 
         assert any(advice in note for note in written.notes) == (lengths(designed) < lengths(written)), name
         assert not any(advice in note for note in designed.notes)
+
+
+def chain_text(joints):
+    """Return a URDF of a chain of continuous joints about z, each with an xyz and an rpy."""
+    links = "".join(f'<link name="l{k}"/>' for k in range(len(joints) + 1))
+    parts = "".join(
+        f'<joint name="j{k}" type="continuous"><parent link="l{k - 1}"/><child link="l{k}"/>'
+        f'<origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="0 0 1"/></joint>'
+        for k, (xyz, rpy) in enumerate(joints, start=1)
+    )
+    return f'<robot name="r">{links}{parts}</robot>'
+
+
+def longest_length(path):
+    numbers = extract_dh(path).description.numbers
+    return float(np.abs([numbers.a, numbers.d]).max())
+
+
+@pytest.mark.parametrize(
+    "joints",
+    [
+        [("0 0 0", "3.1416 0 3.1416"), ("0 0 0", "-3.1416 0 0"), ("0 -0.1 0.3", "0 0 0")],
+        [("0 0 0", "0 0 3.14159"), ("0.1 0.2 0", "-3.14159 0 0"), ("0.3 0 0.1", "0 0 0"), ("0 0.2 0", "0 3.14159 0")],
+        [("0 0 0", "0 0 1.570796"), ("0.4 0 0", "1.570796 1.570796 0"), ("0 -0.4 0", "1.570796 0 0")],
+    ],
+)
+def test_axes_that_are_parallel_in_the_file_follow_one_that_is_made_parallel(joints, tmp_path):
+    file = tmp_path / "arm.urdf"
+    file.write_text(chain_text(joints))
+    assert longest_length(file) < 1
+
+
+def test_a_tilt_that_is_written_stays_though_another_angle_is_rounded(tmp_path):
+    file = tmp_path / "arm.urdf"
+    for right_angle in ("1.571", "1.5707963", "-1.571"):
+        file.write_text(chain_text([("0 0 0.1", "0 0 0"), ("0.4 0 0", f"0.001 0 {right_angle}"), ("0 0.2 0", "0 0 0")]))
+        extraction = extract_dh(file)
+        assert extraction.turned == 0
+        assert extraction.residual.tool < 1e-9
+
+
+def test_random_arms_with_parallel_axes_and_rounded_angles_have_short_tables(law, tmp_path):
+    rng = np.random.default_rng(4)
+    file = tmp_path / "arm.urdf"
+    for _ in range(law.samples(300, quick=20)):
+        digits = int(rng.integers(3, 7))
+        joints = []
+        for _ in range(int(rng.integers(2, 8))):
+            xyz = " ".join(f"{x:.4f}" for x in rng.uniform(-0.5, 0.5, 3) * rng.integers(0, 2, 3))
+            rpy = " ".join(f"{np.pi * k:.{digits}f}" for k in rng.integers(-1, 2, 3))
+            joints.append((xyz, rpy))
+        file.write_text(chain_text(joints))
+        law.holds("longest length, m", longest_length(file), 3.0, joints)

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 from typing import TypeAlias
-
-import numpy as np
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Name, Product, Sum, Tree
@@ -15,18 +12,16 @@ from dhkit.grading.answers.given import LEFT_EMPTY, Given
 from dhkit.grading.answers.sheet_values import Requirements
 from dhkit.grading.judging.coordinates import Coordinates
 from dhkit.grading.judging.findings import Comparison, Finding, compare, exact_difference, names_in
-from dhkit.grading.judging.numeric import doubles, general_state, names_of, state_arrays
+from dhkit.grading.judging.letters import WrittenNumbers
+from dhkit.grading.judging.numeric import doubles, general_state
 from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient
 from dhkit.grading.judging.rounding import Residuals
-from dhkit.grading.judging.truth import Truth, exact_number, substituted
+from dhkit.grading.judging.truth import Truth
 from dhkit.grading.report import Verdict
-from dhkit.symbolic import ExactArm
 from dhkit.symbolic.ring import Element, Elements, RingError, element_array
 
 Index: TypeAlias = tuple[int, ...]
 """Indices of an entry in its quantity, from 0."""
-MOST_TOGETHER = 3
-"""Largest number of parameters whose numbers are looked at together: whether they multiply to 1."""
 ROUNDED_DECIMALS = 5e-3
 """Relative tolerance that decimals of four digits stay below."""
 
@@ -118,12 +113,12 @@ def judge_quantity(
     digits: int = 4,
     seed: int = 0,
     *,
-    in_symbols: bool = False,
+    letters: frozenset[str] = frozenset(),
 ) -> JudgedQuantity:
-    """Judge a quantity with its parameters as symbols; a parameter that the answer lacks is replaced by its number.
+    """Judge a quantity with its parameters as letters; entries that are wrong so with numbers where they have these.
 
-    A number may stand where the answer has it, 9.81 for g. A letter that is left out is no number: where its value is
-    1, or the values of several multiply to 1, the answer would be equal at the file's values alone.
+    A number may stand where it is written, 9.81 for g; a letter that is left out is no number. A sheet without any
+    letter is judged at the file's values.
 
     Parameters
     ----------
@@ -139,8 +134,8 @@ def judge_quantity(
         Significant digits from which a decimal may have been rounded.
     seed
         Seed of the random states at which answers outside the ring are tried.
-    in_symbols
-        Whether the sheet has some letter of the robot's file; an answer without any is judged at the file's values.
+    letters
+        Letters of the robot's file that the sheet has anywhere.
 
     Raises
     ------
@@ -153,18 +148,8 @@ def judge_quantity(
     up_to_constant = None if name == "L" and task.total_derivative else name in ("V", "L")
     by = Comparison(arm, reader, digits, residuals=_residuals(name, task), seed=seed, up_to_constant=up_to_constant)
     judged = JudgedQuantity(name, given, _findings(name, given, right, by, truth), right)
-    missing = _missing_parameters(truth, right, given)
-    if in_symbols and missing:
-        missing -= _droppable(name, truth, right, missing)
-    all_numbers = bool(missing) and missing == parameters_in(right, truth)
-    likely = [entry for entry in given if _is_near(judged, entry, arm)] if missing and judged.wrong else []
-    if judged.wrong and not judged.is_zero and (all_numbers or likely or (missing and name == "C")):
-        in_numbers = truth.with_numbers(name, right, missing)
-        findings = _findings(name, given, in_numbers, replace(by, numbers=missing), truth)
-        other = JudgedQuantity(name, given, findings, in_numbers, missing)
-        judged = other if all_numbers or other.wrong < judged.wrong else judged
-    if name != "C" and judged.wrong:
-        judged = _with_mixed_numbers(judged, missing, truth, by)
+    if judged.wrong and not judged.is_zero:
+        judged = _in_written_numbers(judged, truth, by, letters)
     if task.in_letters and judged.numbers:
         judged = replace(judged, findings={index: _in_numbers(found) for index, found in judged.findings.items()})
     contradictions = tuple(entry.index for entry in given if _contradicts(entry, judged, by))
@@ -200,58 +185,55 @@ def _contradicts(entry: Given, judged: JudgedQuantity, by: Comparison) -> bool:
     return False
 
 
-def _is_near(judged: JudgedQuantity, entry: Given, arm: ExactArm) -> bool:
-    """Whether a wrong entry is nearly right with the file's numbers, at one state."""
-    if entry.tree is None or judged.findings[entry.index].verdict is not Verdict.WRONG or judged.name == "C":
-        return False
-    state = general_state(arm.n)
-    answer = float(doubles(entry.tree, {**arm.parameters, **state}))
-    right = float(arm.evaluate(judged.right(entry.index), *state_arrays(state, arm.n)))
-    return judged.name in ("V", "L") or bool(abs(answer - right) <= ROUNDED_DECIMALS * max(abs(right), 1e-9))
+def _in_written_numbers(
+    judged: JudgedQuantity, truth: Truth, by: Comparison, letters: frozenset[str]
+) -> JudgedQuantity:
+    """Judge the entries that are wrong in letters with numbers for the letters that they have as numbers.
 
-
-def _with_mixed_numbers(judged: JudgedQuantity, tried: frozenset[str], truth: Truth, by: Comparison) -> JudgedQuantity:
-    """Judge wrong entries with numbers for parameters that they lack, though other entries have the symbols."""
-    findings, mixed = dict(judged.findings), set(judged.numbers)
-    for entry in judged.given:
-        if not _is_near(judged, entry, by.arm):
-            continue
-        right = np.array([judged.right(entry.index)], dtype=object)
-        numbers = _missing_parameters(truth, right, [entry])
-        numbers -= _droppable(judged.name, truth, right, numbers)
-        if not numbers or numbers == tried:
-            continue
-        finding = _finding(entry.tree, entry.error, truth.with_numbers(judged.name, right, numbers)[0], by)
-        if finding.verdict in (Verdict.CORRECT, Verdict.ROUNDED):
-            findings[entry.index] = finding
-            mixed |= numbers
-    return replace(judged, findings=findings, numbers=frozenset(mixed)) if mixed != judged.numbers else judged
-
-
-def _droppable(name: str, truth: Truth, right: Elements, missing: frozenset[str]) -> frozenset[str]:
-    """Return those of missing parameters that can be left out of an entry without a change of its numbers.
-
-    Their numbers are 1, or multiply to 1, as 2 and 1/2 do: whether an answer has them as numbers cannot be seen.
+    If they are wrong then too, they are judged so where that makes other entries right, or where nothing is a letter.
     """
-    found: set[str] = set()
-    ring = truth.arm(name).ring
-    numbers = {p: ring.number(exact_number(truth.description, p)) for p in missing}
-    for entry in right.flat:
-        single = element_array([entry])
-        own = sorted(names_in(entry) & missing)
-        in_numbers = substituted(single, numbers, ring)[0]
-        for count in range(1, MOST_TOGETHER + 1):
-            for some in combinations(own, count):
-                without = substituted(single, numbers | dict.fromkeys(some, ring.one), ring)[0]
-                if (without - in_numbers).is_zero:
-                    found |= set(some)
-    return frozenset(found)
+    written = WrittenNumbers(truth, judged.name, by.reader, letters)
+    in_numbers = judged.truth.copy()
+    numbers: dict[Index, frozenset[str]] = {}
+    for place, trees in _wrong_trees(judged, truth).items():
+        right = judged.truth[place]
+        found = written.letters(trees, right) if letters else parameters_in(element_array([right]), truth)
+        if found:
+            numbers[place] = found
+            in_numbers[place] = truth.with_numbers(judged.name, element_array([right]), found)[0]
+    if not numbers:
+        return judged
+    every = frozenset().union(*numbers.values())
+    findings = dict(judged.findings)
+    by_place = {place: replace(by, numbers=found) for place, found in numbers.items()}
+    if judged.name == "C":
+        findings |= _row_findings(judged.given, in_numbers, replace(by, numbers=every), truth)
+    else:
+        for entry in judged.given:
+            if entry.index in by_place:
+                findings[entry.index] = _finding(
+                    entry.tree, entry.error, in_numbers[entry.index], by_place[entry.index]
+                )
+    other = replace(judged, findings=findings, truth=in_numbers, numbers=every)
+    if letters and not other.wrong < judged.wrong:
+        return judged
+    # Entries that stay wrong are shown in letters, beside entries that are right in numbers.
+    right_now = {place for place in numbers if place not in {place_of(other.name, i) for i in other.wrong_indices}}
+    return replace(other, numbers=frozenset().union(*(numbers[place] for place in right_now)) or every)
 
 
-def _missing_parameters(truth: Truth, right: Elements, given: Sequence[Given]) -> frozenset[str]:
-    """Return the parameters that occur in the truth and in no entry of the answer."""
-    used = [names_of(entry.tree) for entry in given if entry.tree is not None]
-    return parameters_in(right, truth).difference(*used)
+def _wrong_trees(judged: JudgedQuantity, truth: Truth) -> dict[Index, Tree]:
+    """Return the formula at each place that is wrong: of an entry, or of a row of C qd."""
+    trees: dict[Index, Tree] = {}
+    for index in judged.wrong_indices:
+        place = place_of(judged.name, index)
+        row = [entry for entry in judged.given if place_of(judged.name, entry.index) == place and entry.tree]
+        if judged.name == "C":
+            terms = (Product(((True, e.tree), (True, _rate(truth.coordinates, e.index[1])))) for e in row if e.tree)
+            trees[place] = Sum(tuple((True, term) for term in terms))
+        elif row and row[0].tree is not None:
+            trees[place] = row[0].tree
+    return trees
 
 
 def parameters_in(array: Elements, truth: Truth) -> frozenset[str]:

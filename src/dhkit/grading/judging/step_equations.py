@@ -20,6 +20,7 @@ from dhkit.grading.judging.inverse_edits import Edit, Lengths, edits_of_parts
 from dhkit.grading.judging.numeric import EditedDoubles, doubles, names_of, parts_of
 from dhkit.grading.judging.quotients import OutsideTheRingError, RingReader
 from dhkit.grading.judging.step_context import Part, StepContext
+from dhkit.grading.judging.step_roots import other_root
 from dhkit.grading.report import Verdict, Witness
 from dhkit.symbolic import table_lengths
 from dhkit.symbolic.equations import plain_text
@@ -87,7 +88,34 @@ class Equations:
             later = sorted(used & joints - {own} - {f"q{j + 1}" for j in self.before})
             what = f", as {', '.join(later)} {'is' if len(later) == 1 else 'are'} not known yet" if later else ""
             return Part(Verdict.INCOMPLETE, f"the equation is right, but does not determine {own}{what}")
+        if (root := self._other_root(used)) is not None:
+            return Part(
+                Verdict.INCOMPLETE,
+                f"the equation is right, but has roots that are no solutions, such as {own} = {root:.4g} at a pose that "
+                f"was tried: it does not determine {own} alone",
+            )
         return Part(verdict, f"equation: {statements[0]}", remark="; ".join(dict.fromkeys(remarks)))
+
+    def _other_root(self, used: set[str]) -> float | None:
+        """Return a root of the equations that is no solution, where solutions are known and no later joint is needed."""
+        n, own = self.context.description.n, self.step.joint
+        poses = self.context.solved_poses
+        later = {f"q{j + 1}" for j in range(n) if j != own and j not in self.before}
+        if not poses.has_closed_form or used & later:
+            return None
+
+        def residual(row: int, q: Array) -> Array:
+            pose = {name: np.broadcast_to(x, len(poses.q))[row] for name, x in poses.values.items()}
+            values = {**pose, **_joints(q)}
+            gaps = []
+            for tree in self.differences:
+                # Relative to the largest size at any value: a factor that is common to all terms has roots too.
+                gap = np.broadcast_to(np.abs(np.asarray(doubles(tree, values))), len(q))
+                gaps.append(gap / max(float(np.nanmax(_sizes(tree, values), initial=0.0)), 1e-12))
+            largest: Array = np.max(gaps, axis=0)
+            return largest
+
+        return other_root(poses, own, self.before, residual)
 
     def _factor_of_other_roots(self, tree: Tree) -> Part | None:
         """Return the part of a product that is zero since one factor is, where another has roots that are no solution.

@@ -29,9 +29,12 @@ Row: TypeAlias = tuple[Expression, Expression, Expression, Expression]
 
 
 def parameter_values(description: Description, factors: Array) -> dict[str, float]:
-    """Return the values of parameters by name, SI units and rad, independent ones times factors of shape (k,)."""
+    """Return the values of parameters by name, SI units and rad, independent ones times factors of shape (k,).
+
+    One that is 0 becomes its factor less 1: a letter of value 0 is a letter.
+    """
     changed = {
-        name: value if value.symbols else exact(float(value) * float(factor))
+        name: value if value.symbols else exact(float(factor) - 1.0 if value.is_zero else float(value) * float(factor))
         for (name, value), factor in zip(description.parameters.items(), factors, strict=True)
     }
     known = resolved(Named(changed)) if np.any(factors != 1) else resolved(description.parameters)

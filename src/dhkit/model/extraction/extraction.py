@@ -34,6 +34,8 @@ MAX_LISTED_MESHES = 5
 """Largest number of omitted meshes that are named one by one."""
 MAX_NOTES_LENGTH = 20_000
 """Characters of notes that a robot file holds."""
+SAME_ERROR = 1.5
+"""Factor up to which the errors of two tables count as equal."""
 LENGTH_RESOLUTION = 1e-9
 """Lengths of a table up to this, m, count as 0 where two tables are compared; tables are written to this decimal."""
 MAX_TABLE_ERROR = 1e-6
@@ -224,13 +226,15 @@ def _best_table(
 ) -> tuple[Table, float]:
     """Return the tidiest table, and the sum of the angles by which axes were turned to be parallel, rad.
 
-    Of nearly parallel axes, taken as parallel or as skew, the table nearer to the file is returned.
+    Of nearly parallel axes, taken as parallel or as skew, the table nearer to the file is returned; of two that are as
+    near, the one with shorter lengths.
     """
     axes = _axes(chain)
     turned = 0.0
     if not exact:
+        in_file = axes.directions
         axes, made = with_parallel_axes(axes, _roundings(chain))
-        turned = sum(one.angle for one in made)
+        turned = float(np.sum(np.linalg.norm(np.cross(in_file, axes.directions), axis=1)))
         if made:
             table = tidiest_table(axes, convention)
             error = original.residual(draft.description(table, UNROUNDED)).tool
@@ -247,7 +251,11 @@ def _best_table(
         table = tidiest_table(replace(axes, parallel_below=parallel_below), convention)
         error = original.residual(draft.description(table, UNROUNDED)).tool
         candidates.append((error, parallel_below, table))
-    (error, parallel_below, table), second, *_ = sorted(candidates, key=lambda candidate: candidate[0])
+    least = min(error for error, _, _ in candidates)
+    (error, parallel_below, table), second, *_ = sorted(
+        candidates,
+        key=lambda one: (one[0] > SAME_ERROR * least, _longest(one[2]) if one[0] <= SAME_ERROR * least else one[0]),
+    )
     for i, sine in nearly:
         treatment = "as parallel" if sine <= parallel_below else "with their own common normal"
         notes.append(
@@ -255,6 +263,11 @@ def _best_table(
             f"otherwise {second[0]:.1e}"
         )
     return table, turned
+
+
+def _longest(table: Table) -> float:
+    """Return the largest of a table's lengths, m."""
+    return float(np.abs(table.rows[:, 1:3]).max())
 
 
 def _smaller_as_designed(chain: Chain, convention: Convention, lengths: int) -> str | None:
@@ -298,7 +311,8 @@ def _rounded(draft: Draft, table: Table, original: Original, turned: float) -> t
     """
     unrounded = draft.description(table, UNROUNDED)
     error = original.residual(unrounded)
-    allowed = (MAX_TABLE_ERROR + 2 * turned) * max(original.size, 1.0)
+    # A turn about an axis that is off by an angle is off by up to twice the angle, at a lever of up to twice the size.
+    allowed = (MAX_TABLE_ERROR + 4 * turned) * max(original.size, 1.0)
     if not original.chain.tree.changes and error.tool > allowed:
         raise ModelError(f"no table within {MAX_TABLE_ERROR:g} of the file: the tool differs by {error.tool:.2g}")
     # With changes as designed or nearly parallel axes the error may exceed the bounds; rounding may then double it.

@@ -102,7 +102,8 @@ def with_parallel_axes(axes: Axes, roundings: Sequence[float]) -> tuple[Axes, tu
     made: list[MadeParallel] = []
     for i, rounding in enumerate(roundings):
         sine = float(np.linalg.norm(np.cross(axes.directions[i], axes.directions[i + 1])))
-        if 0 < sine <= rounding:
+        # An axis that is parallel in the file follows one that was turned.
+        if sine <= max(rounding, NEARLY_PARALLEL_SINES[0]):
             directions[i + 1] = directions[i] * np.sign(axes.directions[i] @ axes.directions[i + 1])
             if sine > NEARLY_PARALLEL_SINES[0]:
                 made.append(MadeParallel(i + 1, math.asin(sine)))
