@@ -27,7 +27,10 @@ REST = 1e-4
 class _Proportional:
     """Base class: gains kp and kd on the errors of joint values and rates, and the model of an arm."""
 
-    def __init__(self, robot: Robot, kp: ArrayLike, kd: ArrayLike) -> None:
+    def __init__(self, robot: Robot, kp: ArrayLike | None = None, kd: ArrayLike | None = None) -> None:
+        if kp is None or kd is None:
+            name = type(self).__name__
+            raise TypeError(f"{name} needs the gains kp and kd, which {name}.tuned(arm) computes")
         self.description = description_of(robot)
         require_bodies(self.description)
         n = self.description.n

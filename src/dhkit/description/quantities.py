@@ -23,10 +23,24 @@ def is_plain_number(text: str) -> bool:
     return NUMBER.fullmatch(text.strip()) is not None
 
 
+def _has_numbers_alone(text: str) -> bool:
+    """Return whether an expression has no name, and no brackets around everything."""
+    if re.search(r"[A-Za-z_]", re.sub(r"(?<=[0-9.])[eE](?=[+-]?[0-9])", "", text)):
+        return False
+    inner = text.strip()
+    depth = 0
+    for place, character in enumerate(inner):
+        depth += (character == "(") - (character == ")")
+        if depth == 0:
+            return not (inner.startswith("(") and place == len(inner) - 1)
+    return True
+
+
 def parse_quantity(text: str, names: Collection[str], unit: Expression = ONE) -> Expression:
     """Return the value of an expression, which is in metres and radians; it may use these names.
 
-    A number as text, "243.3" in a table of mm, is refused: it may mean either unit. "(0.2433)" is an expression.
+    Numbers alone as text, "243.3" or "486.6/2" in a table of mm, are refused: they may mean either unit. "(0.2433)", in
+    brackets, is an expression.
 
     Raises
     ------
@@ -34,12 +48,13 @@ def parse_quantity(text: str, names: Collection[str], unit: Expression = ONE) ->
         Not an expression, or a number as text where ``unit``, that of numbers, is another one.
     """
     value = parse(text, names)
-    if unit != ONE and is_plain_number(text) and not value.is_zero:
+    if unit != ONE and not value.is_zero and _has_numbers_alone(text):
         written = text.strip()
+        product = written if is_plain_number(written) else f"({written})"
         name = next((name for name, constant in CONSTANTS.items() if constant == unit), "its unit")
         raise ExpressionError(
             f"{written!r} is text without a unit; expected the number {written}, or an expression such as"
-            f" {written}*{name}; in parentheses it is in m or rad"
+            f" {product}*{name}; in parentheses it is in m or rad"
         )
     return value
 

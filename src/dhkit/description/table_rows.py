@@ -98,7 +98,9 @@ def from_dh(
     ):
         if value not in known:
             raise DescriptionError(f"{what} is {value!r}; expected one of {', '.join(known)}")
-    letters = "".join(kinds or "R" * len(rows)).upper()
+    rows = list(rows)
+    given = kinds or "R" * len(rows)
+    letters = "".join(map(str, given)).upper() if hasattr(given, "__len__") else ""
     if len(letters) != len(rows) or set(letters) - {"R", "P"}:
         raise DescriptionError(f"kinds is {kinds!r}; expected {len(rows)} letters, R or P, one a row")
     units = Units(length, angle)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import difflib
-import re
 import secrets
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from itertools import chain
+from typing import TypeAlias
 
 import numpy as np
 
@@ -24,13 +24,12 @@ from dhkit.grading.answers.given import (
     vocabulary_of,
     with_entries_gathered,
 )
-from dhkit.grading.answers.matrix_algebra import MatrixOf, Rows
-from dhkit.grading.answers.quantity_names import QuantityNames, Target
-from dhkit.grading.answers.reading import read_answer
+from dhkit.grading.answers.quantity_names import QuantityNames
 from dhkit.grading.answers.sheet import ALIASES, quantity_names, shape_of
-from dhkit.grading.answers.sheet_values import AnswerSheet, Entries
+from dhkit.grading.answers.sheet_matrices import SheetMatrices
+from dhkit.grading.answers.sheet_values import AnswerSheet, Requirements
 from dhkit.grading.answers.typeset import typeset, typeset_equations
-from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
+from dhkit.grading.answers.vocabulary import Vocabulary
 from dhkit.grading.judging.consistency import Consistency
 from dhkit.grading.judging.functions import judge_function
 from dhkit.grading.judging.numeric import names_of
@@ -148,7 +147,7 @@ class _SheetJudge:
         names = QuantityNames(self.truth.description)
         read: dict[str, tuple[Given, ...]] = {}
         answers = with_entries_gathered(self.sheet.answers, names)
-        matrix_of = _SheetMatrices(answers, self.vocabulary, names)
+        matrix_of = SheetMatrices(answers, self.vocabulary, names)
         for name, value in answers.items():
             if _is_empty(value):
                 continue
@@ -181,7 +180,7 @@ class _SheetJudge:
             return error
         return AnswerError(f"{self.sheet.file}: answer: {error}")
 
-    def _jacobian(self, value: object, names: QuantityNames, matrix_of: _SheetMatrices) -> tuple[Given, ...]:
+    def _jacobian(self, value: object, names: QuantityNames, matrix_of: SheetMatrices) -> tuple[Given, ...]:
         """Return the entries of a Jacobian: of the task's rows, of six, or of those that an arm's motion has.
 
         Of an arm in a plane these are the two positions in it, with the angle about its normal or without; of others
@@ -237,8 +236,13 @@ class _SheetJudge:
         return _judge_rows(
             "dh",
             given_rows(rows, description.n, self.vocabulary),
-            lambda trees: judge_table(description, trees, convention, self.seed, self.sheet.task),
+            lambda trees: self._table_in_numbers(
+                judge_table(description, trees, convention, self.seed, self.sheet.task)
+            ),
         )
+
+    def _table_in_numbers(self, judged: KinematicJudgement) -> KinematicJudgement:
+        return in_numbers(judged, judged.at_values, self.sheet.task)
 
     def _inverse(self, explain: bool) -> KinematicJudgement:
         from dhkit.grading.judging.inverse import judge_inverse
@@ -252,81 +256,70 @@ class _SheetJudge:
             steps = given_steps(self.sheet.steps, vocabulary)
             return self._at_other_values(
                 [tree for step in steps for tree in (*step.solutions, *chain.from_iterable(step.equations))],
-                lambda arm: judge_steps(arm, steps, seed=self.seed, explain=explain),
+                lambda arm, formula, explain: judge_steps(
+                    arm, [step.changed(formula) for step in steps], seed=self.seed, explain=explain
+                ),
+                explain,
             )
         return _judge_rows(
             "ik",
             given_branches(self.sheet.branches, description.n, vocabulary),
             lambda trees: self._at_other_values(
                 [tree for branch in trees for tree in branch],
-                lambda arm: judge_inverse(arm, trees, seed=self.seed, explain=explain),
+                lambda arm, formula, explain: judge_inverse(
+                    arm, [[formula(tree) for tree in branch] for branch in trees], seed=self.seed, explain=explain
+                ),
+                explain,
             ),
         )
 
-    def _at_other_values(
-        self, trees: Sequence[Tree], judge: Callable[[Description], KinematicJudgement]
-    ) -> KinematicJudgement:
-        """Judge formulas at the file's values; those that pass at other values of the parameters too."""
-        from dhkit.grading.judging.inverse import with_other_values
+    def _at_other_values(self, trees: Sequence[Tree], judge: FormulaJudge, explain: bool) -> KinematicJudgement:
+        """Judge formulas at the file's values; those that pass at other values of the arm's letters too.
 
-        judged = judge(self.truth.description)
-        other = with_other_values(self.truth.description, trees, self.seed) if judged.verdict.passes else None
-        if other is None:
-            return judged
-        elsewhere = judge(other)
-        if elsewhere.verdict.passes:
-            return judged
-        values = tuple(f"{name} = {value:.6g}" for name, value in other.numbers.values.items())
-        return replace(elsewhere, notes=(*elsewhere.notes, Note(NoteKind.ONLY_AT_VALUES, "ik", values)))
+        Where letters have equal values, mistakes are looked for at other values: one would look like another.
+        """
+        from dhkit.grading.judging.other_values import are_ambiguous, with_other_values
+
+        description = self.truth.description
+        is_ambiguous = explain and are_ambiguous(description, trees)
+        judged = judge(description, _unchanged, explain and not is_ambiguous)
+        other = with_other_values(description, trees, self.seed)
+        passing = {entry.index for entry in judged.entries if entry.verdict.passes}
+        if other.description is not None and (passing or is_ambiguous):
+            elsewhere = judge(other.description, other.formula, explain)
+            failing = {entry.index: entry for entry in elsewhere.entries if not entry.verdict.passes}
+            if by_chance := passing & failing.keys():
+                values = tuple(f"{name} = {value:.6g}" for name, value in other.changed.items())
+                entries = tuple(failing[e.index] if e.index in by_chance else e for e in judged.entries)
+                notes = (*elsewhere.notes, Note(NoteKind.ONLY_AT_VALUES, "ik", values))
+                judged = replace(judged, entries=entries, notes=notes, diagnosis=elsewhere.diagnosis)
+            elif is_ambiguous:
+                judged = replace(judged, diagnosis=elsewhere.diagnosis)
+        elif is_ambiguous:
+            judged = judge(description, _unchanged, explain)
+        return in_numbers(judged, other.at_values, self.sheet.task)
 
 
-VECTOR = re.compile(r"(?:d|dd|dot|ddot|d2)?(?:q|th|theta|Theta|vartheta)(?:d|dd|dot|ddot)?")
-"""Names of the columns of joint values, rates and accelerations; t is the time."""
+FormulaJudge: TypeAlias = Callable[[Description, Callable[[Tree], Tree], bool], KinematicJudgement]
+"""Function from an arm, a change of formulas, and whether to look for mistakes, to the judgement of a sheet."""
 
 
-class _SheetMatrices:
-    """The matrices that names stand for on a sheet: its own answers, and the vectors of the joints' state.
+def _unchanged(tree: Tree) -> Tree:
+    return tree
 
-    Parameters
-    ----------
-    answers
-        The sheet's answers by quantity.
-    vocabulary
-        What names mean; a name that has a meaning of its own is no matrix.
-    names
-        Which names stand for quantities.
-    """
 
-    def __init__(self, answers: Mapping[str, object], vocabulary: Vocabulary, names: QuantityNames) -> None:
-        self.answers = answers
-        self.vocabulary = vocabulary
-        self.names = names
-        self._read: dict[str, Rows] = {}
-
-    def without(self, *quantities: str) -> MatrixOf:
-        """Return which names stand for matrices, where some quantities are not known yet."""
-        return lambda name: self._matrix(name, quantities)
-
-    def _matrix(self, name: str, unknown: tuple[str, ...]) -> Rows | None:
-        vocabulary, quantity = self.vocabulary, self.names.quantity(name)
-        # G is taken for a parameter g only where it is no answer.
-        is_answer = quantity and quantity in self.answers and not vocabulary.is_own(plain_name(name))
-        if vocabulary.knows(name) and not is_answer:
-            return None
-        if VECTOR.fullmatch(plain_name(name)) and vocabulary.is_state(f"{name}1"):
-            return [[read_answer(f"{name}{i + 1}", vocabulary)] for i in range(self.names.n)]
-        if quantity in unknown or not isinstance(self.answers.get(quantity), str | list | Entries):
-            return None
-        if quantity not in self._read:
-            shape = self.names.shape(quantity)
-            value = self.answers[quantity]
-            given = given_quantity(quantity, value, shape, vocabulary, self.names, self.without(*unknown, quantity))
-            if unread := next((entry for entry in given if entry.tree is None), None):
-                raise AnswerError(f"{name}: {Target(quantity, unread.index)} is not read: {unread.error}")
-            trees = [entry.tree for entry in given if entry.tree is not None]
-            columns = shape[1] if len(shape) == 2 else 1
-            self._read[quantity] = [trees[k : k + columns] for k in range(0, len(trees), columns)]
-        return self._read[quantity]
+def in_numbers(judged: KinematicJudgement, at_values: Mapping[str, float], task: Requirements) -> KinematicJudgement:
+    """Return a judgement of an answer that has letters as numbers: it is incomplete where the task asks for letters."""
+    if not at_values:
+        return judged
+    entries = judged.entries
+    if task.in_letters:
+        statement = "right at the file's values; the task asks for letters"
+        entries = tuple(
+            replace(entry, verdict=Verdict.INCOMPLETE, statement=statement) if entry.verdict.passes else entry
+            for entry in entries
+        )
+    return replace(judged, entries=entries, at_values=at_values)
 
 
 def _judge_rows(

@@ -25,6 +25,8 @@ MAX_SHELLS = 400
 """Largest number of shells that are tested for lying inside others."""
 MIN_VOLUME = 1e-13
 """Smallest enclosed volume, as a share of the mesh's size cubed; a wire of 1 m length and 1 um width has 1e-12."""
+DOUBLED = "warning: the surface lies over itself, and the material inside counts twice"
+"""Note on a surface that is written twice, in two tessellations."""
 INVERTED = "inside out: all triangles were turned"
 
 
@@ -208,7 +210,8 @@ def outwards(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
     inversion = (INVERTED,) if is_inverted else ()
     shells = Shells(mesh)
     if shells.count == 1:
-        return mesh, inversion
+        is_doubled = _has_crowded_edges(mesh) and shells.doubled()
+        return mesh, (*inversion, *([DOUBLED] if is_doubled else []))
     if shells.count > MAX_SHELLS:
         return mesh, (*inversion, f"{shells.count} shells: which of them lie in others was not looked at")
     # The shells around a cavity have a winding number of 1; any other shell of negative volume is inside out.
@@ -220,6 +223,13 @@ def outwards(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
     elif flipped.any():
         notes.append(f"{int(flipped.sum())} of {shells.count} shells were inside out and were turned")
     return shells.mesh, (*notes, *_shell_notes(shells))
+
+
+def _has_crowded_edges(mesh: TriangleMesh) -> bool:
+    """Whether an edge belongs to more than two triangles."""
+    edges = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
+    keys = np.sort(edges[:, 0].astype(np.int64) * len(mesh.vertices) + edges[:, 1])
+    return bool((keys[2:] == keys[:-2]).any())
 
 
 def _shell_notes(shells: Shells) -> list[str]:

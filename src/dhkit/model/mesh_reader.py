@@ -18,7 +18,7 @@ from dhkit.errors import ModelError
 from dhkit.model.collada import collada_mesh
 from dhkit.model.polygons import triangles_of
 from dhkit.model.shapes import Part
-from dhkit.model.stl import ascii_corners, binary_corners
+from dhkit.model.stl import ascii_corners, binary_corners, coordinates
 from dhkit.model.triangle_mesh import TriangleMesh
 
 MAX_TRIANGLES = 2_000_000
@@ -150,7 +150,7 @@ def _obj_mesh(content: bytes) -> TriangleMesh:
     """Return an OBJ file's faces as triangles, in the file's units; a material file that it names is not opened."""
     content = content.replace(b"\\\n", b" ").replace(b"\\\r\n", b" ")
     try:
-        vertices = np.array(OBJ_VERTEX.findall(content), dtype="S40").astype(np.float64).reshape(-1, 3)
+        vertices = coordinates(OBJ_VERTEX.findall(content))
         polygons = _obj_polygons(content, len(vertices))
     except ValueError as error:
         raise ModelError(f"{' '.join(str(error).split())[:80]}; expected a number") from None

@@ -92,9 +92,14 @@ class Shells:
         return np.isin(np.arange(self.count), wrong)
 
     def doubled(self) -> int:
-        """Return the number of shells with a test point in the material of others."""
-        solid = np.flatnonzero(self.volume > 0)
-        return sum(bool((self._windings(int(k)) > MIN_INSIDE_WINDING).any()) for k in solid)
+        """Return the number of shells with a test point in the material of others, or twice in their own.
+
+        The same surface in two tessellations is one shell, since both have the same vertices, and encloses twice.
+        """
+        solid = [int(k) for k in np.flatnonzero(self.volume > 0)]
+        others = [bool((self._windings(k) > MIN_INSIDE_WINDING).any()) for k in solid]
+        own = [bool((self._own_windings(k) > 1 + MIN_INSIDE_WINDING).any()) for k in solid]
+        return sum(in_others or in_own for in_others, in_own in zip(others, own, strict=True))
 
     def shared(self) -> tuple[float, int]:
         """Return the volume that counts more than once, and the number of cavities that reach out of the material."""
@@ -150,6 +155,11 @@ class Shells:
             sign = -1.0 if self.flipped[j] else 1.0
             windings[in_box[:, j]] += sign * self._rays.windings(shell, points[in_box[:, j]])
         return windings
+
+    def _own_windings(self, k: int) -> Array:
+        """Return the winding numbers of a shell at its own test points, shape (p,): 1 if it encloses once."""
+        sign = -1.0 if self.flipped[k] else 1.0
+        return sign * self._rays.windings(slice(self._ends[k], self._ends[k + 1]), self._test_points(k))
 
     def _test_points(self, k: int) -> Array:
         """Return points just inside triangles' middles; points on a face that two shells share would be undecided."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,6 +18,10 @@ NORMAL_DECIMALS = 6
 VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 DECIMAL_COMMA = re.compile(rb"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 FACET_END = re.compile(rb"\bendfacet\b", re.IGNORECASE)
+NAME_LINE = re.compile(rb"^[ \t]*(?:end)?solid\b[^\r\n]*", re.IGNORECASE | re.MULTILINE)
+"""Line with the name of a solid, which may have keywords in it."""
+MAX_DIGITS = 64
+"""Longest text of a coordinate; 17 significant digits, a sign and an exponent have 24 characters."""
 
 
 def binary_corners(content: bytes) -> Array:
@@ -40,12 +45,13 @@ def ascii_corners(content: bytes) -> Array:
     ModelError
         A facet without three vertices, or a coordinate that is no number.
     """
+    content = NAME_LINE.sub(b"", content)
     vertices = VERTEX.findall(content)
     facets = len(FACET_END.findall(content))
     if len(vertices) != 3 * facets:
         raise ModelError(f"{facets} facets with {len(vertices)} vertices; expected 3 each")
     try:
-        numbers = np.array(vertices, dtype="S40").astype(np.float64)
+        numbers = coordinates(vertices)
     except ValueError as error:
         if comma := next((text for row in vertices for text in row if DECIMAL_COMMA.fullmatch(text)), None):
             raise ModelError(
@@ -53,6 +59,20 @@ def ascii_corners(content: bytes) -> Array:
             ) from None
         raise ModelError(f"{' '.join(str(error).split())[:80]}; expected a coordinate") from None
     return numbers.reshape(-1, 3, 3)
+
+
+def coordinates(rows: Sequence[tuple[bytes, bytes, bytes]]) -> Array:
+    """Return the numbers of texts, shape (m, 3).
+
+    Raises
+    ------
+    ValueError
+        A text that is not a number.
+    """
+    for text in (text for row in rows for text in row):
+        if len(text) > MAX_DIGITS or b"_" in text:
+            raise ValueError(f"found {text[:20].decode('ascii', 'replace')!r}, {len(text)} characters long")
+    return np.array(rows, dtype=f"S{MAX_DIGITS}").astype(np.float64).reshape(-1, 3)
 
 
 def binary_stl(title: str, corners: Array) -> bytes:

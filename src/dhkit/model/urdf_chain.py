@@ -230,9 +230,14 @@ def _required_tip(tree: UrdfTree, base: str) -> str:
     if (tip := only_tip(tree, base)) is not None:
         return tip
     tips = chain_tips(tree, base)
-    if not tips:
-        raise ModelError(f"no moving joints below link {base!r} that do not follow others (mimic)")
     others = _mimic_chains(tree, base)
+    if not tips:
+        if before := _before_mimics(tree, others):
+            listed = ", ".join(f"{link} ({joint} follows another joint)" for link, joint in before.items())
+            raise ModelError(
+                f"every chain has joints that follow others (mimic); choose an end before them (tip): {listed}"
+            )
+        raise ModelError(f"no moving joints below link {base!r} that do not follow others (mimic)")
     if len(tips) == 1 and not others:
         (leaves,) = tips.values()
         raise ModelError(f"several frames end the chain: {_shortened(leaves, 400)}; choose one (tip)")
@@ -240,6 +245,17 @@ def _required_tip(tree: UrdfTree, base: str) -> str:
     ends = _branchings(tree, {*tips, *others}) | ends
     texts = [f"{link} ({count} joint{'s' * (count > 1)})" for link, count in ends.items()]
     raise ModelError(f"chains end at {_shortened(texts, 600)}; choose one (tip)")
+
+
+def _before_mimics(tree: UrdfTree, chains: Collection[JointNames]) -> dict[str, str]:
+    """Return the links behind moving joints at which joints begin that follow others, each with that joint."""
+    ends: dict[str, str] = {}
+    for chain in sorted(chains):
+        joints = [tree.joints[name] for name in chain]
+        first = next((k for k, joint in enumerate(joints) if joint.mimics is not None), 0)
+        if first:
+            ends.setdefault(joints[first - 1].child, joints[first].name)
+    return ends
 
 
 def _branchings(tree: UrdfTree, chains: Collection[JointNames]) -> dict[str, int]:

@@ -16,6 +16,7 @@ import numpy as np
 
 from dhkit.description import Array, Box, Capsule, Cylinder, Geometry, Mesh, Sphere, pose
 from dhkit.description.bodies import eigenvalue_tolerance
+from dhkit.description.validation import MAX_NUMBER
 from dhkit.errors import ModelError
 from dhkit.expressions import exact
 from dhkit.model.urdf_tree import (
@@ -162,6 +163,10 @@ class _Reader:
     def _origin(self, where: str, origin: Element | None) -> Array:
         """Return the pose of xyz and rpy, or of a quaternion; missing ones are 0."""
         xyz = numbers(where, origin, "xyz", 3) or [0.0] * 3
+        if max(map(abs, xyz)) > MAX_NUMBER:
+            raise ModelError(
+                f"{where}: <origin xyz>: found {max(map(abs, xyz)):.3g} m; expected at most {MAX_NUMBER:g}"
+            )
         if quaternion := numbers(where, origin, "quat_xyzw", 4):  # of URDF 1.2
             if origin is not None and origin.get("rpy") is not None:
                 raise ModelError(f"{where}: <origin> has both rpy and quat_xyzw; expected one of them")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
 
@@ -71,6 +71,11 @@ class GivenStep:
     equations: tuple[tuple[Tree, Tree], ...] = ()
     solutions: tuple[Tree, ...] = ()
     error: str = ""
+
+    def changed(self, formula: Callable[[Tree], Tree]) -> GivenStep:
+        """Return the step with a function applied to all its formulas."""
+        equations = tuple((formula(left), formula(right)) for left, right in self.equations)
+        return replace(self, equations=equations, solutions=tuple(map(formula, self.solutions)))
 
     @property
     def read_as(self) -> tuple[str, str]:

@@ -104,12 +104,21 @@ class _LatexReader:
         """Read up to a closing brace, or to the end."""
         tokens: list[Token] = []
         while (piece := self._peek()) is not None and piece[4] != "}":
-            tokens += self._item(piece)
+            is_sum_going_on = self._goes_on_with_a_sum(piece, tokens)
+            item = self._item(piece)
+            tokens += item[1:-1] if is_sum_going_on else item
         if closing:
             if not self._next_is(closing):
                 fail(self.text, min(self.at, len(self.text) - 1), f"expected {closing!r}")
             self.at = self.text.index(closing, self.at) + 1
         return self._over(tokens)
+
+    def _goes_on_with_a_sum(self, piece: re.Match[str], before: list[Token]) -> bool:
+        """Whether a group in braces begins with a sign behind an operand: a {+ b} is set as a + b, not as a product."""
+        if piece[4] != "{" or not before or before[-1].text in FUNCTION_NAMES:
+            return False
+        is_behind_operand = before[-1].kind in ("name", "number") or before[-1].text in (")", "]")
+        return is_behind_operand and self.text[piece.end() :].lstrip()[:1] in ("+", "-")
 
     def _over(self, tokens: list[Token]) -> list[Token]:
         r"""Read {a \over b} as \frac{a}{b}."""

@@ -6,7 +6,7 @@ import re
 import unicodedata
 from bisect import bisect_right
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Token, Tree
@@ -73,7 +73,8 @@ def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]
     start = next((k for k, token in enumerate(tokens) if token.text == "["), len(tokens))
     end = max((k for k, token in enumerate(tokens) if token.text == "]"), default=-1)
     if end < start:
-        raise AnswerError(f"expected a matrix in brackets, found {text[:60]!r}")
+        hint = "; a matrix that it names is not on the sheet" if re.search(r"[A-Za-z]", text) else ""
+        raise AnswerError(f"expected a matrix in brackets, found {text[:60]!r}{hint}")
     before, after, is_transposed = _factors(tokens[:start], tokens[end + 1 :], text)
     entry_count = sum(token.text in (*COLUMN_SIGNS, *ROW_SIGNS) for token in tokens)
     rows = _rows(tokens[start : end + 1], text) if entry_count <= MAX_ENTRIES else []
@@ -233,6 +234,11 @@ def _factors(before: list[Token], after: list[Token], text: str) -> tuple[list[T
         fail(text, after[0].at, f"{after[0].text!r} behind a matrix, which is not read,")
     if before and before[-1].text in ("^", "/", ".", "./"):
         fail(text, before[-1].at, f"{before[-1].text!r} before a matrix, which is not read,")
+    for tokens in (before[1:], after):
+        depths = accumulate(nesting(token.text) for token in tokens)
+        for token, depth in zip(tokens, depths, strict=True):
+            if depth == 0 and token.kind == "sign" and token.text in ("+", "-"):
+                fail(text, token.at, "a matrix in a sum with a number (write it into the entries that have it)")
     return before, after, is_transposed
 
 

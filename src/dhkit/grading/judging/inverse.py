@@ -6,17 +6,16 @@ distance from them. All solutions are known for arms with a closed form in dhkit
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
 
 from dhkit.description import Description
-from dhkit.description.changes import with_parameters
-from dhkit.errors import AnswerError, DescriptionError
+from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
-from dhkit.expressions.syntax import Number, Tree
+from dhkit.expressions.syntax import Tree
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.judging.inverse_branch import Branch, joint_order
 from dhkit.grading.judging.inverse_edits import with_signs_changed
@@ -30,11 +29,6 @@ from dhkit.symbolic import table_lengths
 
 MAX_NODES = 5_000
 """Largest number of nodes of a formula; a PUMA's longest has 200."""
-LEAST_FACTOR, MOST_FACTOR = 0.8, 1.25
-"""Factors by which parameters' values are changed: at the file's values a formula may be right by chance, if a letter
-is missing whose value is 1, or one length stands for another of the same value."""
-SAME_VALUE = 1e-9
-"""Relative difference up to which a number that is written is a parameter's value."""
 
 
 @dataclass(frozen=True)
@@ -282,41 +276,3 @@ def _coverage(poses: Poses, answers: Sequence[Branch]) -> tuple[int | None, int 
         given |= poses.matches(answer.q, poses.solutions) & answer.closed[:, None]
     general = np.sum(valid, axis=1) == most
     return most, int(np.median(np.sum(given, axis=1)[general]))
-
-
-def with_other_values(description: Description, trees: Collection[Tree], seed: int) -> Description | None:
-    """Return the arm with other values of its parameters; None if the formulas have none of its letters.
-
-    A parameter keeps its value if the formulas have the value as a number in its place, 0.5 for l1 = 0.5; not if that
-    is 1, which may mean anything.
-
-    Parameters
-    ----------
-    trees
-        The formulas.
-    seed
-        Seed of the random values.
-    """
-    parameters = frozenset(description.parameters)
-    used = frozenset().union(*(names_of(tree) for tree in trees)) & parameters
-    if not used:
-        return None
-    written = {abs(float(part.value)) for tree in trees for part in parts_of(tree) if isinstance(part, Number)} - {
-        0.0,
-        1.0,
-    }
-    values = description.numbers.values
-    kept = {
-        name
-        for name in parameters - used
-        if any(abs(abs(values[name]) - number) <= SAME_VALUE * number for number in written)
-    }
-    rng = np.random.default_rng(seed)
-    changed = {
-        name: round(float(values[name] * rng.uniform(LEAST_FACTOR, MOST_FACTOR)), 6)
-        for name in sorted(parameters - kept)
-    }
-    try:
-        return with_parameters(description, **changed)
-    except DescriptionError:  # the other values make no robot
-        return None

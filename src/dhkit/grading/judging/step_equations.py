@@ -20,7 +20,7 @@ from dhkit.grading.judging.inverse_edits import Edit, Lengths, edits_of_parts
 from dhkit.grading.judging.numeric import EditedDoubles, doubles, names_of, parts_of
 from dhkit.grading.judging.quotients import OutsideTheRingError, RingReader
 from dhkit.grading.judging.step_context import Part, StepContext
-from dhkit.grading.judging.step_roots import other_root
+from dhkit.grading.judging.step_roots import Residual, other_root
 from dhkit.grading.report import Verdict, Witness
 from dhkit.symbolic import table_lengths
 from dhkit.symbolic.equations import plain_text
@@ -91,31 +91,44 @@ class Equations:
         if (root := self._other_root(used)) is not None:
             return Part(
                 Verdict.INCOMPLETE,
-                f"the equation is right, but has roots that are no solutions, such as {own} = {root:.4g} at a pose that "
-                f"was tried: it does not determine {own} alone",
+                f"the equation is right, but has roots that are no solutions, such as {own} = {root:.4g} at a pose "
+                f"that was tried: it does not determine {own} alone",
             )
         return Part(verdict, f"equation: {statements[0]}", remark="; ".join(dict.fromkeys(remarks)))
 
     def _other_root(self, used: set[str]) -> float | None:
-        """Return a root of the equations that is no solution, where solutions are known and no later joint is needed."""
+        """Return a root of the equations that is no solution; None without a closed form, or with later joints."""
         n, own = self.context.description.n, self.step.joint
         poses = self.context.solved_poses
         later = {f"q{j + 1}" for j in range(n) if j != own and j not in self.before}
         if not poses.has_closed_form or used & later:
             return None
 
-        def residual(row: int, q: Array) -> Array:
-            pose = {name: np.broadcast_to(x, len(poses.q))[row] for name, x in poses.values.items()}
-            values = {**pose, **_joints(q)}
-            gaps = []
-            for tree in self.differences:
-                # Relative to the largest size at any value: a factor that is common to all terms has roots too.
-                gap = np.broadcast_to(np.abs(np.asarray(doubles(tree, values))), len(q))
-                gaps.append(gap / max(float(np.nanmax(_sizes(tree, values), initial=0.0)), 1e-12))
-            largest: Array = np.max(gaps, axis=0)
-            return largest
+        def values_at(rows: NDArray[np.intp], q: Array) -> dict[str, Array | float]:
+            pose = {name: np.broadcast_to(x, len(poses.q))[rows] for name, x in poses.values.items()}
+            return {**pose, **_joints(q)}
 
-        return other_root(poses, own, self.before, residual)
+        def residual_on(rows: NDArray[np.intp], q: Array) -> Residual:
+            # A factor that is common to all terms has roots too: sizes are the largest of each pose.
+            sizes = []
+            for tree in self.differences:
+                size = np.nan_to_num(np.broadcast_to(_sizes(tree, values_at(rows, q)), len(rows)))
+                largest = np.zeros(int(rows.max()) + 1)
+                np.maximum.at(largest, rows, size)
+                sizes.append(np.maximum(largest, 1e-12))
+
+            def residual(rows: NDArray[np.intp], q: Array) -> Array:
+                values = values_at(rows, q)
+                gaps = [
+                    np.abs(np.asarray(doubles(tree, values))) / size[rows]
+                    for tree, size in zip(self.differences, sizes, strict=True)
+                ]
+                largest: Array = np.max(np.broadcast_arrays(*gaps, np.zeros(len(rows)))[:-1], axis=0)
+                return largest
+
+            return residual
+
+        return other_root(poses, own, self.before, residual_on)
 
     def _factor_of_other_roots(self, tree: Tree) -> Part | None:
         """Return the part of a product that is zero since one factor is, where another has roots that are no solution.

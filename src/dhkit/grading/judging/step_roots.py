@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.grading.judging.inverse_poses import Poses
@@ -12,19 +14,24 @@ from dhkit.grading.judging.inverse_poses import Poses
 TRIED_POSES = 12
 """Number of poses at which roots are looked for."""
 GRID = 720
-"""Joint values at which equations are tried first: every half degree, or every 1/180 of twice the reach."""
+"""Joint values at which equations are tried first: every half degree, or every 1/180 of the reach."""
 REFINEMENTS = 45
-"""Halvings of the interval about a smallest residual; 2^-45 of a degree is rounding."""
-IS_ROOT = 1e-8
-"""Largest residual, relative to the size of an equation's terms, of a root."""
+"""Steps that narrow the interval about a smallest residual, each by a quarter."""
+MAY_BE_ROOT = 0.1
+"""Largest residual on the grid beside a root."""
+IS_ROOT = 1e-7
+"""Largest residual of a root: relative to the largest size of an equation's terms at any joint value."""
 FAR = 1e-3
 """Least distance of a root from all solutions, rad or relative to the reach, that makes it another one."""
 LEAST_SHARE = 0.5
 """Least share of the poses with another root: at single poses a root may be one by chance."""
 
+Residual: TypeAlias = Callable[[NDArray[np.intp], Array], Array]
+"""Function from indices of poses (k,) and joint values (k, n), rad and m, to residuals (k,), none negative."""
+
 
 def other_root(
-    poses: Poses, joint: int, before: Sequence[int], residual: Callable[[int, Array], Array]
+    poses: Poses, joint: int, before: Sequence[int], residual_on: Callable[[NDArray[np.intp], Array], Residual]
 ) -> float | None:
     """Return a joint value that equations allow and no solution has; None if they have solutions for roots alone.
 
@@ -36,45 +43,47 @@ def other_root(
         The joint that the equations are to determine, from 0.
     before
         Joints that earlier steps find; they have the values of a solution.
-    residual
-        Function from the index of a pose and joint values (k, n), rad and m, to the residuals (k,), each the largest of
-        all equations, relative to the largest size of their terms at these joint values.
+    residual_on
+        Function from the indices of poses (k,) and joint values (k, n) to the equations' residual, the largest of all,
+        relative to the largest size of their terms there.
     """
-    is_prismatic = bool(poses.description.numbers.prismatic[joint])
-    reach = 2 * poses.scale if is_prismatic else np.pi
+    count = min(TRIED_POSES, len(poses.q))
+    truths = poses.truths[:count]
+    is_solution = np.all(np.isfinite(truths), axis=-1)
+    q = truths[np.arange(count), np.argmax(is_solution, axis=1)]
+    reach = poses.scale if poses.description.numbers.prismatic[joint] else np.pi
     grid = np.linspace(-reach, reach, GRID + 1)
-    found: list[float | None] = []
-    for s in range(min(TRIED_POSES, len(poses.q))):
-        truths = poses.truths[s]
-        truths = truths[np.all(np.isfinite(truths), axis=1)]
-        same = np.all(poses.gaps(truths[:, list(before)], truths[:1, list(before)], list(before)) < FAR, axis=1)
-        known = truths[same][:, joint]
 
-        def at(x: Array, s: int = s, q: Array = truths[0]) -> Array:
-            # With the grid, so that residuals are relative to the same size each time.
-            joints = np.tile(q, (len(x) + len(grid), 1))
-            joints[:, joint] = np.concatenate([x, grid])
-            return residual(s, joints)[: len(x)]
+    def at(rows: NDArray[np.intp], x: Array) -> Array:
+        joints: Array = q[rows].copy()
+        joints[:, joint] = x
+        return joints
 
-        roots = _roots(at, grid)
-        gaps = poses.gaps(roots[:, None], known[None, :], joint)
-        others = roots[np.all(gaps > FAR, axis=1)]
-        found.append(float(others[0]) if len(others) else None)
-    share = np.mean([one is not None for one in found]) if found else 0.0
-    return next((one for one in found if one is not None), None) if share >= LEAST_SHARE else None
+    every = np.repeat(np.arange(count), len(grid))
+    values = np.tile(grid, count)
+    residual = residual_on(every, at(every, values))
+    rows, roots = _roots(lambda k, x: residual(k, at(k, x)), grid, count)
+    # The solutions of a pose that have the same values of the joints before.
+    same = is_solution & np.all(poses.gaps(truths[..., before], q[:, None, before], list(before)) < FAR, axis=-1)
+    gaps = np.where(same[rows], poses.gaps(roots[:, None], truths[rows, :, joint], joint), np.inf)
+    is_other = np.all(gaps > FAR, axis=1)
+    share = len(np.unique(rows[is_other])) / count
+    return round(float(roots[is_other][0]), 6) + 0.0 if share >= LEAST_SHARE else None
 
 
-def _roots(residual: Callable[[Array], Array], grid: Array) -> Array:
-    """Return the values at which a residual, which is nowhere negative, is zero: from its smallest values on a grid."""
-    values = np.nan_to_num(residual(grid), nan=np.inf)
-    inner = values[1:-1]
-    is_low = (inner <= values[:-2]) & (inner <= values[2:]) & (inner < 0.1)
-    centres = grid[1:-1][is_low]
-    width = np.full(len(centres), grid[1] - grid[0])
-    # A smallest value lies between the neighbours on the grid: thirds that do not have it are left out.
-    for _ in range(REFINEMENTS):
-        left, right = centres - width / 3, centres + width / 3
-        at_left, at_right = (np.nan_to_num(residual(x), nan=np.inf) for x in (left, right))
-        centres = np.where(at_left < at_right, centres - width / 6, centres + width / 6)
-        width = width * 0.75
-    return centres[np.nan_to_num(residual(centres), nan=np.inf) < IS_ROOT] if len(centres) else centres
+def _roots(residual: Residual, grid: Array, count: int) -> tuple[NDArray[np.intp], Array]:
+    """Return the roots of residuals and the indices of their poses: from the smallest values on a grid."""
+    every = np.repeat(np.arange(count), len(grid))
+    values = np.nan_to_num(residual(every, np.tile(grid, count)), nan=np.inf).reshape(count, -1)
+    inner = values[:, 1:-1]
+    is_low = (inner <= values[:, :-2]) & (inner <= values[:, 2:]) & (inner < MAY_BE_ROOT)
+    rows, places = np.nonzero(is_low)
+    centres = grid[1:-1][places]
+    width = 2 * (grid[1] - grid[0])
+    # A smallest value lies between the neighbours on the grid: the quarter that does not have it is left out.
+    for _ in range(REFINEMENTS if len(rows) else 0):
+        left, right = (np.nan_to_num(residual(rows, centres + x), nan=np.inf) for x in (-width / 4, width / 4))
+        centres = np.where(left < right, centres - width / 8, centres + width / 8)
+        width *= 0.75
+    is_root = np.nan_to_num(residual(rows, centres), nan=np.inf) < IS_ROOT if len(rows) else np.zeros(0, dtype=bool)
+    return rows[is_root], centres[is_root]

@@ -16,7 +16,7 @@ import numpy as np
 
 from dhkit.description import Convention, Description, Placement, takes_robot
 from dhkit.description.parameters import resolved
-from dhkit.expressions import PI, PI_DIGITS, ZERO, Expression, exact_angle, substitute
+from dhkit.expressions import PI, PI_DIGITS, ZERO, Expression, exact, exact_angle, substitute
 from dhkit.symbolic.exact.naming import Naming
 from dhkit.symbolic.exact.transforms import identity, inverse, rotation, translation
 from dhkit.symbolic.ring import Direction, Element, Elements, Ring
@@ -250,6 +250,21 @@ def table_lengths(description: Description) -> dict[str, Fraction]:
             if symbol.text not in description.parameters and value is not None and value.rational is not None:
                 found[symbol.text] = value.rational
     return found
+
+
+def with_table_lengths(description: Description, lengths: Mapping[str, Fraction]) -> Description:
+    """Return the arm with other lengths in its table; ``lengths`` by the names of :func:`table_lengths`, m."""
+    naming = Naming(description, "inertial")
+
+    def other(name: str, length: Expression) -> Expression:
+        new = lengths.get(naming.length(name, length).text)
+        return length if new is None else exact(new)
+
+    joints = tuple(
+        replace(joint, a=other(f"a{i}", joint.a), d=other(f"d{i}", joint.d))
+        for i, joint in enumerate(description.joints, start=1)
+    )
+    return replace(description, joints=joints)
 
 
 def is_identity(T: Elements) -> bool:

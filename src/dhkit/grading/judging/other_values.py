@@ -1,0 +1,149 @@
+"""Inverse kinematics at other values of the arm's letters than the file's.
+
+At the file's values a formula may be right by chance: a letter is missing whose value is 1, or one length stands for
+another of the same value. Letters are the file's parameters, and the names of the table's lengths, such as a2 and d4.
+A number that is written stands for the letter whose value it is: 0.5 for l1, 0.25 for l1^2, 1 for 2 l1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+
+from dhkit.description import Description
+from dhkit.description.changes import with_parameters
+from dhkit.errors import DescriptionError
+from dhkit.expressions.syntax import Name, Number, Tree
+from dhkit.grading.judging.changed_formulas import leaf_text, renamed, square_of, times
+from dhkit.grading.judging.numeric import names_of, parts_of
+from dhkit.symbolic import table_lengths
+from dhkit.symbolic.inverse.chain import with_table_lengths
+
+LEAST_FACTOR, MOST_FACTOR = 0.8, 1.25
+"""Factors by which values are changed."""
+SAME_VALUE = 1e-9
+"""Relative difference up to which a number that is written is the value of a letter."""
+MAX_FACTOR = 12
+"""Largest numerator and denominator of a factor that formulas have whatever the lengths are: 2, 1/2, 1/12."""
+
+
+@dataclass(frozen=True)
+class OtherValues:
+    """An arm with other values, and what formulas for the file's arm are for it.
+
+    Attributes
+    ----------
+    description
+        The arm; None if the formulas have none of its letters.
+    in_letters
+        Letters, or formulas of them, for numbers that are written, by the text of the number.
+    at_values
+        Letters that keep the file's values, since the formulas have them as numbers, or have no letter at all.
+    changed
+        The other values by letter.
+    """
+
+    description: Description | None
+    in_letters: Mapping[str, Tree]
+    at_values: Mapping[str, float]
+    changed: Mapping[str, float] = field(default_factory=dict)
+
+    def formula(self, tree: Tree) -> Tree:
+        """Return a formula for the arm with other values."""
+        return renamed(tree, self.in_letters)
+
+
+def with_other_values(description: Description, trees: Sequence[Tree], seed: int) -> OtherValues:
+    """Return the arm with other values of its letters.
+
+    Parameters
+    ----------
+    trees
+        The formulas.
+    seed
+        Seed of the random values.
+    """
+    table = {name: float(value) for name, value in table_lengths(description).items()}
+    numbers = description.numbers.values
+    parameters = {name: float(numbers[name]) for name in _kinematic_parameters(description)}
+    letters = parameters | table
+    used = frozenset().union(*map(names_of, trees)) & letters.keys()
+    if not used:
+        return OtherValues(None, {}, parameters)
+    parts = [part for tree in trees for part in parts_of(tree)]
+    written = {leaf_text(part): part.value for part in parts if isinstance(part, Number) and _is_value(part)}
+    missing = {name: value for name, value in letters.items() if name not in used and value}
+    in_letters: dict[str, Tree] = {}
+    unknown = False
+    for text, number in written.items():
+        found = _letters_of(float(number), missing, letters)
+        if found is None:
+            unknown = True
+        else:
+            in_letters[text] = found
+    replaced = frozenset().union(*map(names_of, in_letters.values())) if in_letters else frozenset()
+    kept = {name: value for name, value in missing.items() if name in replaced or (unknown and name in parameters)}
+    varied = letters.keys() - (kept.keys() - replaced) if unknown else letters.keys()
+    rng = np.random.default_rng(seed)
+    values = {name: round(letters[name] * float(rng.uniform(LEAST_FACTOR, MOST_FACTOR)), 6) for name in sorted(varied)}
+    try:
+        other = with_parameters(description, **{name: x for name, x in values.items() if name in parameters})
+        lengths = {name: Fraction(str(x)) for name, x in values.items() if name in table}
+        other = with_table_lengths(other, lengths)
+    except DescriptionError:  # the other values make no robot
+        return OtherValues(None, {}, kept)
+    return OtherValues(other, in_letters, kept, values)
+
+
+def _kinematic_parameters(description: Description) -> list[str]:
+    """Return the parameters that the table, the base and the tool have."""
+    expressions = [x for joint in description.joints for x in (joint.theta, joint.d, joint.a, joint.alpha)]
+    used: set[str] = set().union(*(x.symbols for x in expressions))
+    for placement in (description.base.placement, description.tool.placement):
+        used |= {symbol for x in (*placement.xyz, *placement.rpy) for symbol in x.symbols}
+    waiting = list(used)
+    while waiting:  # parameters that others are made of
+        for name in description.parameters[waiting.pop()].symbols:
+            if name not in used:
+                used.add(name)
+                waiting.append(name)
+    return [name for name in description.parameters if name in used]
+
+
+def _is_value(part: Number) -> bool:
+    """Whether a number may be a length: a decimal, not a factor such as 2 or 1/2."""
+    is_factor = part.value.denominator <= MAX_FACTOR and abs(part.value.numerator) <= MAX_FACTOR
+    return "." in part.text or not is_factor
+
+
+def _letters_of(number: float, missing: Mapping[str, float], letters: Mapping[str, float]) -> Tree | None:
+    """Return the letter, or the formula of letters, whose value a number is; None if there is none, or several."""
+    found = [tree for value, tree in _formulas(missing, letters) if abs(value - number) <= SAME_VALUE * abs(value)]
+    return found[0] if len(found) == 1 else None
+
+
+def _formulas(missing: Mapping[str, float], letters: Mapping[str, float]) -> Iterator[tuple[float, Tree]]:
+    """Yield l, l^2, 2 l, and the products of two letters, with their values."""
+    two = Number(Fraction(2), "2", 0)
+    for name, value in missing.items():
+        tree = Name(name, 0)
+        yield value, tree
+        yield value**2, square_of(tree)
+        yield 2 * value, times(two, tree)
+        for other, factor in letters.items():
+            if other > name or (other != name and other not in missing):
+                yield value * factor, times(tree, Name(other, 0))
+                yield 2 * value * factor, times(two, times(tree, Name(other, 0)))
+
+
+def are_ambiguous(description: Description, trees: Iterable[Tree]) -> bool:
+    """Whether letters of some formulas have equal values, or the value 1, so that one mistake looks like another."""
+    table = {name: float(value) for name, value in table_lengths(description).items()}
+    values = description.numbers.values
+    used = frozenset().union(*map(names_of, trees))
+    sizes = [abs(float(values[name])) for name in description.parameters if name in used]
+    sizes += [abs(value) for name, value in table.items() if name in used]
+    return any(abs(x - 1) < SAME_VALUE for x in sizes) or len({round(x, 9) for x in sizes}) < len(sizes)
