@@ -93,10 +93,10 @@ def test_a_lost_root_is_noted_and_an_arc_cosine_for_both_roots_is_wrong():
     assert [diagnosis.mistake for diagnosis in both.diagnosis] == ["sign_lost"]
 
 
-def test_lengths_in_equations_may_be_right_for_this_arm_only():
+def test_lengths_in_equations_are_letters():
     # Corke's a2 and d4 are both 0.4318 m.
     entry = judged(with_change("puma560", 1, "equation", "- a2^2 - a3^2 - d4^2", "- d4^2 - a3^2 - d4^2")).entries[1]
-    assert entry.verdict is Verdict.CORRECT and "an identity of the arm with its own lengths" in entry.statement
+    assert entry.verdict is Verdict.WRONG
 
 
 def test_offsets_base_and_tool_belong_to_the_arm():

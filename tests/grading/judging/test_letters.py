@@ -126,6 +126,99 @@ def test_inverse_kinematics_in_letters_is_right_at_other_values_too(name):
     assert by_chance == (not passes)
 
 
+PLANAR = {"l1": 0.5, "l2": 0.4}
+ACOS = "±acos((px^2+py^2-{})/({}))"
+BOTH = "atan2(py,px)-atan2({l2}*s2,{l1}+{l2}*c2)"
+
+
+@pytest.mark.parametrize(
+    ("squares", "product", "shoulder", "verdicts", "at_values"),
+    [
+        ("l1^2-l2^2", "2*l1*l2", BOTH.format(l1="l1", l2="l2"), ["correct", "correct"], {}),
+        ("0.41", "0.4", BOTH.format(l1="0.5", l2="0.4"), ["correct", "correct"], PLANAR),
+        ("0.25-l2^2", "2*0.5*l2", BOTH.format(l1="0.5", l2="l2"), ["correct", "correct"], {"l1": 0.5}),
+        ("0.25-l2^2", "1.0*l2", BOTH.format(l1="0.5", l2="l2"), ["correct", "correct"], {"l1": 0.5}),
+        ("0.25-l2^2", "l2", BOTH.format(l1="0.5", l2="l2"), ["wrong", "correct"], {"l1": 0.5}),
+        ("l1^2-l2^2", "l2", BOTH.format(l1="l1", l2="l2"), ["wrong", "correct"], {}),
+    ],
+)
+def test_numbers_in_inverse_kinematics_stand_where_they_are_written(squares, product, shoulder, verdicts, at_values):
+    steps = [{"joint": 2, "solution": ACOS.format(squares, product)}, {"joint": 1, "solution": shoulder}]
+    arm = Arm.load("planar2r")
+    report = arm.grade({"ik": {"steps": steps}}, explain=False)
+    assert [entry.verdict.value for entry in report.entries] == verdicts
+    assert report.at_values == at_values
+    in_letters = arm.grade({"ik": {"steps": steps}}, task={"values": False}, explain=False)
+    assert in_letters.verdict.passes == (verdicts == ["correct", "correct"] and not at_values)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "squares", "product", "shoulder"),
+    [
+        ((1.0, 0.5), "a1^2-a2^2", "2*a2", ("a1", "a2")),
+        ((1.0, 0.5), "a1-a2^2", "2*a1*a2", ("a1", "a2")),
+        ((0.4, 0.4), "2*a1^2", "2*a1*a2", ("a2", "a1")),
+    ],
+)
+def test_lengths_of_the_table_are_letters_in_inverse_kinematics(lengths, squares, product, shoulder):
+    arm = Arm.from_dh([(0, 0, length, 0) for length in lengths])
+    first, second = shoulder
+    wrong = [
+        {"joint": 2, "solution": ACOS.format(squares, product)},
+        {"joint": 1, "solution": BOTH.format(l1=first, l2=second)},
+    ]
+    assert not arm.grade({"ik": {"steps": wrong}}, explain=False).entries[0].verdict.passes
+    right = [
+        {"joint": 2, "solution": ACOS.format("a1^2-a2^2", "2*a1*a2")},
+        {"joint": 1, "solution": BOTH.format(l1="a1", l2="a2")},
+    ]
+    assert arm.grade({"ik": {"steps": right}}, explain=False).verdict.passes
+
+
+@pytest.mark.parametrize(
+    ("values", "answer"),
+    [
+        ({}, {"V": "g*l1*s1+m2*g*(l1*s1+l2*s12/2)"}),
+        ({}, {"K": "l1^2*qd1^2/3+m2*(l1^2*qd1^2+l2^2*(qd1+qd2)^2/3+l1*l2*c2*qd1*(qd1+qd2))/2"}),
+        ({}, {"h": ["-m2*l2*s2*(qd1*qd2 + qd2^2/2)/2", "m2*l2*s2*qd1^2/4"]}),
+        ({"l2": 2.0}, {"V": "m1*g*l1/2*s1+m2*g*(l1*s1+s12)"}),
+        ({"l2": 2.0}, {"C": [["-m2*l1*s2*qd2", "-m2*l1*s2*(qd1+qd2)"], ["m2*l1*s2*qd1", "0"]]}),
+        ({"m2": 3.0}, {"M": [["m1*l1^2/3+m2*(l1^2+l2^2/3+l1*l2*c2)", "m2*l2*(l2/3+l1*c2/2)"]] * 1 + [["0", "l2^2"]]}),
+        ({"l2": 2.0}, {"g": ["m1*g*l1*c1/2+m2*g*(l1*c1+c12)", "m2*g*(2*cos((q1+q2)/2)^2-1)"]}),
+    ],
+)
+def test_a_letter_whose_value_cancels_a_factor_of_the_truth_is_left_out(values, answer):
+    text = to_toml(library_robot("planar2r"))
+    for name, value in values.items():
+        text = re.sub(rf"(?m)^{name} = [\d.]+$", f"{name} = {value}", text)
+    report = Arm(from_toml(text)).grade(answer, explain=False)
+    assert not report.verdict.passes, str(report)
+    assert not report.at_values
+
+
+def test_a_letter_of_value_0_is_a_letter():
+    text = re.sub(r"(?m)^l2 = [\d.]+$", "l2 = 0.4\ne = 0.0", to_toml(library_robot("planar2r")))
+    arm = Arm(from_toml(text.replace("d = 0", 'd = "e"', 1)))
+    rows = [["q1", "e", "l1", "0"], ["q2", "0", "l2", "0"]]
+    table = {"convention": "standard", "rows": rows}
+    assert arm.grade({"dh": table}).verdict.passes
+    rows[0][1] = "0"
+    assert arm.grade({"dh": table}).entries[0].verdict.value == "wrong"
+    assert (
+        arm.grade(
+            {
+                "T": [
+                    ["c12", "-s12", "0", "l1*c1+l2*c12"],
+                    ["s12", "c12", "0", "l1*s1+l2*s12"],
+                    ["0", "0", "1", "0"],
+                    ["0", "0", "0", "1"],
+                ]
+            }
+        ).verdict.value
+        == "wrong"
+    )
+
+
 def test_a_christoffel_c_in_numbers_is_called_that():
     arm = Arm.load("planar2r")
     values = {name: f"({float(value)})" for name, value in arm.description.numbers.values.items()}

@@ -57,9 +57,9 @@ class WrittenNumbers:
         try:
             remaining = self.reader.read(bare).element()
         except (OutsideTheRingError, AnswerError, RingError):
-            return candidates
-        if remaining is None:
-            return candidates
+            remaining = None
+        if remaining is None:  # its terms cannot be told apart
+            return candidates if has_written(tree) else frozenset()
         while candidates:
             left_out = self._left_out(remaining, right, candidates, values)
             if not left_out:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from itertools import combinations
 
 import numpy as np
 
@@ -28,6 +29,9 @@ SAME_VALUE = 1e-9
 """Relative difference up to which a number that is written is the value of a letter."""
 MAX_FACTOR = 12
 """Largest numerator and denominator of a factor that formulas have whatever the lengths are: 2, 1/2, 1/12."""
+
+
+TWO = Number(Fraction(2), "2", 0)
 
 
 @dataclass(frozen=True)
@@ -75,18 +79,16 @@ def with_other_values(description: Description, trees: Sequence[Tree], seed: int
         return OtherValues(None, {}, parameters)
     parts = [part for tree in trees for part in parts_of(tree)]
     written = {leaf_text(part): part.value for part in parts if isinstance(part, Number) and _is_value(part)}
-    missing = {name: value for name, value in letters.items() if name not in used and value}
     in_letters: dict[str, Tree] = {}
-    unknown = False
+    kept: set[str] = set()
     for text, number in written.items():
-        found = _letters_of(float(number), missing, letters)
-        if found is None:
-            unknown = True
-        else:
-            in_letters[text] = found
-    replaced = frozenset().union(*map(names_of, in_letters.values())) if in_letters else frozenset()
-    kept = {name: value for name, value in missing.items() if name in replaced or (unknown and name in parameters)}
-    varied = letters.keys() - (kept.keys() - replaced) if unknown else letters.keys()
+        found = _letters_of(float(number), letters)
+        if len(found) == 1:
+            in_letters[text] = found[0]
+        else:  # a number of several letters, or of none: what it may be keeps its value
+            kept |= set().union(*map(names_of, found)) if found else {name for name in parameters if name not in used}
+    varied = letters.keys() - kept
+    at_values = {name: letters[name] for name in kept | _names_of_all(in_letters.values()) if name not in used}
     rng = np.random.default_rng(seed)
     values = {name: round(letters[name] * float(rng.uniform(LEAST_FACTOR, MOST_FACTOR)), 6) for name in sorted(varied)}
     try:
@@ -94,8 +96,8 @@ def with_other_values(description: Description, trees: Sequence[Tree], seed: int
         lengths = {name: Fraction(str(x)) for name, x in values.items() if name in table}
         other = with_table_lengths(other, lengths)
     except DescriptionError:  # the other values make no robot
-        return OtherValues(None, {}, kept)
-    return OtherValues(other, in_letters, kept, values)
+        return OtherValues(None, {}, at_values)
+    return OtherValues(other, in_letters, at_values, values)
 
 
 def _kinematic_parameters(description: Description) -> list[str]:
@@ -119,24 +121,36 @@ def _is_value(part: Number) -> bool:
     return "." in part.text or not is_factor
 
 
-def _letters_of(number: float, missing: Mapping[str, float], letters: Mapping[str, float]) -> Tree | None:
-    """Return the letter, or the formula of letters, whose value a number is; None if there is none, or several."""
-    found = [tree for value, tree in _formulas(missing, letters) if abs(value - number) <= SAME_VALUE * abs(value)]
-    return found[0] if len(found) == 1 else None
+def _names_of_all(trees: Iterable[Tree]) -> frozenset[str]:
+    return frozenset[str]().union(*map(names_of, trees))
 
 
-def _formulas(missing: Mapping[str, float], letters: Mapping[str, float]) -> Iterator[tuple[float, Tree]]:
-    """Yield l, l^2, 2 l, and the products of two letters, with their values."""
-    two = Number(Fraction(2), "2", 0)
-    for name, value in missing.items():
-        tree = Name(name, 0)
-        yield value, tree
-        yield value**2, square_of(tree)
-        yield 2 * value, times(two, tree)
-        for other, factor in letters.items():
-            if other > name or (other != name and other not in missing):
-                yield value * factor, times(tree, Name(other, 0))
-                yield 2 * value * factor, times(two, times(tree, Name(other, 0)))
+def _letters_of(number: float, letters: Mapping[str, float]) -> list[Tree]:
+    """Return the letters, and the simplest formulas of letters, whose value a number is."""
+    for formulas in (_powers(letters), _products(letters)):
+        found = [tree for value, tree in formulas if abs(value - number) <= SAME_VALUE * abs(value)]
+        if found:
+            return found
+    return []
+
+
+def _powers(letters: Mapping[str, float]) -> Iterator[tuple[float, Tree]]:
+    """Yield l, l^2 and 2 l, with their values, of letters that are not 0."""
+    for name, value in letters.items():
+        if value:
+            tree = Name(name, 0)
+            yield abs(value), tree
+            yield value**2, square_of(tree)
+            yield 2 * abs(value), times(TWO, tree)
+
+
+def _products(letters: Mapping[str, float]) -> Iterator[tuple[float, Tree]]:
+    """Yield the products of two letters, and twice these, with their values."""
+    for (one, first), (two, second) in combinations(letters.items(), 2):
+        if first and second:
+            tree = times(Name(one, 0), Name(two, 0))
+            yield abs(first * second), tree
+            yield 2 * abs(first * second), times(TWO, tree)
 
 
 def are_ambiguous(description: Description, trees: Iterable[Tree]) -> bool:
