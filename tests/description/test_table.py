@@ -100,9 +100,26 @@ def test_a_number_as_text_has_no_unit():
     assert from_dh([(0, "0.2433", "0", "pi/2")]).numbers.d[0] == 0.2433
 
 
+@pytest.mark.parametrize("entry", ["486.6/2", "243.3*1", "243.3 + 0", "(243.3)*(1)", "2.433e2"])
+def test_numbers_alone_as_text_are_refused_where_numbers_are_in_another_unit(entry):
+    with pytest.raises(DescriptionError, match=r"row 1: d: .* is text without a unit; .*\*mm; in parentheses"):
+        from_dh([(0, entry, 0, 0)], length="mm")
+    assert from_dh([(0, f"({entry})", 0, 0)], length="mm").numbers.d[0] == pytest.approx(243.3)
+    assert from_dh([(0, entry, 0, 0)]).numbers.d[0] == pytest.approx(243.3)
+
+
+def test_a_parameter_is_not_called_as_a_joint_variable():
+    with pytest.raises(DescriptionError, match="'q1' is taken: joint variables are q1"):
+        from_dh([("q1", 0.5, 0, 0)], parameters={"q1": 1.0})
+
+
+def test_rows_may_come_one_by_one():
+    assert from_dh((0, 0.1, 0, 0) for _ in range(2)).n == 2
+
+
 def test_numbers_without_a_finite_decimal_are_written_as_expressions():
     """0.3 m in inches, and 1 rad in degrees."""
-    arm = from_dh([("1*1", "0.3*1", 1, 0)], length="in", angle="deg")
+    arm = from_dh([("(1*1)", "(0.3*1)", 1, 0)], length="in", angle="deg")
     text = to_toml(arm)
     assert from_toml(text).numbers.d[0] == 0.3
     plain = replace(arm.joints[0], d=exact(Fraction(3, 10)), theta=exact(1))

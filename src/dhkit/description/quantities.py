@@ -23,7 +23,7 @@ def is_plain_number(text: str) -> bool:
     return NUMBER.fullmatch(text.strip()) is not None
 
 
-def _has_numbers_alone(text: str) -> bool:
+def has_numbers_alone(text: str) -> bool:
     """Return whether an expression has no name, and no brackets around everything."""
     if re.search(r"[A-Za-z_]", re.sub(r"(?<=[0-9.])[eE](?=[+-]?[0-9])", "", text)):
         return False
@@ -48,7 +48,7 @@ def parse_quantity(text: str, names: Collection[str], unit: Expression = ONE) ->
         Not an expression, or a number as text where ``unit``, that of numbers, is another one.
     """
     value = parse(text, names)
-    if unit != ONE and not value.is_zero and _has_numbers_alone(text):
+    if unit != ONE and not value.is_zero and has_numbers_alone(text):
         written = text.strip()
         product = written if is_plain_number(written) else f"({written})"
         name = next((name for name, constant in CONSTANTS.items() if constant == unit), "its unit")

@@ -9,7 +9,7 @@ import tomlkit
 from tomlkit.items import Array, Float, InlineTable, Item, Table, Trivia
 
 from dhkit.description.bodies import Body
-from dhkit.description.quantities import is_plain_number
+from dhkit.description.quantities import has_numbers_alone
 from dhkit.description.robot_data import RobotData
 from dhkit.description.values import (
     ONE,
@@ -168,7 +168,7 @@ def _entry(value: Expression, unit: Expression = ONE) -> Item:
     if bare is None or "/" in text:
         written = value.text if value.written is None else text
         # In a table of mm a number in quotes could be taken for mm: in parentheses it is an expression, in metres.
-        return tomlkit.item(f"({written})" if unit != ONE and is_plain_number(written) else written)
+        return tomlkit.item(f"({written})" if unit != ONE and has_numbers_alone(written) else written)
     if bare.denominator == 1 and "e" not in text:
         return tomlkit.integer(text)
     # tomlkit.float_ would print the nearest double; this keeps all digits.

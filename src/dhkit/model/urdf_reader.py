@@ -147,7 +147,7 @@ class _Reader:
             kind=kind,
             parent=child_name(joint, "parent"),
             child=child_name(joint, "child"),
-            T_parent_joint=self._origin(str(name), joint.find("origin")),
+            T_parent_joint=self._joint_origin(str(name), joint.find("origin")),
             rounding=self._rounding(joint.find("origin"), "rpy"),
             axis=self._axis(name, joint) if has_axis else np.array([1.0, 0.0, 0.0]),
             axis_rounding=self._rounding(joint.find("axis"), "xyz"),
@@ -160,13 +160,16 @@ class _Reader:
             fault=fault,
         )
 
+    def _joint_origin(self, where: str, origin: Element | None) -> Array:
+        T = self._origin(where, origin)
+        largest = float(np.abs(T[:3, 3]).max())
+        if largest > MAX_NUMBER:
+            raise ModelError(f"{where}: <origin xyz>: found {largest:.3g} m; expected at most {MAX_NUMBER:g}")
+        return T
+
     def _origin(self, where: str, origin: Element | None) -> Array:
         """Return the pose of xyz and rpy, or of a quaternion; missing ones are 0."""
         xyz = numbers(where, origin, "xyz", 3) or [0.0] * 3
-        if max(map(abs, xyz)) > MAX_NUMBER:
-            raise ModelError(
-                f"{where}: <origin xyz>: found {max(map(abs, xyz)):.3g} m; expected at most {MAX_NUMBER:g}"
-            )
         if quaternion := numbers(where, origin, "quat_xyzw", 4):  # of URDF 1.2
             if origin is not None and origin.get("rpy") is not None:
                 raise ModelError(f"{where}: <origin> has both rpy and quat_xyzw; expected one of them")

@@ -54,11 +54,8 @@ class WrittenNumbers:
         bare = without_written(tree, whole)
         if bare is tree:
             return frozenset()
-        try:
-            remaining = self.reader.read(bare).element()
-        except (OutsideTheRingError, AnswerError, RingError):
-            remaining = None
-        if remaining is None:  # its terms cannot be told apart
+        whole_answer, remaining = self._element(tree), self._element(bare)
+        if whole_answer is None or remaining is None:  # its terms cannot be told apart
             return candidates if has_written(tree) else frozenset()
         while candidates:
             left_out = self._left_out(remaining, right, candidates, values)
@@ -66,6 +63,13 @@ class WrittenNumbers:
                 break
             candidates -= left_out
         return candidates
+
+    def _element(self, tree: Tree) -> Element | None:
+        """Return a formula as an element of the ring; None if it is outside."""
+        try:
+            return self.reader.read(tree).element()
+        except (OutsideTheRingError, AnswerError, RingError):
+            return None
 
     def _values(self, tree: Tree, right: Element) -> dict[str, Fraction]:
         """Return the values of the letters that the right value has and the entry has not."""
