@@ -10,8 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from dhkit.description import Convention, Description
+from dhkit.description.parameters import resolved
 from dhkit.errors import AnswerError, ExpressionError
-from dhkit.expressions import CONSTANTS, ZERO, Expression, exact_angle
+from dhkit.expressions import CONSTANTS, ZERO, Expression, exact_angle, substitute
 from dhkit.expressions.budget import budgeted
 from dhkit.expressions.parser import value_of
 from dhkit.expressions.syntax import Tree
@@ -130,36 +131,62 @@ class TableRows:
 
     def row(self, i: int) -> JudgedRow:
         """Judge A_i, i from 0."""
-        entries = self.answer.entries[i]
+        entries, written = self.answer.entries[i], self.written(i)
         if None not in entries:
-            if self.is_proved(i, numbers=False):
+            if self.is_proved(i, self.reference[i]):
                 return JudgedRow(Verdict.CORRECT, f"A{i + 1} is proved")
-            if self.has_numbers(i) and self.is_proved(i, numbers=True):
-                used = frozenset().union(*(entry.symbols for entry in self.reference[i]))
-                return JudgedRow(Verdict.CORRECT, f"A{i + 1} is proved with the file's numbers", used)
+            if written and self.is_proved(i, self.reference_in_numbers(i)):
+                return JudgedRow(Verdict.CORRECT, f"A{i + 1} is proved with the file's numbers", written)
         if self.agrees_in_doubles(i):
             statement = f"A{i + 1} agrees at {STATES} random states to {ROUNDING:g}, without a proof"
             return JudgedRow(Verdict.UNDECIDED, statement)
         return JudgedRow(Verdict.WRONG, f"A{i + 1} differs")
 
-    def has_numbers(self, i: int) -> bool:
-        """Whether row i has numbers where the file has parameters."""
-        parameters = set(self.description.parameters)
-        given = set().union(*(entry.symbols for entry in self.answer.entries[i] if entry is not None))
-        return not given & parameters and any(entry.symbols & parameters for entry in self.reference[i])
+    @cached_property
+    def has_letters(self) -> bool:
+        """Whether the answer has a parameter of the file anywhere."""
+        names = (names_of(tree) for row in self.answer.trees for tree in row)
+        return any(self.description.parameters.keys() & used for used in names)
 
-    def is_proved(self, i: int, numbers: bool) -> bool:
-        """Whether A_i, i from 0, equals the file's in the ring of the file's parameters, or of its numbers."""
-        reader = self.readers[numbers]
+    def is_written(self, i: int, column: int) -> bool:
+        """Whether an entry of row i is without letters where the file has some: their numbers are written.
+
+        A letter of value 0 beside other letters was left out.
+        """
+        parameters = self.description.parameters
+        letters = self.reference[i][column].symbols & parameters.keys()
+        if not letters or names_of(self.answer.trees[i][column]) & parameters.keys():
+            return False
+        return not self.has_letters or all(self.states[0][letter] != 0 for letter in letters)
+
+    def written(self, i: int) -> frozenset[str]:
+        """Return the letters that row i has as numbers."""
+        letters = (self.reference[i][k].symbols for k in range(len(COLUMNS)) if self.is_written(i, k))
+        return frozenset().union(*letters) & self.description.parameters.keys()
+
+    def reference_in_numbers(self, i: int) -> Row:
+        """Return row i of the file, with numbers where the answer has them."""
+        return tuple(self._in_numbers(i, k, entry) for k, entry in enumerate(self.reference[i]))  # type: ignore[return-value]
+
+    def _in_numbers(self, i: int, column: int, truth: Expression) -> Expression:
+        """Return an entry with the file's numbers where the answer has them."""
+        return substitute(truth, self._values) if self.is_written(i, column) else truth
+
+    @cached_property
+    def _values(self) -> dict[str, Expression]:
+        return resolved(self.description.parameters)
+
+    def is_proved(self, i: int, reference: Row) -> bool:
+        """Whether A_i, i from 0, equals that of a row of the file in the ring of the file's parameters."""
         try:
-            A = reader.link(self.answer.entries[i], self.convention)
-            return bool((reader.link(self.reference[i], self.convention) == A).all())
+            A = self.reader.link(self.answer.entries[i], self.convention)
+            return bool((self.reader.link(reference, self.convention) == A).all())
         except (RingError, ExpressionError):
             return False
 
     def agrees_in_doubles(self, i: int) -> bool:
         """Whether A_i, i from 0, agrees with the file's in doubles, for other values of the parameters as well."""
-        fixed = {name: self.states[0][name] for name in self.description.parameters} if self.has_numbers(i) else {}
+        fixed = {name: self.states[0][name] for name in self.written(i)}
         for state in self.states:
             values = state | fixed
             entries = row_numbers(self.answer.trees[i], values)
@@ -177,10 +204,9 @@ class TableRows:
         return _file_rows(self.description, self.convention)
 
     @cached_property
-    def readers(self) -> tuple[_Reader, _Reader]:
-        """Readers into the ring with the file's parameters, and into the one with its numbers."""
-        whole = with_massless_links(self.description)
-        return _Reader(exact_arm(whole, "file")), _Reader(exact_arm(whole, "none"))
+    def reader(self) -> _Reader:
+        """Reader into the ring with the file's parameters."""
+        return _Reader(exact_arm(with_massless_links(self.description), "file"))
 
     @cached_property
     def states(self) -> list[dict[str, float]]:
@@ -200,8 +226,8 @@ class TableRows:
         given = self.answer.entries[i][column]
         if given is None:
             return False
-        naming = self.readers[self.has_numbers(i)].naming
-        difference = naming.known(given) - naming.known(truth)
+        naming = self.reader.naming
+        difference = naming.known(given) - naming.known(self._in_numbers(i, column, truth))
         if COLUMNS[column] in ("d", "a"):
             return difference.is_zero
         turns = exact_angle(difference).half_turns

@@ -112,6 +112,8 @@ def _judge(table: TableRows, task: Requirements) -> TableJudgement:
     overlay = _overlay(table)
     # Without changes all frames are the file's to 1e-9: the numbers that are wrong by less belong to another arm.
     if overlay is not None and overlay.changes:
+        written = frozenset().union(*(table.written(i) for i in range(table.n)))
+        at_values = {name: table.states[0][name] for name in table.description.parameters if name in written}
         return _judge_in_other_frames(table, rows, wrong, mistakes, overlay, task, notes, at_values)
     diagnosis = tuple(mistake.diagnosis() for mistake in mistakes)
     if _is_of_other_convention(table):
@@ -192,8 +194,10 @@ def _overlay(table: TableRows) -> Overlay | None:
     """Return how the answer's frames lie on the file's; None if the answer is another arm."""
     strict, kinds = not table.converted, table.description.kinds
     best: Overlay | None = None
-    is_symbolic = table.description.parameters and not any(table.has_numbers(i) for i in range(table.n))
-    for values in table.states[: 2 if is_symbolic else 1]:
+    written = frozenset().union(*(table.written(i) for i in range(table.n)))
+    fixed = {name: table.states[0][name] for name in written}
+    for state in table.states[: 2 if table.description.parameters else 1]:
+        values = state | fixed
         answer = TableArm.of_trees(table.answer.trees, kinds, table.convention, values)
         truth = TableArm.of_rows(table.reference, kinds, table.convention, values)
         overlay = None if answer is None else overlaid(answer, truth, strict)
