@@ -45,7 +45,11 @@ def slip_between(truth: Truth, name: str, answer: Element, right: Element) -> Sl
     """Return the slip that turns the truth into an answer, in the student's own rates and angles."""
     own = truth.coordinates.in_own_rates
     slip = slip_in(truth.arm(name), own(answer), own(right))
-    return None if slip is None else replace(slip, detail=in_own_angles(truth, slip.detail))
+    return (
+        None
+        if slip is None
+        else replace(slip, detail=in_own_angles(truth, slip.detail), right=in_own_angles(truth, slip.right))
+    )
 
 
 def in_own_angles(truth: Truth, text: str) -> str:
@@ -141,7 +145,7 @@ def described(truth: Truth, quantity: JudgedQuantity, index: Index) -> Diagnosis
 
 
 def compare_terms(arm: ExactArm, answer: Element, truth: Element) -> tuple[str, str]:
-    """Return in words how the terms of an answer differ from those of the truth, and those that are missing.
+    """Return in words how the terms of an answer differ from those of the truth, and what is right in their place.
 
     Parameters
     ----------
@@ -160,12 +164,9 @@ def compare_terms(arm: ExactArm, answer: Element, truth: Element) -> tuple[str, 
     differences = {
         "missing": [text({m: c}) for m, c in ours.items() if m not in theirs],
         "too much": [text({m: c}) for m, c in theirs.items() if m not in ours],
-        "another factor": [
-            f"{text({m: theirs[m]})} in place of {text({m: c})}"
-            for m, c in ours.items()
-            if m in theirs and theirs[m] != c
-        ],
+        "another factor": [text({m: theirs[m]}) for m, c in ours.items() if m in theirs and theirs[m] != c],
     }
+    right = [text({m: c}) for m, c in ours.items() if m not in theirs or theirs[m] != c]
     listed = {kind: _few(terms) for kind, terms in differences.items() if terms}
     missing = differences["missing"]
     parts = [f"{kind}: {terms}" for kind, terms in listed.items() if kind != "missing"]
@@ -173,7 +174,7 @@ def compare_terms(arm: ExactArm, answer: Element, truth: Element) -> tuple[str, 
         kind = kind_of_terms(arm, ring.from_terms({m: c for m, c in ours.items() if m not in theirs}))
         count = f"{len(missing)} terms are missing" if len(missing) > 1 else "a term is missing"
         parts.insert(0, f"{count}, with {kind}" if kind else count)
-    return "; ".join(parts) or "the terms are the same", listed.get("missing", "")
+    return "; ".join(parts) or "the terms are the same", _few(right)
 
 
 def _few(terms: Sequence[str]) -> str:

@@ -31,14 +31,17 @@ class Slip:
     identity
         Identity of the mistake.
     detail
-        The term, and the term in its place.
+        The term: as it was handed in, or, if it is missing, as it should be.
     kind
         Of missing terms, of what kind they are and of which links, in words; empty for others.
+    right
+        The right term where another one was handed in; empty for others.
     """
 
     identity: str
     detail: str
     kind: str = ""
+    right: str = ""
 
 
 def slip_in(arm: ExactArm, answer: Element, truth: Element) -> Slip | None:
@@ -127,7 +130,7 @@ def _rescaled(ring: PolynomialRing, shared: Terms, right: Terms) -> Slip | None:
     if factor in UNITS:
         return Slip("millimetres_for_metres", terms)
     wrong = plain_text(ring.from_terms({m: right[m] * factor for m in shared}))
-    return Slip("term_factor", f"{wrong} in place of {terms}")
+    return Slip("term_factor", wrong, right=terms)
 
 
 def _state_part(ring: PolynomialRing, term: tuple[int, ...]) -> tuple[int, ...]:
@@ -167,8 +170,8 @@ def _of_pairs(
     (exchange,) = exchanges
     removed = [(ring.generators[k], -e) for k, e in enumerate(exchange) if e < 0]
     added = [(ring.generators[k], e) for k, e in enumerate(exchange) if e > 0]
-    texts = [plain_text(ring.from_terms(dict(terms))) for terms in (new, missing)]
-    return Slip(_identity(ring, removed, added, next(iter(pairs))), " in place of ".join(texts))
+    wrong, right = (plain_text(ring.from_terms(dict(terms))) for terms in (new, missing))
+    return Slip(_identity(ring, removed, added, next(iter(pairs))), wrong, right=right)
 
 
 def _paired(old: Terms, new: Terms) -> dict[tuple[int, ...], tuple[int, ...]] | None:

@@ -79,8 +79,8 @@ def diagnosis_of_slip(quantity: JudgedQuantity, index: Index, slip: Slip) -> Dia
     entry = entry_name(quantity.name, index)
     if slip.identity != "term_missing":
         sentence = sentence_of(slip.identity, detail=slip.detail)
-        return Diagnosis(slip.identity, sentence, entry, (entry,), hint_of(slip.identity))
-    # The term itself would be the answer: what is said first is where it comes from.
+        return Diagnosis(slip.identity, sentence, entry, (entry,), hint_of(slip.identity), second_hint=slip.right)
+    # The right term would be the answer: what is said first is where it comes from.
     sentence = sentence_of(slip.identity, detail=f"one with {slip.kind}" if slip.kind else "")
     hint = f"Look again at the terms with {slip.kind}: is each there?" if slip.kind else hint_of(slip.identity)
     return Diagnosis(slip.identity, sentence, entry, (entry,), hint, second_hint=slip.detail)
