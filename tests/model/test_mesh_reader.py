@@ -6,6 +6,7 @@ import trimesh
 
 from dhkit.description import Mesh
 from dhkit.description.mesh_files import check_mesh_file
+from dhkit.errors import ModelError
 from dhkit.expressions import exact
 from dhkit.model.mesh_reader import read_mesh, read_part
 from dhkit.model.shape_inertia import shape_inertia
@@ -152,3 +153,24 @@ def test_arrays_of_other_shapes_are_no_mesh():
         TriangleMesh(np.zeros((3, 2)), np.zeros((1, 3), dtype=int))
     with pytest.raises(ValueError, match="colours has shape"):
         TriangleMesh(np.zeros((3, 3)), np.zeros((1, 3), dtype=int), np.zeros((2, 3), dtype=np.uint8))
+
+
+TRIANGLE = (
+    "solid {name}\nfacet normal 0 0 1\n outer loop\n vertex {x} 0 0\n vertex 1 0 0\n vertex 0 1 0\n endloop\nendfacet\n"
+)
+
+
+@pytest.mark.parametrize("name", ["a", "vertex 1 2 3", "endfacet", "facet"])
+@pytest.mark.parametrize("x", ["0.001", "1.000000000000000020816681711721685132943093776703e-03"])
+def test_long_coordinates_and_keywords_in_the_name_of_a_text(tmp_path, name, x):
+    file = tmp_path / "part.stl"
+    file.write_text(TRIANGLE.format(name=name, x=x) + f"endsolid {name}\n")
+    assert read_mesh(file).corners[0, 0, 0] == pytest.approx(0.001)
+
+
+@pytest.mark.parametrize("x", ["1_0", "1" + "0" * 80])
+def test_coordinates_that_are_no_numbers_are_refused(tmp_path, x):
+    file = tmp_path / "part.stl"
+    file.write_text(TRIANGLE.format(name="a", x=x) + "endsolid a\n")
+    with pytest.raises(ModelError, match="expected a coordinate"):
+        read_mesh(file)

@@ -184,7 +184,7 @@ class _SheetJudge:
         """Return the entries of a Jacobian: of the task's rows, of six, or of those that an arm's motion has.
 
         Of an arm in a plane these are the two positions in it, with the angle about its normal or without; of others
-        three rows are those of the position.
+        three rows are those of the position, and four or five those that are not zero.
         """
         asked, errors = self.sheet.task.jacobian_rows, list[AnswerError]()
         for rows in [asked] if asked else [(0, 1, 2, 3, 4, 5), *self._rows_of_few()]:
@@ -203,7 +203,10 @@ class _SheetJudge:
         moving = [row for row in range(6) if not all(element.is_zero for element in J[row])]
         position = tuple(row for row in moving if row < 3)
         is_planar = len(position) == 2 and len(moving) <= 3
-        return [position, tuple(moving)] if is_planar else [(0, 1, 2)]
+        if is_planar:
+            return [position, tuple(moving)]
+        # A SCARA has the rows vx, vy, vz and wz.
+        return [(0, 1, 2), tuple(moving)] if 3 < len(moving) < 6 else [(0, 1, 2)]
 
     def _require_known(self, name: str, names: QuantityNames) -> None:
         """Refuse a name that is none of a quantity."""

@@ -8,6 +8,7 @@ import pytest
 
 import dhkit
 from dhkit.description import library_robot
+from dhkit.errors import AnswerError
 from dhkit.grading import Verdict
 from dhkit.grading.answers.matrix_algebra import is_algebra, read_algebra
 from dhkit.grading.answers.vocabulary import Vocabulary
@@ -192,3 +193,31 @@ def test_what_cannot_be_read_says_why(answers, message):
     report = PLANAR.grade({"V": given("V"), **answers})
     unread = [entry.statement for entry in report.entries if entry.verdict is Verdict.UNREADABLE]
     assert unread and message in unread[0], unread
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        r"\begin{bmatrix} m_1 & m_2 \\ m_2 & l_1 \end{bmatrix} + m_2",
+        "[m1, m2; m2, l1] + m2",
+        "m2 - [m1, m2; m2, l1]",
+        "[[m1, m2], [m2, l1]] - m2*l2^2/3",
+    ],
+)
+def test_a_matrix_and_a_number_have_no_sum(text):
+    with pytest.raises(AnswerError, match="a matrix in a sum with a number"):
+        dhkit.Arm.load("planar2r").grade({"M": text})
+
+
+@pytest.mark.parametrize(
+    ("g2", "verdict"),
+    [
+        (r"m_2 g {\frac{1}{2} l_2 \cos(q_1+q_2)}", Verdict.CORRECT),
+        (r"m_2 g {+ \frac{1}{2} l_2 \cos(q_1+q_2)}", Verdict.WRONG),
+        (r"0 {+ m_2 g \frac{1}{2} l_2 \cos(q_1+q_2)}", Verdict.CORRECT),
+        (r"-m_2 g \frac{1}{2} l_2 \cos{-(q_1+q_2-\pi)}", Verdict.CORRECT),
+    ],
+)
+def test_braces_that_begin_with_a_sign_are_no_factor(g2, verdict):
+    report = dhkit.Arm.load("planar2r").grade({"g": ["(m1/2+m2)*g*l1*c1+m2*g*l2*c12/2", g2]}, explain=False)
+    assert report.entries[1].verdict is verdict

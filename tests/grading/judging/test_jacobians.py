@@ -141,3 +141,18 @@ def test_a_task_says_which_rows_are_asked_for():
     for wrong in (["vx", "vx"], ["phi"], "vx"):
         with pytest.raises(AnswerError, match=r"task\.J_rows"):
             arm.grade({"J": rows}, task={"J_rows": wrong})
+
+
+def test_the_four_rows_of_a_scara():
+    # vx, vy, vz and wz; the slide's axis points down.
+    arm = Arm.load("cobra600")
+    c12, s12 = "0.275*cos(q1+q2)", "0.275*sin(q1+q2)"
+    right = [
+        [f"-0.325*sin(q1)-{s12}", f"-{s12}", "0", "0"],
+        [f"0.325*cos(q1)+{c12}", c12, "0", "0"],
+        ["0", "0", "-1", "0"],
+        ["1", "1", "0", "-1"],
+    ]
+    assert arm.grade({"J": right}).verdict.passes
+    wrong = [*right[:2], ["0", "0", "1", "0"], right[3]]
+    assert [entry.name for entry in arm.grade({"J": wrong}).entries if not entry.verdict.passes] == ["J33"]

@@ -1,12 +1,13 @@
 """Judging tables: the file's own is proved, other frames are recognised, and mistakes have names."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from acceptance import only_accepting
-from dhkit.description import Convention, from_dh, library_robot, robots
+from dhkit.description import Convention, from_dh, from_toml, library_robot, robots, to_toml
 from dhkit.errors import AnswerError
 from dhkit.expressions import read
 from dhkit.grading.answers.sheet_values import Requirements
@@ -429,3 +430,22 @@ def test_random_gauges_of_random_arms():
             change = turned_x if random.random() < 0.5 else reversed_z
             table = change(table, int(random.integers(1, n)))
         assert judge(arm, table).verdict in (CORRECT, UNDECIDED), (kinds, rows, table)
+
+
+def test_letters_of_equal_value_are_letters_in_other_frames_too():
+    text = to_toml(library_robot("planar2r"))
+    for name in ("l1", "l2"):
+        text = re.sub(rf"(?m)^{name} = [\d.]+$", f"{name} = 2.0", text)
+    description = from_toml(text)
+    wrong = judge(description, [["q1 + pi", "0", "-2", "0"], ["q2 - pi", "0", "l1", "0"]])
+    assert wrong.verdict is WRONG
+    right = judge(description, [["q1 + pi", "0", "-2", "0"], ["q2 - pi", "0", "l2", "0"]])
+    assert right.verdict is UNDECIDED and dict(right.at_values) == {"l1": 2.0}
+
+
+def test_a_number_may_stand_in_one_entry_of_a_row():
+    arm = from_dh([("beta", "l1", 0, "beta"), (0, 0, "l2", 0)], parameters={"beta": "pi/2", "l1": 1.0, "l2": 0.5})
+    row = ["q2", "0", "l2", "0"]
+    assert dict(judge(arm, [["q1 + beta", "l1", "0", "pi/2"], row]).at_values) == {"beta": pytest.approx(np.pi / 2)}
+    assert judge(arm, [["q1 + pi/2", "1", "0", "beta"], row]).verdict is CORRECT
+    assert judge(arm, [["q1 + pi/2", "2", "0", "beta"], row]).verdict is WRONG
