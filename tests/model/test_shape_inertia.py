@@ -282,6 +282,6 @@ def test_a_surface_that_is_written_in_two_tessellations_warns():
     cube = box((1, 1, 1))
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     other = np.array([t for a, b, c, d in quads for t in ((a, b, d), (b, c, d))])
-    assert shape_inertia(TriangleMesh(cube.vertices, other), 1.0).mass == pytest.approx(1.0)
-    doubled = shape_inertia(TriangleMesh(cube.vertices, np.concatenate([cube.faces, other])), 1.0)
+    assert shape_inertia(TriangleMesh(cube.vertices, other), density=1.0).mass == pytest.approx(1.0)
+    doubled = shape_inertia(TriangleMesh(cube.vertices, np.concatenate([cube.faces, other])), density=1.0)
     assert any("counts twice" in note for note in doubled.notes)
