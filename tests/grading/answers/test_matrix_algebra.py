@@ -1,6 +1,6 @@
 """Formulas with several matrices: sums, products, transposes, powers, and names of other answers of a sheet.
 
-Modules: matrix_algebra, given, matrices.
+Modules: matrix_algebra, given, matrices, sheet_matrices.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Letters are letters: one that is left out is no number, though its value is 1 or that of another letter.
 
-Modules: quantities, inverse.
+Modules: quantities, letters, inverse, other_values.
 """
 
 import re

@@ -1,6 +1,6 @@
 """Steps of inverse kinematics followed along the student's own roots, and what else a step may hold.
 
-Modules: step_mistakes, step_solutions.
+Modules: step_mistakes, step_solutions, step_roots.
 """
 
 import numpy as np
