@@ -1,7 +1,4 @@
-"""What cannot be simulated is refused in one clear line; a wrong controller names the time, and keeps the run.
-
-Modules: controller, simulation.
-"""
+"""What cannot be simulated is refused in one clear line; a wrong controller names the time, and keeps the run."""
 
 import re
 

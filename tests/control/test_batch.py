@@ -1,7 +1,4 @@
-"""A batch of arms moves as each of them does alone, and one that fails does not touch the others.
-
-Modules: batch, batch_result, batch_run, step_kernel.
-"""
+"""A batch of arms moves as each of them does alone, and one that fails does not touch the others."""
 
 import numpy as np
 import pytest

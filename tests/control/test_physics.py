@@ -1,7 +1,4 @@
-"""The simulated arm obeys mechanics: against Pinocchio, in energy, with friction and at its stops.
-
-Modules: events, integrators, plant, runs, timing.
-"""
+"""The simulated arm obeys mechanics: against Pinocchio, in energy, with friction and at its stops."""
 
 from dataclasses import replace
 

@@ -1,7 +1,4 @@
-"""Joint centres of tables whose lengths are no sizes of the arm.
-
-Modules: joint_centres.
-"""
+"""Joint centres of tables whose lengths are no sizes of the arm."""
 
 import numpy as np
 import pytest

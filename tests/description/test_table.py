@@ -1,7 +1,4 @@
-"""Tables in: any order, units, letters, text; and what is no table.
-
-Modules: table_rows, quantities.
-"""
+"""Tables in: any order, units, letters, text; and what is no table."""
 
 from dataclasses import replace
 from fractions import Fraction

@@ -1,7 +1,4 @@
-"""Batches of dynamics: one rule of shapes, NaN rows, out=, threads=, and errors that say what was expected.
-
-Modules: programs.
-"""
+"""Batches of dynamics: one rule of shapes, NaN rows, out=, threads=, and errors that say what was expected."""
 
 import numpy as np
 import pytest

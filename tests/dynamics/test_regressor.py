@@ -1,7 +1,4 @@
-"""The regressor in numbers: linear, equal to the exact one and to Pinocchio's.
-
-Modules: regressor, velocity_regressor.
-"""
+"""The regressor in numbers: linear, equal to the exact one and to Pinocchio's."""
 
 from __future__ import annotations
 

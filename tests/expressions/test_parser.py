@@ -1,7 +1,4 @@
-"""What the parser reads, and what it refuses, fast.
-
-Modules: budget, functions, parser, syntax.
-"""
+"""What the parser reads, and what it refuses, fast."""
 
 import contextlib
 import time

@@ -1,7 +1,4 @@
-"""Kernels: equal results interpreted and compiled, when they are compiled, on one thread and several.
-
-Modules: batches, interpreter, kernel, llvm_source, machine_code, stages, threads, vectors.
-"""
+"""Kernels: equal results interpreted and compiled, when they are compiled, on one thread and several."""
 
 import signal
 import subprocess

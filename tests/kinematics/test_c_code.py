@@ -1,7 +1,4 @@
-"""The C code compiles without a warning and computes what dhkit computes.
-
-Modules: programs.
-"""
+"""The C code compiles without a warning and computes what dhkit computes."""
 
 import ctypes
 import subprocess

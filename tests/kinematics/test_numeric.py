@@ -1,7 +1,4 @@
-"""Laws of iterative inverse kinematics: what closes, what is near, what limits keep, what is said of failures.
-
-Modules: candidates, newton, newton_program, numeric.
-"""
+"""Laws of iterative inverse kinematics: what closes, what is near, what limits keep, what is said of failures."""
 
 import time
 

@@ -1,7 +1,4 @@
-"""A path of poses is followed on one branch, through whole turns, and what stands in the way is reported.
-
-Modules: path.
-"""
+"""A path of poses is followed on one branch, through whole turns, and what stands in the way is reported."""
 
 import numpy as np
 import pytest

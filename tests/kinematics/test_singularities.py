@@ -1,7 +1,4 @@
-"""Laws of singularities in closed form: a determinant that is a product, and configurations where it vanishes.
-
-Modules: singular_factors, singularities.
-"""
+"""Laws of singularities in closed form: a determinant that is a product, and configurations where it vanishes."""
 
 import json
 from dataclasses import replace

@@ -1,7 +1,4 @@
-"""What a page can ask for: each panel's requests do what the API does, on several arms.
-
-Modules: desk, requests.
-"""
+"""What a page can ask for: each panel's requests do what the API does, on several arms."""
 
 import base64
 import json

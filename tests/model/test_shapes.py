@@ -1,7 +1,4 @@
-"""Laws of what arms look like.
-
-Modules: shapes, drawing.
-"""
+"""Laws of what arms look like."""
 
 import re
 from dataclasses import replace

@@ -1,7 +1,4 @@
-"""A certificate for any motion: limits of one's own, jumps between pieces, payloads and friction.
-
-Modules: certificate.
-"""
+"""A certificate for any motion: limits of one's own, jumps between pieces, payloads and friction."""
 
 from __future__ import annotations
 

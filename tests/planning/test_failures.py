@@ -1,7 +1,4 @@
-"""Every way in which there is no motion, and what is said of it.
-
-Modules: feasibility, goals, value_objects.
-"""
+"""Every way in which there is no motion, and what is said of it."""
 
 import itertools
 import math

@@ -1,7 +1,4 @@
-"""What a planner is asked for: ways, loads, constraints, time, interruption.
-
-Modules: assembly, guess, integration, mesh, planner, point, problem, report, request, search, solver, task.
-"""
+"""What a planner is asked for: ways, loads, constraints, time, interruption."""
 
 import pickle
 import threading

@@ -1,7 +1,4 @@
-"""Certificates that an attack made lie once: each is a sample of a class.
-
-Modules: between_states, collision_avoidance, certificate.
-"""
+"""Certificates that an attack made lie once: each is a sample of a class."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,4 @@
-"""Spheres and boxes on the direct way, passed at the clearance that was asked for.
-
-Modules: collision_avoidance, avoiding.
-"""
+"""Spheres and boxes on the direct way, passed at the clearance that was asked for."""
 
 import itertools
 import re

@@ -1,7 +1,4 @@
-"""What a certificate of clearance covers: lengths in metres, links with shapes, arms with locked joints.
-
-Modules: collision_avoidance, goals, report, work.
-"""
+"""What a certificate of clearance covers: lengths in metres, links with shapes, arms with locked joints."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,4 @@
-"""Programs that do harm, lie or dawdle: the parent says what happened and on which line; nothing is left behind.
-
-Modules: confinement, files_written, orphans, process, program, python_runner, supervisor.
-"""
+"""Programs that do harm, lie or dawdle: the parent says what happened and on which line; nothing is left behind."""
 
 # ruff: noqa: E501 - programs in one line
 

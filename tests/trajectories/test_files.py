@@ -1,7 +1,4 @@
-"""Files come back as they were, and damaged ones are refused in one line.
-
-Modules: archives, files, labels, ros_yaml, tables.
-"""
+"""Files come back as they were, and damaged ones are refused in one line."""
 
 import io
 import zipfile

@@ -1,7 +1,4 @@
-"""Samples out of .mat files as MATLAB and Simulink users save them; what is wrong is named with its variable.
-
-Modules: matlab_samples.
-"""
+"""Samples out of .mat files as MATLAB and Simulink users save them; what is wrong is named with its variable."""
 
 import struct
 

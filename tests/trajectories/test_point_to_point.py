@@ -1,7 +1,4 @@
-"""Classical motions against their textbooks, and the best blend against all others.
-
-Modules: point_to_point, timing.
-"""
+"""Classical motions against their textbooks, and the best blend against all others."""
 
 import numpy as np
 import pytest

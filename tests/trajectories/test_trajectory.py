@@ -1,7 +1,4 @@
-"""Laws of trajectories: exact derivatives, what holds at breaks and ends, and motions made from motions.
-
-Modules: interpolation, pieces, samples, trajectory.
-"""
+"""Laws of trajectories: exact derivatives, what holds at breaks and ends, and motions made from motions."""
 
 import pickle
 

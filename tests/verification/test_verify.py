@@ -1,7 +1,4 @@
-"""Verification finds nothing where nothing is wrong, and what is wrong where something is.
-
-Modules: comparison, differences, reference, report, second_opinion, states.
-"""
+"""Verification finds nothing where nothing is wrong, and what is wrong where something is."""
 
 from __future__ import annotations
 

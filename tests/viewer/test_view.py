@@ -1,4 +1,4 @@
-"""Facts of a view that need no browser. Modules: view, opening."""
+"""Facts of a view that need no browser."""
 
 import subprocess
 import sys

@@ -1,7 +1,4 @@
-"""Steps of inverse kinematics on a sheet: what cannot be read is refused, or says why.
-
-Modules: inverse_steps, pose_entries, sheet_values.
-"""
+"""Steps of inverse kinematics on a sheet: what cannot be read is refused, or says why."""
 
 import re
 

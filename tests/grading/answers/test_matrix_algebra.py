@@ -1,7 +1,4 @@
-"""Formulas with several matrices: sums, products, transposes, powers, and names of other answers of a sheet.
-
-Modules: matrix_algebra, given, matrices, sheet_matrices.
-"""
+"""Formulas with several matrices: sums, products, transposes, powers, and names of other answers of a sheet."""
 
 import numpy as np
 import pytest

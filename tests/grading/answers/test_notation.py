@@ -1,7 +1,4 @@
-"""Every notation means what a person means by it; what is no mathematics is refused with its place.
-
-Modules: indices, latex, objects, rewriting, tokens.
-"""
+"""Every notation means what a person means by it; what is no mathematics is refused with its place."""
 
 import contextlib
 import math

@@ -1,7 +1,4 @@
-"""A task's names of the joint variables hold for programs and papers.
-
-Modules: sources.
-"""
+"""A task's names of the joint variables hold for programs and papers."""
 
 import pytest
 

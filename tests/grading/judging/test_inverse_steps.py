@@ -1,7 +1,4 @@
-"""Inverse kinematics handed in step by step: equations proved, solutions tried, mistakes named, others' not blamed.
-
-Modules: inverse_steps, step_context, step_equations, step_solutions.
-"""
+"""Inverse kinematics handed in step by step: equations proved, solutions tried, mistakes named, others' not blamed."""
 
 import pytest
 

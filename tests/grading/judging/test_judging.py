@@ -1,7 +1,4 @@
-"""Laws of the parts of judging: each module that compares answers with the truth, by itself.
-
-Modules: functions, coordinates, enclosures, quotients, sampling.
-"""
+"""Laws of the parts of judging: each module that compares answers with the truth, by itself."""
 
 from fractions import Fraction
 

@@ -1,7 +1,4 @@
-"""Letters are letters: one that is left out is no number, though its value is 1 or that of another letter.
-
-Modules: quantities, letters, inverse, other_values.
-"""
+"""Letters are letters: one that is left out is no number, though its value is 1 or that of another letter."""
 
 import re
 

@@ -1,7 +1,4 @@
-"""Steps of inverse kinematics followed along the student's own roots, and what else a step may hold.
-
-Modules: step_mistakes, step_solutions, step_roots.
-"""
+"""Steps of inverse kinematics followed along the student's own roots, and what else a step may hold."""
 
 import numpy as np
 import pytest

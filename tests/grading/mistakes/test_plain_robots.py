@@ -1,7 +1,4 @@
-"""Mistakes of homework on plain arms, answers derived by hand: the name says what was done.
-
-Modules: plain_causes, parameter_variants, energy_variants, diagnosis.
-"""
+"""Mistakes of homework on plain arms, answers derived by hand: the name says what was done."""
 
 import math
 

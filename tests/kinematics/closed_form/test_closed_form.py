@@ -1,7 +1,4 @@
-"""Closed-form inverse kinematics: every branch closes, the original is among them, peers find the same.
-
-Modules: arm_plane, family, formulas, links, planar, program, spherical_wrist, three_parallel, turret, wrist.
-"""
+"""Closed-form inverse kinematics: every branch closes, the original is among them, peers find the same."""
 
 import numpy as np
 import pytest

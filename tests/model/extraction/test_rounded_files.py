@@ -1,7 +1,4 @@
-"""Tables of URDFs whose angles are rounded: no lengths of kilometres, and residuals no larger than the rounding.
-
-Modules: extraction, table, axes.
-"""
+"""Tables of URDFs whose angles are rounded: no lengths of kilometres, and residuals no larger than the rounding."""
 
 import re
 

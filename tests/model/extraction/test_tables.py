@@ -1,7 +1,4 @@
-"""Tables found in URDFs: random tables come back, published ones are found, degenerate axes have tidy ones.
-
-Modules: axes, draft, ends, extraction, table.
-"""
+"""Tables found in URDFs: random tables come back, published ones are found, degenerate axes have tidy ones."""
 
 from __future__ import annotations
 

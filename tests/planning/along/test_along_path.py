@@ -1,7 +1,4 @@
-"""Motions along a path against the textbook's bang-bang, toppra, and limits on another grid by another library.
-
-Modules: checks, grid, path_motion, path_point, path_program, path_states, smooth_timing, timing.
-"""
+"""Motions along a path against the textbook's bang-bang, toppra, and limits on another grid by another library."""
 
 from dataclasses import dataclass
 

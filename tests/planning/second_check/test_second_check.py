@@ -1,7 +1,4 @@
-"""The second check refutes what is wrong, and no certificate that is right.
-
-Modules: distances, instants, joints, recheck, result.
-"""
+"""The second check refutes what is wrong, and no certificate that is right."""
 
 from dataclasses import replace
 

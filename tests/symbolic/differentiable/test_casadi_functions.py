@@ -1,7 +1,4 @@
-"""CasADi functions: named, differentiable, of use to optimizers, and equal to the kernels.
-
-Modules: casadi_functions, friction, velocity_regressor.
-"""
+"""CasADi functions: named, differentiable, of use to optimizers, and equal to the kernels."""
 
 import pickle
 import time

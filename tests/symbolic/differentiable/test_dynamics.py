@@ -1,8 +1,4 @@
-"""Lagrange's equations by differentiation, and the recursions beside them, agree with Pinocchio's dynamics.
-
-Modules: composite_bodies, energies, equation_frames, forward_dynamics, frames, inertial_table, joint_frames,
-number_patterns, recursive, vectors.
-"""
+"""Lagrange's equations by differentiation, and the recursions beside them, agree with Pinocchio's dynamics."""
 
 import casadi
 import numpy as np

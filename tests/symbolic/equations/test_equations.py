@@ -1,7 +1,4 @@
-"""What is printed is what was derived, exactly; and it reads as in textbooks.
-
-Modules: collected, programs, quantities, text, writing.
-"""
+"""What is printed is what was derived, exactly; and it reads as in textbooks."""
 
 import re
 from fractions import Fraction

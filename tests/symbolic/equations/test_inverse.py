@@ -1,8 +1,4 @@
-"""Derivations of inverse kinematics as text, LaTeX, pages, sympy objects and code that is compiled and run.
-
-Modules: html, inverse_code, inverse_figures, inverse_page, inverse_program, inverse_sympy, inverse_text,
-inverse_writing.
-"""
+"""Derivations of inverse kinematics as text, LaTeX, pages, sympy objects and code that is compiled and run."""
 
 import ctypes
 import importlib.util

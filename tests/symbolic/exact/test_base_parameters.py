@@ -1,7 +1,4 @@
-"""Base parameters and the regressor: as many as the numeric rank, and the same equations.
-
-Modules: base_parameters, dependencies, regressor.
-"""
+"""Base parameters and the regressor: as many as the numeric rank, and the same equations."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Exact equations of motion against Pinocchio, the textbook's route, and the textbooks' own formulas.
-
-Modules: composite, exact_arm, lagrangian, naming.
-"""
+"""Exact equations of motion against Pinocchio, the textbook's route, and the textbooks' own formulas."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Inverse kinematics derived in the exact ring: proved, and held against the kernels and forward kinematics.
-
-Modules: chain, derivation, families, forms, missing, planar, regions, relations, steps,
-turning_planes, wrists.
-"""
+"""Inverse kinematics derived in the exact ring: proved, and held against the kernels and forward kinematics."""
 
 import math
 

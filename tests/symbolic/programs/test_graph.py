@@ -1,7 +1,4 @@
-"""Straight-line programs compute what CasADi computes, with nothing done twice.
-
-Modules: graph, printers.
-"""
+"""Straight-line programs compute what CasADi computes, with nothing done twice."""
 
 import casadi
 import numpy as np

@@ -1,7 +1,4 @@
-"""The ring's laws: relations, normal forms, derivatives, and reading of exact expressions.
-
-Modules: constants, elements, notation, polynomials, reading, ring.
-"""
+"""The ring's laws: relations, normal forms, derivatives, and reading of exact expressions."""
 
 from __future__ import annotations
 

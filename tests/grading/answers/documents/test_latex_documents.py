@@ -1,7 +1,4 @@
-r"""Documents: rows that go on, chains, entries and systems are read as what they mean and as nothing else.
-
-Modules: latex_document, latex_rows, latex_source, latex_statements, entry_statements, statements.
-"""
+r"""Documents: rows that go on, chains, entries and systems are read as what they mean and as nothing else."""
 
 import re
 import time

@@ -1,10 +1,6 @@
 """Programs: whatever binds a name, nothing passes that the program does not compute.
 
-Python programs of this file, and only those, are run, to compare what they compute with the verdict on them.
-
-Modules: bindings, definitions, name_resolution, matlab_formulas, matlab_program, matlab_statements, python_effects,
-python_formulas, python_program, python_text, python_values.
-"""
+Python programs of this file, and only those, are run, to compare what they compute with the verdict on them."""
 
 import contextlib
 import io

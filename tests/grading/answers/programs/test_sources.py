@@ -1,7 +1,4 @@
-"""Programs and papers are read, not run: what they assign, in order, and nothing that was changed afterwards.
-
-Modules: notebook, program_answers.
-"""
+"""Programs and papers are read, not run: what they assign, in order, and nothing that was changed afterwards."""
 
 import json
 import re
