@@ -121,13 +121,15 @@ INVERSE = _catalogue(
             "offset_forgotten": "a constant length of base or table is not taken off a component of the position",
             "triangle_angle_forgotten": "the angle in the triangle of two links is not taken off: the direction to the"
             " end of the second is given in place of the first link's",
-            "tool_length_forgotten": "the tool's length is not taken off the position: the triangle ends at the wrist",
+            "tool_length_forgotten": "the length beyond the last joint, of the last link or of the tool, is not taken off the"
+            " position: the triangle ends at the last joint",
             "shoulder_offset_forgotten": "the shoulder's offset is missing: the point does not lie in the plane through"
             " axis 1, but beside it",
             "tool_not_taken_off": "the tool is not taken off: the formula is right for the last frame, T tool^-1",
             "base_not_taken_off": "the base is not taken off: the formula is right for the tool in frame 0, base^-1 T",
             "base_and_tool_not_taken_off": "base and tool are not taken off: the formula is right for A_1 ... A_n",
-            "tool_length_added": "the tool's length is added to the position: it is to be taken off",
+            "tool_length_added": "the length beyond the last joint, of the last link or of the tool, is added to the"
+            " position: it is to be taken off",
             "length_forgotten": "a length of the arm is missing",
             "length_taken_as_zero": "the formula is right for an arm in which a length is zero",
             "rounded_length": "a length is rounded: the formula needs all of its digits, or its name",
