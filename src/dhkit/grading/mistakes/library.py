@@ -121,8 +121,8 @@ INVERSE = _catalogue(
             "offset_forgotten": "a constant length of base or table is not taken off a component of the position",
             "triangle_angle_forgotten": "the angle in the triangle of two links is not taken off: the direction to the"
             " end of the second is given in place of the first link's",
-            "tool_length_forgotten": "the length beyond the last joint, of the last link or of the tool, is not taken off the"
-            " position: the triangle ends at the last joint",
+            "tool_length_forgotten": "the length beyond the last joint, of the last link or of the tool, is not taken"
+            " off the position: the triangle ends at the last joint",
             "shoulder_offset_forgotten": "the shoulder's offset is missing: the point does not lie in the plane through"
             " axis 1, but beside it",
             "tool_not_taken_off": "the tool is not taken off: the formula is right for the last frame, T tool^-1",
