@@ -49,6 +49,16 @@ def poses_beyond(arm, rng, count):
     return T[beyond], wanted[beyond]
 
 
+def nearest(off, first):
+    """Return the least distance that SciPy finds from ``first``, m.
+
+    Where the wrist is nearly on axis 1, J^T J is singular at the minimum and steps converge linearly: 1,300 evaluations
+    were seen, where SciPy's own limit is 300.
+    """
+    found = least_squares(off, first, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=10_000)
+    return np.linalg.norm(found.fun)
+
+
 def test_no_state_is_nearer_and_one_is_as_near(arm, law):
     rng = np.random.default_rng(0)
     sampled = any_joints(arm, rng, STATES)
@@ -63,10 +73,7 @@ def test_no_state_is_nearer_and_one_is_as_near(arm, law):
         def off(first, wanted=wanted):
             return wrist_centres(arm, np.r_[first, 0, 0, 0]) - wanted
 
-        best = min(
-            np.linalg.norm(least_squares(off, sampled[k, :3], xtol=1e-15, ftol=1e-15, gtol=1e-15).fun)
-            for k in np.argsort(away)[:2]
-        )
+        best = min(nearest(off, sampled[k, :3]) for k in np.argsort(away)[:2])
         law.holds("m beside least squares", abs(best - distance), EXACT, trial)
 
 
