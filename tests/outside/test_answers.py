@@ -39,6 +39,21 @@ def test_a_tasks_names_in_a_matlab_file(report):
     assert report(TASKS / "s01_task_names_in_matlab", "g.m", "--task", "task.toml")["verdict"] == "correct"
 
 
+def test_a_product_of_the_file_is_judged(report):
+    """T = A2*A1 is in the wrong order, and A1 and A2 are right."""
+    found = report(TASKS / "s06_product_dropped_in_silence", "h.m", "--robot", "rr.toml")
+    verdicts = {(one["quantity"], one["verdict"]) for one in found["entries"]}
+    assert {("A1", "correct"), ("A2", "correct"), ("T", "wrong")} <= verdicts
+    assert not verdicts & {("A1", "wrong"), ("A2", "wrong")}
+
+
+@pytest.mark.parametrize(
+    ("folder", "file"), [("s11_state_vector_matlab", "plant.m"), ("s13_input_torque_judged", "sim.m")]
+)
+def test_states_taken_apart_and_inputs(report, folder, file):
+    assert report(TASKS / folder, file, "--robot", "rr.toml")["verdict"] == "correct"
+
+
 @pytest.mark.parametrize(("file", "verdict"), [("good.m", "correct"), ("bad.m", "wrong")])
 def test_vectors_of_parameters_in_matlab(report, file, verdict):
     folder = TASKS / "s16_matlab_vectors_of_parameters"

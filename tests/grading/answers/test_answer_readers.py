@@ -15,13 +15,10 @@ from dhkit.grading.answers.documents.latex_rows import matrix_rows, rows_of
 from dhkit.grading.answers.documents.latex_source import document_statements
 from dhkit.grading.answers.given import given_quantity, vocabulary_of, with_entries_gathered
 from dhkit.grading.answers.pretty import in_one_line, is_pretty
-from dhkit.grading.answers.programs.bindings import Formula, Read, join_formulas
-from dhkit.grading.answers.programs.matlab_formulas import MatlabFormulas
-from dhkit.grading.answers.programs.matlab_statements import matlab_statements
+from dhkit.grading.answers.programs.matlab_tokens import matlab_statements
 from dhkit.grading.answers.programs.notebook import Notebook
-from dhkit.grading.answers.programs.python_effects import bound_names, part_names
-from dhkit.grading.answers.programs.python_formulas import PythonFormulas
-from dhkit.grading.answers.programs.python_text import PythonText, ascii_name
+from dhkit.grading.answers.programs.python_changes import assigned_names, changed_parts
+from dhkit.grading.answers.programs.python_program import constant_index
 from dhkit.grading.answers.quantity_names import QuantityNames
 from dhkit.grading.answers.sheet_values import AnswerSheet
 from dhkit.grading.answers.tokens import replace_runs, split_tokens
@@ -42,34 +39,22 @@ def test_runs_of_tokens_are_replaced_once():
     assert [t.text for t in replace_runs(tokens, read_run)] == ["c", "c", "a"]
 
 
-def test_places_in_joined_formulas_move_with_the_text():
-    entry = Formula("q[0]", (Read("q", 0, 4, (0,)),))
-    joined = join_formulas(["sin(", entry, ") + ", entry])
-    assert [joined.text[r.start : r.end] for r in joined.reads] == ["q[0]", "q[0]"]
-
-
-def test_a_segment_is_one_line_and_spans_point_into_it():
-    source = "x = (ä +  # a comment\n     b*c)\n"
-    value = ast.parse(source).body[0].value
-    text = PythonText(source)
-    segment, span = text.segment(value), text.spans(value)
-    assert "\n" not in segment and "comment" not in segment
-    assert {segment[slice(*span(node))] for node in ast.walk(value) if isinstance(node, ast.Name)} == {"ä", "b", "c"}
-    assert ascii_name("θ") == "theta" and ascii_name("q1") == "q1"
-
-
 @pytest.mark.parametrize(
-    ("text", "index"), [("q[0]", (0,)), ("M[0, 1]", (0, 1)), ("M[0][1]", (0, 1)), ("M[..., 2, 3]", (2, 3))]
+    ("text", "index"), [("q[0]", (0,)), ("M[0, 1]", (0, 1)), ("M[..., 2, 3]", (2, 3)), ("q[k]", None), ("q[-1]", None)]
 )
 def test_python_indices_count_from_zero(text, index):
-    (name,) = PythonFormulas(text).formula(ast.parse(text, mode="eval").body).reads
-    assert name.index == index and (name.start, name.end) == (0, len(text))
+    assert constant_index(ast.parse(text, mode="eval").body.slice) == index
 
 
 def test_names_bound_and_parts_assigned_however_deep():
-    statements = ast.parse("for i in x:\n    with a as b:\n        M[i].y = 1\n        del K[0]\n").body
-    assert set(bound_names(statements)) == {"i", "b", "M", "K"}
-    assert part_names(statements[0]) == ["M", "K"]
+    tree = ast.parse("for i in x:\n    with a as b:\n        M[i].y = 1\n        del K[0]\n")
+    assert set(assigned_names(tree)) == {"i", "b", "M", "K"}
+    assert list(changed_parts(tree)) == ["M", "K"]
+
+
+def test_a_string_that_does_not_end_in_matlab():
+    with pytest.raises(AnswerError, match="line 2: a string that does not end"):
+        list(matlab_statements("a = 1;\nb = 'x", "file", line_name))
 
 
 @pytest.mark.parametrize(
@@ -86,15 +71,6 @@ def test_names_bound_and_parts_assigned_however_deep():
 def test_names_that_a_matlab_statement_may_assign(text, names):
     (statement,) = matlab_statements(text, "file", line_name)
     assert statement.assigned_names() == names
-
-
-def test_matlab_indices_count_from_one_and_transposes_are_no_strings():
-    (statement,) = matlab_statements("M = [a(1) -b'; c, d(2,1)]", "file", line_name)
-    formula = MatlabFormulas(lambda name: False).formula(statement.tokens[2:])
-    assert formula.entries is not None and set(formula.entries) == {(0, 0), (0, 1), (1, 0), (1, 1)}
-    assert [r.index for r in formula.reads] == [(0,), None, None, (1, 0)]
-    with pytest.raises(AnswerError, match="line 2: a string that does not end"):
-        list(matlab_statements("a = 1;\nb = 'x", "file", line_name))
 
 
 def test_lines_of_a_notebook_belong_to_cells():

@@ -66,16 +66,20 @@ def read_source(path: Path, description: Description, names: Names = NO_NAMES) -
 
 def _python(text: str, file: str, line_name: LineName, description: Description, names: Names) -> AnswerSheet:
     from dhkit.grading.answers.programs.program_answers import answers_of
-    from dhkit.grading.answers.programs.python_program import python_program
+    from dhkit.grading.answers.programs.python_program import PythonProgram
+    from dhkit.grading.answers.programs.robot_names import RobotNames
+    from dhkit.grading.answers.programs.scope import Record
 
-    return answers_of(python_program(text, file, line_name, description.n), description, file, names)
+    return answers_of(PythonProgram(text, file, line_name, Record(RobotNames(description, names), "**")), file)
 
 
 def _matlab(text: str, file: str, line_name: LineName, description: Description, names: Names) -> AnswerSheet:
-    from dhkit.grading.answers.programs.matlab_program import matlab_program
+    from dhkit.grading.answers.programs.matlab_program import MatlabProgram
     from dhkit.grading.answers.programs.program_answers import answers_of
+    from dhkit.grading.answers.programs.robot_names import RobotNames
+    from dhkit.grading.answers.programs.scope import Record
 
-    return answers_of(matlab_program(text, file, line_name), description, file, names)
+    return answers_of(MatlabProgram(text, file, line_name, Record(RobotNames(description, names), "^")), file)
 
 
 def _latex(text: str, file: str, line_name: LineName, description: Description, names: Names) -> AnswerSheet:

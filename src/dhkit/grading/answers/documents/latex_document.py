@@ -11,7 +11,7 @@ from dhkit.grading.answers.documents.latex_rows import MATRIX_BEGINNING, has_sym
 from dhkit.grading.answers.documents.latex_source import document_statements
 from dhkit.grading.answers.documents.statements import Statement, left_hand_name
 from dhkit.grading.answers.latex import latex_tokens
-from dhkit.grading.answers.programs.name_resolution import NameResolver, is_same_number
+from dhkit.grading.answers.programs.robot_names import RobotNames, is_same_number
 from dhkit.grading.answers.quantity_names import Target
 from dhkit.grading.answers.sheet import source_sheet
 from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Chain, Entries, Names, Refusal
@@ -72,7 +72,7 @@ class _DocumentAnswers:
         names: Names,
     ) -> None:
         self.line_name = line_name
-        self.names = NameResolver(description, names)
+        self.names = RobotNames(description, names)
         self.quantities = self.names.quantities
         self.left_out: list[str] = []
         self.notes: list[str] = []

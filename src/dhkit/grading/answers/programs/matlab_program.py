@@ -1,40 +1,55 @@
-"""MATLAB and Octave programs as bindings: a closed list of statements is understood, others are noted as changes."""
+"""MATLAB and Octave programs: a closed list of statements and expressions is read, and nothing is run."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
 
 from dhkit.errors import AnswerError
-from dhkit.grading.answers.programs.bindings import (
-    MAX_STATEMENTS,
-    RETURNED_FORMULA,
-    Formula,
-    Index,
-    LibraryFunction,
-    NotUnderstood,
-    OwnFunction,
-    Program,
-    ReturnValue,
-    Scope,
-    Structure,
-    Symbol,
-    Value,
-    vector_of_names,
-)
-from dhkit.grading.answers.programs.matlab_formulas import FUNCTIONS, MatlabFormulas, constant_index
-from dhkit.grading.answers.programs.matlab_statements import (
+from dhkit.grading.answers.programs.library import called
+from dhkit.grading.answers.programs.matlab_tokens import (
     CHANGING,
     STEPPING,
     MatlabStatement,
+    MatlabToken,
     Tokens,
     closing,
     is_call,
     matlab_statements,
+    split_rows,
 )
-from dhkit.grading.answers.tokens import word_set
+from dhkit.grading.answers.programs.scope import Record, Scope
+from dhkit.grading.answers.programs.values import (
+    MAX_INDEX,
+    Function,
+    Given,
+    Index,
+    Library,
+    Matrix,
+    Part,
+    Scalar,
+    Several,
+    Structure,
+    Text,
+    Unread,
+    UnreadError,
+    Value,
+    calculated,
+    matrix_of,
+    number,
+    opposite,
+    transposed,
+    vector_of,
+)
+from dhkit.grading.answers.tokens import rate_name, word_set
+from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, plain_name
+
+MAX_STATEMENTS = 5_000
+"""Largest number of statements that are read, those of functions each time that they are applied."""
+MAX_DEPTH = 20
+"""Largest depth of calls of the program's own functions."""
 
 BLOCK_BEGINNINGS = word_set(
     "if for while switch try parfor spmd unwind_protect do classdef methods properties events enumeration"
@@ -44,7 +59,7 @@ BLOCK_ENDS = word_set(
     "end endif endfor endwhile endswitch end_try_catch endfunction endparfor end_unwind_protect until"
 )
 
-UNBOUNDED_NAMES = word_set(
+UNBOUNDED = word_set(
     """
     eval evalc evalin assignin load run source feval builtin str2func inputname import cellfun arrayfun evalAt
     rehash dbstop keyboard inline matlabFunction_eval script
@@ -52,7 +67,7 @@ UNBOUNDED_NAMES = word_set(
 )
 """Functions with which a program may change any name."""
 
-HARMLESS = word_set(
+COMMANDS = word_set(
     """
     clc close clear clearvars format hold warning more pkg figure grid axis disp display fprintf printf pretty
     tic toc drawnow plot save diary echo help doc graphics_toolkit addpath digits assume assumeAlso latex
@@ -61,7 +76,8 @@ HARMLESS = word_set(
 )
 """Commands, and functions without a value, that assign nothing."""
 
-KNOWN_WORDS = HARMLESS | FUNCTIONS | {"ans", "break", "continue", "pi"}
+FUNCTIONS = frozenset(FUNCTION_NAMES) - {"square", "pow", "S", "Float", "Integer", "Rational", "number"}
+KNOWN_WORDS = COMMANDS | FUNCTIONS | {"ans", "break", "continue", "pi"}
 """Words that, as a statement of their own, run no other file."""
 
 SYNTAX = word_set(
@@ -75,9 +91,22 @@ SYNTAX = word_set(
 ASSUMPTIONS = frozenset(["real", "positive", "integer", "rational", "clear", "nonnegative", "matrix"])
 """Words behind the names of ``syms``."""
 
+PLAIN_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+SUMS, PRODUCTS = ("+", "-", ".+", ".-"), ("*", "/", ".*", "./")
+POWERS = {"^": "^", "**": "^", ".^": ".^", ".**": ".^"}
 
-def matlab_program(text: str, file: str, line_name: Callable[[int], str]) -> Program:
-    """Read a program of MATLAB's or Octave's; nothing in it is run.
+
+@dataclass(frozen=True)
+class _Definition:
+    """The text of a function: its statements, or the formula of a handle, and the names of its results."""
+
+    statements: tuple[MatlabStatement, ...] = ()
+    results: tuple[str, ...] = ()
+    formula: Tokens = ()
+
+
+class MatlabProgram:
+    """A program of MATLAB's or Octave's, read as bindings of names.
 
     Parameters
     ----------
@@ -87,104 +116,95 @@ def matlab_program(text: str, file: str, line_name: Callable[[int], str]) -> Pro
         What messages begin with.
     line_name
         How messages name a line, which counts from 1.
+    record
+        What is known of the program.
 
     Raises
     ------
     AnswerError
         No MATLAB, more statements than are read, or one that may change any name.
     """
-    if "\0" in text:
-        raise AnswerError(f"{file}: no MATLAB: a NUL character")
-    statements: list[MatlabStatement] = []
-    for statement in matlab_statements(text, file, line_name):
-        statements.append(statement)
-        if len(statements) > MAX_STATEMENTS:
-            raise AnswerError(f"{file}: more than {MAX_STATEMENTS} statements")
-    return _ProgramReader(file, line_name).read(statements)
 
-
-@dataclass
-class _Function:
-    """A function that is being read: its name, outputs and scope, and whether ``return`` was passed."""
-
-    name: str
-    outputs: tuple[str, ...]
-    scope: Scope
-    has_returned: bool = False
-
-
-class _ProgramReader:
-    """Reads statement after statement; ``statement`` is the current one, and ``blocks`` the words of open blocks."""
-
-    def __init__(self, file: str, line_name: Callable[[int], str]) -> None:
+    def __init__(self, text: str, file: str, line_name: Callable[[int], str], record: Record) -> None:
+        if "\0" in text:
+            raise AnswerError(f"{file}: no MATLAB: a NUL character")
         self.file = file
         self.line_name = line_name
-        self.program = Program()
-        self.statement = MatlabStatement(())
-        self.blocks: list[str] = []
-        self.function: _Function | None = None
+        self.record = record
+        self.main = Scope(record)
+        self.own = Scope(record)
+        """The functions of the file, which functions see besides their own names."""
+        self.functions: list[Function] = []
+        self.count = 0
+        self.depth = 0
         self.bound: set[str] = set()
-        """Names that the program assigns anywhere."""
-        self.function_line_names: set[str] = set()
+        """Names that the program assigns anywhere: they are no functions."""
+        self.signature_names: set[str] = set()
         """Names in the first lines of the file's functions."""
-        self.functions: set[str] = set()
-        """Names of the file's functions, which go before those of MATLAB's everywhere in the file."""
-        self.single_zeros: set[tuple[int, str]] = set()
-        """Scopes and names of zeros(1, 1)."""
-        self.formulas = MatlabFormulas(self.bound.__contains__)
-
-    def read(self, statements: Sequence[MatlabStatement]) -> Program:
+        statements = []
+        for statement in matlab_statements(text, file, line_name):
+            statements.append(statement)
+            if len(statements) > MAX_STATEMENTS:
+                raise AnswerError(f"{file}: more than {MAX_STATEMENTS} statements")
         for statement in statements:
             self.bound |= statement.assigned_names()
-            if statement.tokens[0].text == "function":
-                self.function_line_names |= {token.text for token in statement.tokens if token.kind == "name"}
+            if statement.keyword == "function":
+                self.signature_names |= {token.text for token in statement.tokens if token.kind == "name"}
+        for statement in statements:
+            self._refuse_unbounded(statement)
+        try:
+            main = self._without_functions(statements)
+            self._block(main, self.main)
+        except RecursionError:
+            raise AnswerError(f"{file}: nested too deep to be read; write long sums in parts") from None
+
+    def _refuse(self, statement: MatlabStatement, what: str, expected: str = "") -> AnswerError:
+        more = f"; expected {expected}" if expected else ""
+        return AnswerError(f"{self.file}: {self.line_name(statement.line)}: {what}{more}")
+
+    def _refuse_unbounded(self, statement: MatlabStatement) -> None:
+        for k, token in enumerate(statement.tokens):
+            is_field = k > 0 and statement.tokens[k - 1].text == "."
+            if token.kind == "name" and token.text in UNBOUNDED and not is_field and token.text not in self.bound:
+                raise self._refuse(
+                    statement, f"found {token.text!r}, which may change any name; a program is read, not run"
+                )
+        if statement.keyword in UNBOUNDED:
+            raise self._refuse(statement, f"found {statement.keyword!r}, which may change any name")
+
+    # Functions
+
+    def _without_functions(self, statements: Sequence[MatlabStatement]) -> list[MatlabStatement]:
+        """Define the file's functions, and return the statements outside them."""
         has_ends = self._functions_have_ends(statements)
+        main: list[MatlabStatement] = []
         k = 0
         while k < len(statements):
-            if self._is_default(statements[k : k + 3]):
-                k += 3
+            statement = statements[k]
+            if statement.keyword == "classdef":
+                raise self._refuse(statement, "found 'classdef'", "a script or functions")
+            if statement.keyword != "function":
+                main.append(statement)
+                k += 1
                 continue
-            self.statement = statements[k]
-            self._refuse_unbounded()
-            self._read_statement(has_ends)
-            k += 1
-        self._end_function()
-        everywhere = Scope(
-            {
-                name: [b for b in bindings if isinstance(b.value, OwnFunction)]
-                for name, bindings in self.program.main.bindings.items()
-                if name in self.functions
-            }
-        )
-        for scope in self.program.functions:
-            scope.outer = scope.outer or everywhere
-        return self.program
-
-    @property
-    def scope(self) -> Scope:
-        return self.function.scope if self.function is not None else self.program.main
-
-    @property
-    def line(self) -> str:
-        return self.line_name(self.statement.line)
-
-    def _refuse(self, what: str, expected: str = "") -> AnswerError:
-        more = f"; expected {expected}" if expected else ""
-        return AnswerError(f"{self.file}: {self.line}: {what}{more}")
-
-    def _bind(self, name: str, value: Value, index: Index | None = None, is_added: bool = False) -> None:
-        if self.function is not None and self.function.has_returned:
-            value, index = NotUnderstood(f"{name} is assigned behind 'return', in {self.line}"), None
-        if self.blocks:
-            value, index = NotUnderstood(f"{name[:40]} is changed by {self.blocks[-1]!r} in {self.line}"), None
-        self.program.bind(self.scope, name, self.line, value, index, is_added and index is not None)
-
-    def _bind_changed(self, names: Iterable[str], what: str) -> None:
-        """Note that the statement changes names in a way that is not read."""
-        for name in sorted(names):
-            self._bind(name, NotUnderstood(f"{name[:40]} is changed by {what} in {self.line}"))
-
-    # Blocks
+            end, depth = k + 1, 0
+            while end < len(statements):
+                word = statements[end].keyword
+                if word == "function":
+                    if has_ends:
+                        raise self._refuse(
+                            statements[end], "found a function inside a function or a block", "functions side by side"
+                        )
+                    break
+                if word in BLOCK_ENDS:
+                    if depth == 0:
+                        break
+                    depth -= 1
+                depth += word in BLOCK_BEGINNINGS
+                end += 1
+            self._define(statement, statements[k + 1 : end])
+            k = end + has_ends
+        return main
 
     def _functions_have_ends(self, statements: Sequence[MatlabStatement]) -> bool:
         """Whether functions close with an end of their own, as all or none of a file do."""
@@ -198,111 +218,167 @@ class _ProgramReader:
             return False
         raise AnswerError(f"{self.file}: {openers + functions} blocks begin and {closers} end")
 
-    def _is_default(self, statements: Sequence[MatlabStatement]) -> bool:
-        """Whether statements are ``if nargin < 2, p = NAME_parameters(); end``: a default of an argument."""
-        if self.function is None or self.blocks or statements[0].keyword != "if":
-            return False
-        match [statement.texts for statement in statements]:
-            case [["if", "nargin", "<", _], [argument, "=", function, "(", ")"], ["end"]]:
-                bindings = self.scope.bindings.get(argument, [])
-                is_parameters = function in self.function_line_names or function.endswith("_parameters")
-                return is_parameters and len(bindings) == 1 and bindings[0].is_argument
-        return False
-
-    def _read_statement(self, has_ends: bool) -> None:
-        word = self.statement.keyword
-        if word == "function":
-            self._begin_function(has_ends)
-        elif word == "classdef":
-            raise self._refuse("found 'classdef'", "a script or functions")
-        elif word in BLOCK_BEGINNINGS or (word in BLOCK_BRANCHES and self.blocks):
-            self.blocks += [word] if word in BLOCK_BEGINNINGS else []
-            self._bind_changed(self.statement.assigned_names(), repr(word))
-        elif word in BLOCK_ENDS:
-            if self.blocks:
-                self.blocks.pop()
-            elif has_ends and self.function is not None:
-                self._end_function()
-            else:
-                raise self._refuse(f"found {word!r}, which closes nothing")
-        elif word == "return":
-            if self.function is None:
-                raise self._refuse("found 'return' outside a function", "statements that are all run")
-            if self.blocks:
-                self._bind_changed(self.function.outputs, "'return'")
-            else:
-                self.function.has_returned = True
-        else:
-            self._read_simple(word)
-
-    def _begin_function(self, has_ends: bool) -> None:
-        if self.blocks or (self.function is not None and has_ends):
-            raise self._refuse("found a function inside a function or a block", "functions side by side")
-        self._end_function()
-        tokens = self.statement.tokens[1:]
+    def _define(self, statement: MatlabStatement, body: Sequence[MatlabStatement]) -> None:
+        tokens = statement.tokens[1:]
         equals = next((k for k, token in enumerate(tokens) if token.is_sign("=")), -1)
-        outputs = tuple(token.text for token in tokens[: max(equals, 0)] if token.kind == "name")
+        results = tuple(token.text for token in tokens[: max(equals, 0)] if token.kind == "name")
         right = tokens[equals + 1 :]
         if not right or right[0].kind != "name":
-            raise self._refuse("found a function without a name")
+            raise self._refuse(statement, "found a function without a name")
         name = right[0].text
         if name in SYNTAX:
-            raise self._refuse(f"found a function {name!r}, which changes what formulas mean")
-        self.functions.add(name)
-        self.program.bind(self.program.main, name, self.line, OwnFunction())
-        self.function = _Function(name, outputs, self.program.add_function())
-        for argument in [token.text for token in right[1:] if token.kind == "name"]:
-            value: Value = Symbol(argument, is_argument=True)
-            if argument in outputs:
-                value = NotUnderstood(f"{argument} is an argument and an output, in {self.line}")
-            self.program.bind(self.scope, argument, self.line, value)
+            raise self._refuse(statement, f"found a function {name!r}, which changes what formulas mean")
         if any(token.text == "=" for token in right[1:]):
-            raise self._refuse("found a default of an argument", "arguments by name alone")
+            raise self._refuse(statement, "found a default of an argument", "arguments by name alone")
+        parameters = tuple(token.text for token in right[1:] if token.kind == "name")
+        line = self.line_name(statement.line)
+        function = Function(name, parameters, _Definition(tuple(body), results), line)
+        self.functions.append(function)
+        self.own.bind(name, function, line)
+        self.main.bind(name, function, line)
 
-    def _end_function(self) -> None:
-        if self.function is not None:
-            name, scope = self.function.name, self.function.scope
-            outputs = [output for output in self.function.outputs if output in scope.bindings]
-            scope.return_values += [ReturnValue(name, output, is_only=False) for output in outputs]
-        self.function = None
+    def arguments_as_given(self, function: Function) -> dict[str, Value]:
+        """Return a function's arguments as themselves."""
+        values: dict[str, Value] = {name: Given(name, is_argument=True) for name in function.parameters}
+        if function.name in function.definition.results:
+            values = {}
+        for name in set(function.definition.results) & set(values):
+            values[name] = Unread(f"{name} is an argument and an output, in {function.line}")
+        return values
+
+    def applied(self, function: Function, arguments: dict[str, Value]) -> tuple[Value, Scope]:
+        """Return what a function returns for some arguments, and its local names.
+
+        Raises
+        ------
+        UnreadError
+            The function is not read.
+        """
+        if function.name in function.definition.results:
+            raise UnreadError(f"{function.name} is the name of a function and of its result, in {function.line}")
+        if self.depth >= MAX_DEPTH:
+            raise UnreadError(f"{function.name} calls itself, or functions nested too deep")
+        definition: _Definition = function.definition
+        local = set(function.parameters)
+        for statement in definition.statements:
+            local |= statement.assigned_names()
+        # A handle sees the program's names as they are, a function only the file's functions.
+        outer = self.main if definition.formula else self.own
+        scope = Scope(self.record, outer, frozenset(local))
+        for name, value in arguments.items():
+            scope.set_argument(name, value, function.line)
+        self.depth += 1
+        try:
+            if definition.formula:
+                try:
+                    return self.value(definition.formula, scope), scope
+                except UnreadError as error:
+                    return Unread(f"{function.line}: {error}"), scope
+            self._block(self._without_defaults(definition.statements, function), scope)
+        finally:
+            self.depth -= 1
+        values: list[Value] = []
+        names: list[str] = []
+        for result in definition.results:
+            bound = scope.names.get(result)
+            names.append(result if bound is not None else "")
+            values.append(bound.value if bound is not None else Unread(f"{result} is not assigned, in {function.line}"))
+        return Several(tuple(values), tuple(names)), scope
+
+    @staticmethod
+    def returned_names(function: Function) -> list[str]:
+        """Return the names in what a function returns."""
+        definition: _Definition = function.definition
+        return [*definition.results, *(token.text for token in definition.formula if token.kind == "name")]
+
+    def _without_defaults(self, statements: Sequence[MatlabStatement], function: Function) -> list[MatlabStatement]:
+        """Leave out ``if nargin < 2, p = NAME_parameters(); end``: a default of an argument."""
+        kept: list[MatlabStatement] = []
+        k = 0
+        while k < len(statements):
+            match [statement.texts for statement in statements[k : k + 3]]:
+                case [["if", "nargin", "<", _], [argument, "=", default, "(", ")"], ["end"]] if (
+                    argument in function.parameters
+                    and (default in self.signature_names or default.endswith("_parameters"))
+                ):
+                    k += 3
+                    continue
+            kept.append(statements[k])
+            k += 1
+        return kept
 
     # Statements
 
-    def _refuse_unbounded(self) -> None:
-        """Refuse a statement that may change any name."""
-        tokens = self.statement.tokens
-        for k, token in enumerate(tokens):
-            is_field = k > 0 and tokens[k - 1].text == "."
-            is_unbounded = token.kind == "name" and token.text in UNBOUNDED_NAMES
-            if is_unbounded and not is_field and token.text not in self.bound:
-                raise self._refuse(f"found {token.text!r}, which may change any name; a program is read, not run")
-        if self.statement.keyword in UNBOUNDED_NAMES:
-            raise self._refuse(f"found {self.statement.keyword!r}, which may change any name")
+    def _block(self, statements: Sequence[MatlabStatement], scope: Scope) -> None:
+        blocks: list[str] = []
+        has_returned = False
+        for statement in statements:
+            self.count += 1
+            if self.count > MAX_STATEMENTS:
+                raise AnswerError(f"{self.file}: more than {MAX_STATEMENTS} statements")
+            word = statement.keyword
+            line = self.line_name(statement.line)
+            if word in BLOCK_BEGINNINGS:
+                blocks.append(word)
+                self._change(statement, scope, repr(word), line)
+            elif word in BLOCK_ENDS:
+                if not blocks:
+                    raise self._refuse(statement, f"found {word!r}, which closes nothing")
+                blocks.pop()
+            elif word in BLOCK_BRANCHES and blocks:
+                self._change(statement, scope, repr(word), line)
+            elif word == "return":
+                if scope is self.main:
+                    raise self._refuse(statement, "found 'return' outside a function", "statements that are all run")
+                has_returned = True
+                if blocks:
+                    for name in scope.local:
+                        scope.change(name, f"{name} may be changed by 'return' in {line}", only_matrices=False)
+            elif blocks or has_returned:
+                where = repr(blocks[-1]) if blocks else "a statement behind 'return'"
+                self._refuse_script(statement, word)
+                self._change(statement, scope, where, line)
+            else:
+                self._statement(statement, word, scope, line)
 
-    def _read_simple(self, word: str) -> None:
-        """Read a statement outside or inside a block: an assignment, a command, or a call for its effects."""
-        statement, tokens = self.statement, self.statement.tokens
+    def _change(self, statement: MatlabStatement, scope: Scope, what: str, line: str) -> None:
+        """Note that a statement changes names in a way that is not read."""
+        for name in sorted(statement.assigned_names()):
+            scope.change(name, f"{name[:40]} is changed by {what} in {line}", only_matrices=False)
+
+    def _refuse_script(self, statement: MatlabStatement, word: str) -> None:
+        known = {*KNOWN_WORDS, *self.bound, *self.signature_names}
+        if len(statement.tokens) == 1 and word and word not in known:
+            raise self._refuse(statement, f"found {word!r}, which may be a script that changes any name", "assignments")
+
+    def _statement(self, statement: MatlabStatement, word: str, scope: Scope, line: str) -> None:
+        tokens = statement.tokens
         equals = [k for k, token in enumerate(tokens) if token.is_sign("=")]
         depths = list(accumulate(token.nesting for token in tokens))
         assigning = next((k for k in equals if depths[k] == 0), None)
         changing = next((k for k, token in enumerate(tokens) if token.is_sign(*CHANGING)), None)
         is_change = changing is not None or tokens[0].text in STEPPING or tokens[-1].text in STEPPING
         if word in ("global", "persistent"):
-            self._bind_changed(statement.command_names, repr(word))
+            for name in statement.command_names:
+                scope.change(name, f"{name[:40]} is changed by {word!r} in {line}", only_matrices=False)
         elif word == "syms":
-            self._syms()
+            self._syms(tokens[0].words, scope, line)
         elif len(equals) > 1 or (equals and (is_change or assigning is None)):
-            self._bind_changed(statement.assigned_names(), "an assignment inside an expression")
+            self._change(statement, scope, "an assignment inside an expression", line)
         elif assigning is not None:
-            self._assign(tokens[:assigning], tokens[assigning + 1 :])
+            self._assign(statement, tokens[:assigning], tokens[assigning + 1 :], scope, line)
         elif is_change:
-            self._change(changing)
-        elif len(tokens) == 1 and word and word not in {*KNOWN_WORDS, *self.bound, *self.function_line_names}:
-            raise self._refuse(f"found {word!r}, which may be a script that changes any name", "assignments")
+            name, index = _target(tokens[: changing or 0])
+            if changing is not None and tokens[changing].text == "+=" and name and index is not None:
+                self._assign_entry(name, index, tokens[changing + 1 :], scope, line, is_added=True)
+            else:
+                self._change(statement, scope, "an assignment that adds to it", line)
+        else:
+            self._refuse_script(statement, word)
 
-    def _syms(self) -> None:
+    def _syms(self, words: str, scope: Scope, line: str) -> None:
         """Read ``syms q1(t) m [2 1] real``."""
-        words = re.sub(r"^\s*\((.*)\)\s*$", r"\1", self.statement.tokens[0].words)
+        words = re.sub(r"^\s*\((.*)\)\s*$", r"\1", words)
         words = re.sub(r"['\",]", " ", words)
         for match in re.finditer(r"([A-Za-z]\w*)(\s*\([^)]*\))?(\s*\[[^\]]*\])?", words, re.ASCII):
             name, arguments, shape = match.groups()
@@ -310,81 +386,416 @@ class _ProgramReader:
                 continue
             if shape:
                 lengths = [int(k) for k in re.findall(r"\d{1,3}", shape)]
-                if len(lengths) > 2 or (len(lengths) == 2 and min(lengths) > 1):
-                    self._bind_changed([name], "'syms' of a matrix")
+                if len(lengths) > 2 or (len(lengths) == 2 and min(lengths) > 1) or not lengths:
+                    scope.change(name, f"{name[:40]} is made by 'syms' of a matrix in {line}", only_matrices=False)
                     continue
-                entries = [f"{name}{k + 1}" for k in range(max(lengths, default=0))]
-                for entry in entries:
-                    self._bind(entry, Symbol(entry))
-                self._bind(name, vector_of_names(entries))
+                scope.bind(name, self._symbols(name, max(lengths), scope, line), line)
             elif arguments and arguments.replace(" ", "") != "(t)":
-                self._bind_changed([name], "'syms' of a function of other names than t")
+                reason = f"{name[:40]} is made by 'syms' of a function of other names than t in {line}"
+                scope.change(name, reason, only_matrices=False)
             else:
-                self._bind(name, Symbol(name))
+                scope.bind(name, Given(name, is_symbol=True), line)
 
-    def _change(self, changing: int | None) -> None:
-        """Read M(1,1) += formula; other changes are not understood."""
-        tokens = self.statement.tokens
-        if changing is not None and tokens[changing].text == "+=":
-            name, index = _target(tokens[:changing])
-            formula = self.formulas.formula(tokens[changing + 1 :])
-            if name and index is not None and not formula.is_matrix:
-                self._bind(name, formula, index, is_added=True)
-                return
-        for name in sorted(self.statement.assigned_names()):
-            self._bind(name, NotUnderstood(f"{name} is changed after it is assigned, in {self.line}"))
+    def _symbols(self, name: str, count: int, scope: Scope, line: str) -> Matrix:
+        names = [f"{name}{k + 1}" for k in range(count)]
+        for one in names:
+            scope.bind(one, Given(one, is_symbol=True), line)
+        return vector_of([Scalar(one, uses=frozenset((scope.key(one),))) for one in names])
 
-    def _assign(self, left: Tokens, right: Tokens) -> None:
+    def _assign(self, statement: MatlabStatement, left: Tokens, right: Tokens, scope: Scope, line: str) -> None:
+        if left[0].is_sign("[") and closing(left, 0) == len(left) - 1:
+            self._assign_several(statement, left, right, scope, line)
+            return
         name, index = _target(left)
         if not name or not right:
-            self._bind_changed(self.statement.assigned_names(), "an assignment that is not read")
+            self._change(statement, scope, "an assignment that is not read", line)
             return
-        if right[0].text == "@":
-            self._assign_handle(name, index, right)
+        if index is not None:
+            self._assign_entry(name, index, right, scope, line)
             return
-        if index is None and (symbol := self._symbol(right)):
-            self._bind(name, Symbol(symbol))
+        try:
+            value = self.value(right, scope, name)
+        except UnreadError as error:
+            names = frozenset(token.text for token in right if token.kind == "name")
+            value = Unread(f"{line}: {error}", names, any(token.is_sign("[") for token in right))
+        if "." not in name:
+            if isinstance(value, Function) and scope is self.main:
+                self.functions.append(value)
+            scope.bind(name, value, line)
             return
-        formula = self.formulas.formula(right)
-        if index is None and formula.text == name and not formula.problem:
-            return  # M = simplify(M)
-        if index is not None and formula.is_matrix:
-            self._bind_changed([name], "an assignment of a matrix to a part of it")
-            return
-        key = (id(self.scope), name)
-        if formula.is_zeros and re.fullmatch(r"zeros\(1(, ?1)?\)", formula.text):
-            self.single_zeros.add(key)
-        elif index is None and key in self.single_zeros and not formula.is_matrix:
-            index = ()  # the one entry of zeros(1, 1)
-        added = _added_part(name, index, formula)
-        if "." in name:
-            self._bind(name.partition(".")[0], Structure())
-        self._bind(name, added or formula, index, is_added=added is not None)
+        structure, _, member = name.partition(".")
+        bound = scope.names.get(structure)
+        fields = dict(bound.value.fields) if bound is not None and isinstance(bound.value, Structure) else {}
+        if bound is not None and not isinstance(bound.value, Structure | Given):
+            scope.change(structure, f"{structure[:40]} is changed in {line}", only_matrices=False)
+        elif member in fields and fields[member] != value:
+            scope.change(structure, f"{name[:40]} is assigned twice, in {line}", only_matrices=False)
+        else:
+            scope.set_argument(structure, Structure({**fields, member: value}), line)
 
-    def _symbol(self, right: Tokens) -> str:
-        """Return the name of the symbol that sym('q1', 'real') makes; empty of another value."""
-        if len(right) < 4 or not is_call(right, "sym") or right[2].kind != "string" or "sym" in self.bound:
-            return ""
-        match = re.fullmatch(r"([A-Za-z]\w*)(\(t\))?", right[2].text[1:-1], re.ASCII)
-        return match[1] if match and all(token.text != "[" for token in right) else ""
+    def _assign_several(self, statement: MatlabStatement, left: Tokens, right: Tokens, scope: Scope, line: str) -> None:
+        """Read ``[M, C] = dynamics(q, qd)`` and ``[a, b] = deal(1, 2)``."""
+        targets = [entry for row in split_rows(left[1:-1]) for entry in row]
+        names = [entry[0].text if len(entry) == 1 else "" for entry in targets]
+        values: Sequence[Value] = ()
+        try:
+            if is_call(right, "deal"):
+                values = [self.value(x, scope) for x in _arguments(right[2:-1])]
+            else:
+                value = self.value(right, scope, "", count=len(names))
+                values = value.values if isinstance(value, Several) else ()
+        except UnreadError as error:
+            values = [Unread(f"{line}: {error}")] * len(names)
+        if len(values) < len(names) or not all(names):
+            self._change(statement, scope, "an assignment that is not read", line)
+            return
+        for name, value in zip(names, values, strict=False):
+            if name != "~":
+                scope.bind(name, value, line)
 
-    def _assign_handle(self, name: str, index: Index | None, right: Tokens) -> None:
-        """Read M = @(q1, q2) [...] as a function, and s = @sin as another name of one."""
-        if len(right) == 2 and right[1].kind == "name" and index is None:
-            function = right[1].text
-            self._bind(name, OwnFunction() if function in self.function_line_names else LibraryFunction(function))
+    def _assign_entry(
+        self, name: str, index: Index, right: Tokens, scope: Scope, line: str, is_added: bool = False
+    ) -> None:
+        bound = scope.names.get(name)
+        try:
+            value = self.value(right, scope)
+            if isinstance(value, Matrix) and len(value.entries) > 1:
+                raise UnreadError(f"{name} is changed by an assignment of a matrix to a part of it")
+            scalar = scope.scalar(value)
+        except UnreadError as error:
+            scope.change(name, f"{line}: {error}", only_matrices=False)
             return
-        if index is not None or len(right) < 3 or right[1].text != "(" or self.blocks or self.function is not None:
-            self._bind_changed([name], "'@'")
-            return
-        end = closing(right, 1)
-        self._bind(name, OwnFunction())
-        scope = self.program.add_function(outer=self.program.main)
-        for token in right[2:end]:
-            if token.kind == "name":
-                self.program.bind(scope, token.text, self.line, Symbol(token.text, is_argument=True))
-        self.program.bind(scope, RETURNED_FORMULA, self.line, self.formulas.formula(right[end + 1 :]))
-        scope.return_values.append(ReturnValue(name, RETURNED_FORMULA))
+        if not is_added and bound is not None:
+            scalar, is_added = _added_part(name, index, right, scalar, self, scope)
+        scope.bind_entry(name, index, scalar, line, is_added)
+
+    # Expressions
+
+    def value(self, tokens: Tokens, scope: Scope, name: str = "", count: int = 1) -> Value:
+        """Return the value of an expression; ``name`` is what it is assigned to.
+
+        Raises
+        ------
+        UnreadError
+            It is not read.
+        """
+        if tokens[0].text == "@":
+            return self._handle(tokens, name, scope)
+        parser = _Expression(self, tokens, scope, count)
+        value = parser.sum()
+        if parser.at < len(tokens):
+            found = tokens[parser.at]
+            if found.kind in ("number", "name") or found.text == "(":
+                raise UnreadError(f"an operator is missing in front of {found.text[:20]!r}")
+            raise UnreadError(f"{_text(tokens)[:40]!r} is not read")
+        return value
+
+    def _handle(self, tokens: Tokens, name: str, scope: Scope) -> Value:
+        """Return M = @(q1, q2) [...] as a function, and s = @sin as another name of one."""
+        if len(tokens) == 2 and tokens[1].kind == "name":
+            function = tokens[1].text
+            if function in self.own.names:
+                return self.own.value(function)
+            return Library(function)
+        if len(tokens) < 3 or tokens[1].text != "(" or scope is not self.main:
+            raise UnreadError("'@' is not read")
+        end = closing(tokens, 1)
+        parameters = tuple(token.text for token in tokens[2:end] if token.kind == "name")
+        if not tokens[end + 1 :]:
+            raise UnreadError("'@' is not read")
+        line = self.line_name(tokens[0].line)
+        return Function(name, parameters, _Definition(formula=tuple(tokens[end + 1 :])), line)
+
+    def call(self, function: Function, arguments: Sequence[Value], scope: Scope, name: str, count: int) -> Value:
+        """Return the value of a call of one of the program's functions."""
+        if len(arguments) > len(function.parameters):
+            raise UnreadError(f"{name}(...) is called with too many arguments")
+        values = dict(zip(function.parameters, arguments, strict=False))
+        value, _ = self.applied(function, values)
+        if isinstance(value, Several):
+            if not value.values:
+                raise UnreadError(f"{name}(...) returns nothing")
+            if count == 1:
+                value = value.values[0]
+        if isinstance(value, Unread):
+            raise UnreadError(value.reason)
+        return with_use(value, scope.key_of(name))
+
+
+class _Expression:
+    """Reads one expression by the rules of precedence; ``at`` is the next token."""
+
+    def __init__(self, program: MatlabProgram, tokens: Tokens, scope: Scope, count: int = 1) -> None:
+        self.program = program
+        self.tokens = tokens
+        self.scope = scope
+        self.count = count
+        self.at = 0
+
+    def _next(self, *texts: str) -> str:
+        """Take the next token if it is one of some signs; return its text, or an empty one."""
+        if self.at < len(self.tokens) and self.tokens[self.at].is_sign(*texts):
+            self.at += 1
+            return self.tokens[self.at - 1].text
+        return ""
+
+    def _operand(self, value: Value) -> Value:
+        """Return a value with which is calculated."""
+        robot = self.program.record.robot
+        if isinstance(value, Given) and not robot.vocabulary.knows(value.name) and robot.is_vector(value.name):
+            entries = [self.scope.scalar(self.scope.entry(value, (k,))) for k in range(robot.n)]
+            return matrix_of([[entry] for entry in entries])
+        if isinstance(value, Matrix):
+            return _as_column(value)
+        return self.scope.scalar(value)
+
+    def sum(self) -> Value:
+        """Read a sum, or one operand as it is."""
+        value = self.product()
+        while sign := self._next(*SUMS):
+            value = calculated(self._operand(value), sign[-1], self._operand(self.product()), "^")
+        return value
+
+    def product(self) -> Value:
+        value = self.signed()
+        while sign := self._next(*PRODUCTS):
+            value = calculated(self._operand(value), sign, self._operand(self.signed()), "^")
+        return value
+
+    def signed(self) -> Value:
+        sign = self._next("+", "-")
+        if not sign:
+            return self.power()
+        value = self._operand(self.signed())
+        return opposite(value) if sign == "-" else value
+
+    def power(self) -> Value:
+        value = self.postfix()
+        has_power = False
+        while sign := self._next(*POWERS):
+            if has_power:
+                raise UnreadError("a power of a power without brackets is not read")
+            has_power = True
+            minus = self._next("+", "-")
+            exponent = self._operand(self.postfix())
+            exponent = opposite(exponent) if minus == "-" else exponent
+            value = calculated(self._operand(value), POWERS[sign], exponent, "^")
+        return value
+
+    def postfix(self) -> Value:
+        value = self.primary()
+        while self._next("'", ".'"):
+            value = self._operand(value)
+            value = transposed(value) if isinstance(value, Matrix) else value
+        return value
+
+    def primary(self) -> Value:
+        if self.at >= len(self.tokens):
+            raise UnreadError(f"{_text(self.tokens)[:40]!r} ends where a number or a name was expected")
+        token = self.tokens[self.at]
+        self.at += 1
+        match token.kind, token.text:
+            case "number", text:
+                if PLAIN_NUMBER.fullmatch(text) is None:
+                    raise UnreadError(f"the number {text[:20]!r} is not read")
+                return number(text)
+            case "string", text:
+                return Text(text[1:-1])
+            case "name", name:
+                return self._name(name)
+            case "sign", "(":
+                end = closing(self.tokens, self.at - 1)
+                inside = self.tokens[self.at : end]
+                if not inside:
+                    raise UnreadError("empty brackets are not read")
+                value = self.program.value(inside, self.scope)
+                self.at = end + 1
+                return value
+            case "sign", "[":
+                end = closing(self.tokens, self.at - 1)
+                value = self._matrix(self.tokens[self.at : end])
+                self.at = end + 1
+                return value
+        raise UnreadError(f"{_text(self.tokens)[:40]!r} is not read")
+
+    def _matrix(self, inside: Tokens) -> Value:
+        """Read a matrix by rows; its entries may be matrices themselves."""
+        rows: list[list[Scalar]] = []
+        for row in split_rows(inside):
+            blocks = [self._block_of(entry) for entry in row]
+            heights = {len(block) for block in blocks}
+            if len(heights) != 1:
+                raise UnreadError("the rows of a matrix differ in length, or are not read")
+            rows += [[x for block in blocks for x in block[k]] for k in range(heights.pop())]
+        if not rows or len({len(row) for row in rows}) != 1:
+            raise UnreadError("the rows of a matrix differ in length, or are not read")
+        return matrix_of(rows)
+
+    def _block_of(self, entry: Tokens) -> list[list[Scalar]]:
+        value = self._operand(self.program.value(entry, self.scope))
+        if isinstance(value, Matrix):
+            return value.rows
+        return [[self.scope.scalar(value)]]
+
+    def _name(self, name: str) -> Value:
+        """Read a name with what stands behind it: a field, an index or arguments."""
+        value: Value
+        if self._next("."):
+            if self.at >= len(self.tokens) or self.tokens[self.at].kind != "name":
+                raise UnreadError(f"{name}.(...) is not read")
+            member = self.tokens[self.at].text
+            self.at += 1
+            value = self.scope.field(self.scope.value(name), member)
+            return self._indexed(value, f"{name}.{member}") if self._is_bracket() else value
+        if self.at < len(self.tokens) and self.tokens[self.at].is_sign("{"):
+            raise UnreadError(f"{name}{{...}} is not read")
+        if not self._is_bracket():
+            return self.scope.value(name)
+        return self._indexed(self._called(name), name)
+
+    def _called(self, name: str) -> Value:
+        """Return what a name in front of brackets stands for: a function of a library, or a value."""
+        is_library = name in FUNCTIONS or name in OTHER_FUNCTIONS
+        if is_library and name not in self.program.bound and self.scope.owner(name) is None:
+            self.scope.value(name)
+            return Library(name)
+        return self.scope.value(name)
+
+    def _is_bracket(self) -> bool:
+        return self.at < len(self.tokens) and self.tokens[self.at].is_sign("(")
+
+    def _indexed(self, value: Value, name: str) -> Value:
+        end = closing(self.tokens, self.at)
+        inside = self.tokens[self.at + 1 : end]
+        self.at = end + 1
+        if isinstance(value, Given) and [token.text for token in inside] == ["t"]:
+            self.scope.key_of("t")
+            return value
+        match value:
+            case Library(function):
+                return with_use(self._library(function, inside), self.scope.key_of(name))
+            case Function():
+                arguments = [self.program.value(x, self.scope) for x in _arguments(inside)]
+                return self.program.call(value, arguments, self.scope, name, self.count)
+        return self._entry(value, inside, name)
+
+    def _entry(self, value: Value, inside: Tokens, name: str) -> Value:
+        index = constant_index(inside)
+        if index is None:
+            index = self._index_by_names(inside)
+        if index is not None:
+            if isinstance(value, Matrix) and len(index) == 1 and not value.is_flat and 1 not in value.shape:
+                raise UnreadError(f"one index into the matrix {name} is not read")
+            return self.scope.entry(value, index)
+        places = [_places(part) for part in _arguments(inside)]
+        match value, places:
+            case Given(vector), [range() as one] if not self.program.record.robot.vocabulary.knows(vector):
+                if one:
+                    return Part(vector, tuple(one), is_slice=True)
+            case Matrix(), [rows, columns] if not value.is_flat:
+                m, n = value.shape
+                i = range(m) if rows == "all" else rows
+                j = range(n) if columns == "all" else columns
+                if isinstance(i, range) and isinstance(j, range) and i and j and i[-1] < m and j[-1] < n:
+                    return matrix_of([[value.entries[(a, b)] for b in j] for a in i])
+            case Matrix(), [range() as one] if one and (value.is_flat or 1 in value.shape):
+                return matrix_of([[self.scope.scalar(self.scope.entry(value, (k,)))] for k in one])
+        raise UnreadError(f"{_text([*inside])[:40]!r} as an index is not read")
+
+    def _index_by_names(self, inside: Tokens) -> Index | None:
+        """Return an index that is made of names of whole numbers."""
+        numbers: list[int] = []
+        for part in _arguments(inside):
+            if len(part) != 1 or part[0].kind not in ("name", "number"):
+                return None
+            try:
+                value = self.program.value(part, self.scope)
+            except UnreadError:
+                return None
+            if not isinstance(value, Scalar) or not value.text.isdecimal() or not 0 < int(value.text[:5]) <= MAX_INDEX:
+                return None
+            numbers.append(int(value.text) - 1)
+        return tuple(numbers) if numbers else None
+
+    def _library(self, function: str, inside: Tokens) -> Value:
+        """Return the value of a function of MATLAB's."""
+        text = "".join(token.text for token in inside)
+        if function == "diff":
+            return self._time_derivative(text)
+        if function == "sym":
+            return self._symbol(inside, text)
+        arguments = [self.program.value(part, self.scope) for part in _arguments(inside)]
+        if function in ("zeros", "eye") and len(arguments) == 1:
+            arguments = [*arguments, *arguments] if not isinstance(arguments[0], Matrix) else arguments
+        if function in ("simplify", "vpa", "expand", "collect", "combine", "simplifyFraction"):
+            arguments = arguments[:1]
+        arguments = [x if isinstance(x, Matrix) else self.scope.scalar(x) for x in arguments]
+        return called(self.scope, function, arguments, of_numpy=False)
+
+    def _time_derivative(self, text: str) -> Value:
+        """Return the rate that diff(q1, t), diff(q1(t), t, 2) and diff(q1, t, t) are."""
+        match = re.fullmatch(r"([A-Za-z]\w*)(?:\(t\))?,t(,[2t])?", text, re.ASCII)
+        if match is None:
+            raise UnreadError(f"{f'diff({text})'[:40]!r} is not read")
+        for name in (match[1], "t"):
+            self.scope.key_of(name)
+        value = self.scope.value(match[1])
+        name = value.name if isinstance(value, Given) else value.text if isinstance(value, Scalar) else ""
+        vocabulary = self.program.record.robot.vocabulary
+        plain = plain_name(name)
+        order = 2 if match[2] else 1
+        for base in (plain, plain.replace("dot", "")):
+            known = rate_name(base, ("dot", "ddot")[order - 1 if base == plain else min(order, 1)])
+            if vocabulary.is_position(base) and vocabulary.is_state(known):
+                return with_use(self.scope.known(known), self.scope.key_of(match[1]))
+        raise UnreadError(f"diff({text[:40]}): {name} is the program's own name, of which no rate is read")
+
+    def _symbol(self, inside: Tokens, text: str) -> Value:
+        """Return the symbol of sym('q1', 'real'), the number of sym(1/3), and the vector of sym('q', [2 1])."""
+        if inside and inside[0].kind == "string":
+            quoted = inside[0].text[1:-1]
+            rest = inside[2:]
+            match = re.fullmatch(r"([A-Za-z]\w*)(\(t\))?", quoted, re.ASCII)
+            if match and rest and rest[0].is_sign("["):
+                lengths = [int(token.text[:4]) for token in rest if token.kind == "number" and token.text.isdecimal()]
+                if 1 <= len(lengths) <= 2 and (len(lengths) == 1 or min(lengths) == 1):
+                    names = [f"{match[1]}{k + 1}" for k in range(max(lengths))]
+                    return vector_of([self.scope.known(one) for one in names])
+            if match and not any(token.is_sign("[") for token in inside):
+                return Given(match[1], is_symbol=True)
+            text = quoted
+        elif inside:
+            value = self.program.value(inside, self.scope)
+            if isinstance(value, Matrix) or (isinstance(value, Scalar) and value.number is not None):
+                return value
+        match = re.fullmatch(r"(\d+(?:\.\d+)?)(?:/(\d+(?:\.\d+)?))?", text, re.ASCII)
+        if match is None:
+            raise UnreadError(f"{f'sym({text})'[:40]!r} is not read")
+        return calculated(number(match[1]), "/", number(match[2])) if match[2] else number(match[1])
+
+
+OTHER_FUNCTIONS = word_set(
+    "zeros eye diff sym vpa simplify expand collect combine simplifyFraction transpose ctranspose"
+)
+"""Functions of MATLAB's, besides those of numbers, that are read."""
+
+
+def with_use(value: Value, key: str) -> Value:
+    """Return a value that knows that it is made of a name."""
+    if isinstance(value, Scalar):
+        return replace(value, uses=value.uses | {key})
+    if isinstance(value, Matrix):
+        return replace(value, entries={k: replace(x, uses=x.uses | {key}) for k, x in value.entries.items()})
+    if isinstance(value, Several):
+        return replace(value, values=tuple(with_use(one, key) for one in value.values))
+    return value
+
+
+def _as_column(matrix: Matrix) -> Matrix:
+    """Return a vector that was assigned entry by entry as the row that MATLAB makes of it."""
+    if not matrix.is_flat:
+        return matrix
+    return matrix_of([[matrix.entries[(k,)]] for k in range(matrix.shape[0])])
 
 
 def _target(tokens: Tokens) -> tuple[str, Index | None]:
@@ -400,14 +811,59 @@ def _target(tokens: Tokens) -> tuple[str, Index | None]:
     return ("", None) if index is None else (name, index)
 
 
-def _added_part(name: str, index: Index | None, formula: Formula) -> Formula | None:
-    """Return what M(1,1) = M(1,1) + rest adds to the entry; None of another formula."""
-    own = [read for read in formula.reads if read.name == name and (read.index or ()) == (index or ())]
-    if index is None or len(own) != 1 or own[0].start != 0 or formula.problem:
+def constant_index(inside: Tokens) -> Index | None:
+    """Return the index, from 0, between brackets; None where it is not made of whole numbers."""
+    numbers, commas = inside[::2], inside[1::2]
+    if len(inside) % 2 == 0 or any(token.text != "," for token in commas):
         return None
-    sign = re.match(r"\s*([-+])", formula.text[own[0].end :])
-    if sign is None:
+    if not all(t.kind == "number" and t.text.isdecimal() and 0 < int(t.text[:5]) <= MAX_INDEX for t in numbers):
         return None
-    start = own[0].end + (sign.end() if sign[1] == "+" else sign.start(1))
-    reads = (replace(read, start=read.start - start, end=read.end - start) for read in formula.reads)
-    return Formula(formula.text[start:], tuple(read for read in reads if read.start >= 0))
+    return tuple(int(token.text) - 1 for token in numbers)
+
+
+def _places(tokens: Tokens) -> range | str:
+    """Return the places that 1:2, : or 3 choose, from 0; "all" for a colon alone."""
+    match [token.text for token in tokens]:
+        case [":"]:
+            return "all"
+        case [low, ":", high] if (
+            low.isdecimal() and high.isdecimal() and 0 < int(low[:5]) <= int(high[:5]) <= MAX_INDEX
+        ):
+            return range(int(low) - 1, int(high))
+        case [one] if one.isdecimal() and 0 < int(one[:5]) <= MAX_INDEX:
+            return range(int(one) - 1, int(one))
+    raise UnreadError(f"{_text(tokens)[:40]!r} as an index is not read")
+
+
+def _arguments(inside: Tokens) -> list[Tokens]:
+    """Return the arguments between brackets, split at commas."""
+    depths = list(accumulate(token.nesting for token in inside))
+    pieces: list[list[MatlabToken]] = [[]]
+    for token, depth in zip(inside, depths, strict=True):
+        if depth == 0 and token.is_sign(","):
+            pieces.append([])
+        else:
+            pieces[-1].append(token)
+    if pieces == [[]]:
+        return []
+    if not all(pieces):
+        raise UnreadError("an empty argument is not read")
+    return [*pieces]
+
+
+def _added_part(
+    name: str, index: Index, right: Tokens, scalar: Scalar, program: MatlabProgram, scope: Scope
+) -> tuple[Scalar, bool]:
+    """Return what M(1,1) = M(1,1) + rest adds to the entry, and True; another right-hand side as it is."""
+    end = closing(right, 1) if is_call(right[:1], name) or (len(right) > 2 and right[1].is_sign("(")) else 0
+    is_own = right[0].text == name and end and constant_index(right[2:end]) == index
+    if not is_own or end + 1 >= len(right) or not right[end + 1].is_sign("+", "-"):
+        return scalar, False
+    rest = right[end + 2 :] if right[end + 1].text == "+" else right[end + 1 :]
+    return scope.scalar(program.value(rest, scope)), True
+
+
+def _text(tokens: Tokens) -> str:
+    """Return tokens in one line, with the spaces between them."""
+    pieces = [(" " if token.is_spaced or token.kind == "row" else "") + token.text.strip() for token in tokens]
+    return "".join(pieces).strip()

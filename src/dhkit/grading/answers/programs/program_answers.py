@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from typing import Protocol
 
-from dhkit.description import Description
-from dhkit.grading.answers.programs.bindings import (
-    RETURNED_FORMULA,
-    Binding,
-    Formula,
-    NotUnderstood,
-    OwnFunction,
-    Program,
-    Scope,
-    Use,
+from dhkit.errors import AnswerError
+from dhkit.grading.answers.programs.scope import MAX_DEFINITIONS, Record, Scope
+from dhkit.grading.answers.programs.values import (
+    Function,
+    Given,
+    Matrix,
+    Scalar,
+    Several,
+    Structure,
+    Unread,
+    UnreadError,
+    Value,
 )
-from dhkit.grading.answers.programs.definitions import Definition, Definitions, definition_of
-from dhkit.grading.answers.programs.name_resolution import NameResolver, Resolution
 from dhkit.grading.answers.quantity_names import Target
 from dhkit.grading.answers.sheet import source_sheet
-from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Chain, Entries, Names, Refusal
+from dhkit.grading.answers.sheet_values import AnswerSheet, Chain, Entries, Refusal
 
 WRITTEN_BY_DHKIT = {
     "mass_matrix": "M",
@@ -34,12 +34,24 @@ WRITTEN_BY_DHKIT = {
     "potential_energy": "V",
 }
 """Functions of `dhkit equations --format python`, and what they return."""
+ENERGIES = ("K", "V", "L")
 
-MAX_RENAMINGS = 10
-"""Largest number of names that are followed from one to the next: M = mass."""
 
-PLAIN_CALL = re.compile(r"(\w+)\s*\(([\w\s,.]*)\)", re.ASCII)
-NAME = re.compile(r"[A-Za-z_]\w*")
+class Program(Protocol):
+    """A program that was read."""
+
+    record: Record
+    main: Scope
+    functions: list[Function]
+
+    def arguments_as_given(self, function: Function) -> dict[str, Value]:
+        """Return a function's arguments as themselves."""
+
+    def returned_names(self, function: Function) -> list[str]:
+        """Return the names in what a function returns."""
+
+    def applied(self, function: Function, arguments: dict[str, Value]) -> tuple[Value, Scope]:
+        """Return what a function returns, and its local names."""
 
 
 @dataclass(frozen=True)
@@ -51,374 +63,468 @@ class _Candidate:
     target
         The quantity or entry.
     line
-        Line of the assignment.
-    definition
-        Its formula; None where it cannot be read.
-    problem
-        Why it cannot be read; empty where it can.
-    name, called
-        Name in the program, and the name that says what it is: a function's for what the function returns.
+        Where it is assigned.
+    value
+        Its formula or matrix.
+    name
+        Its name in the program.
+    key
+        What tells its name from those of other scopes.
     is_alias, is_named_entry
         Whether the name is another name of the quantity, such as U for V, or that of an entry, such as M12.
-    function, is_local
-        The function that assigns it, empty for the program itself, and whether that function does not return it.
+    function
+        The function that gives it; empty for the program itself.
     """
 
     target: Target
     line: str
-    definition: Definition | None = None
-    problem: str = ""
-    name: str = ""
-    called: str = ""
+    value: Scalar | Matrix | Unread
+    name: str
+    key: str
     is_alias: bool = False
     is_named_entry: bool = False
     function: str = ""
-    is_local: bool = False
-
-    @property
-    def is_in_function(self) -> bool:
-        return bool(self.function) or self.is_local
-
-    def refuse(self, problem: str) -> _Candidate:
-        return replace(self, definition=None, problem=problem)
 
 
-def answers_of(program: Program, description: Description, file: str, names: Names = NO_NAMES) -> AnswerSheet:
-    """Return the answers of a program; ``names`` are the task's names of the joint variables.
+def answers_of(program: Program, file: str) -> AnswerSheet:
+    """Return the answers of a program.
 
     Raises
     ------
     AnswerError
         It gives none, or answers are made of too many names.
     """
-    return _ProgramAnswers(program, description, names).sheet(file)
+    return _ProgramAnswers(program).sheet(file)
 
 
 class _ProgramAnswers:
-    def __init__(self, program: Program, description: Description, names: Names) -> None:
+    def __init__(self, program: Program) -> None:
         self.program = program
-        self.names = NameResolver(description, names)
-        self.quantities = self.names.quantities
-        self.definitions = Definitions(self.names)
-        self.left_out = list(program.left_out)
-        self.notes: list[str] = []
-        self.zero_quantities: set[str] = set()
-        """Quantities of which entries that are not assigned are zero."""
+        self.record = program.record
+        self.quantities = program.record.robot.quantities
+        self.parameters: dict[str, str | Refusal] = {}
+        self._function_scopes: list[Scope] = []
 
     def sheet(self, file: str) -> AnswerSheet:
         main = self.program.main
-        candidates = [one for name in main.bindings for one in self._given_by_name(main, name, name)]
-        candidates += self._returned_by_functions()
-        candidates = self._refuse_rebound([*candidates, *self._local_to_functions(candidates)])
-        candidates = self._without_aliases(candidates)
+        candidates = [one for name in list(main.names) for one in self._given_by(main, name, name)]
+        candidates += self._given_by_functions({one.target.quantity for one in candidates})
+        candidates = self._without_aliases(self._without_calls(candidates))
         answers: dict[str, str | Entries | Refusal] = {}
         for quantity in dict.fromkeys(one.target.quantity for one in candidates):
-            answer = self._answer(quantity, candidates)
+            own = [one for one in candidates if one.target.quantity == quantity]
+            answer = self._answer(own, candidates)
             if answer is not None:
                 answers[quantity] = answer
-        notes = (*self.notes, *self.definitions.notes)
-        return source_sheet(file, self.quantities.n, answers, self.definitions.parameters, notes, self.left_out)
+        record = self.record
+        return source_sheet(file, self.quantities.n, answers, self.parameters, record.notes, record.left_out)
 
     # What the program gives
 
-    def _returned_by_functions(self) -> Iterator[_Candidate]:
-        for scope in self.program.functions:
-            for returned in scope.return_values:
-                own = WRITTEN_BY_DHKIT.get(returned.function, returned.function)
-                is_named = self.quantities.quantity(own) or self.quantities.entries(own)
-                called = own if returned.is_only and is_named else returned.local
-                if returned.local in scope.bindings:
-                    for one in self._given_by_name(scope, returned.local, called):
-                        yield replace(one, called=called, function=returned.function)
-
-    def _local_to_functions(self, candidates: Sequence[_Candidate]) -> list[_Candidate]:
-        """Return what functions assign and do not return, of quantities that nothing else gives."""
-        known = {one.target.quantity for one in candidates}
-        local: list[_Candidate] = []
-        for scope in self.program.functions:
-            returned = {value.local for value in scope.return_values}
-            function = scope.return_values[0].function if scope.return_values else ""
-            for name in scope.bindings:
-                if name in returned or name == RETURNED_FORMULA:
-                    continue
-                for one in self._given_by_name(scope, name, name):
-                    if one.target.quantity in known:
-                        continue
-                    if not one.problem and self._is_changed_on_return(scope, name, one.target.quantity):
-                        one = one.refuse(
-                            f"{function} returns something else that it makes of {name}, which {one.line} assigns"
-                        )
-                    local.append(replace(one, called=name, function=function, is_local=True))
-        first = {one.target.quantity: one for one in reversed(local) if not one.problem}
-        for one in local:
-            if first.get(one.target.quantity) is one:
-                self.notes.append(f"{one.line}: {one.name} is a local name of a function, which does not return it")
-        return local
-
-    def _is_changed_on_return(self, scope: Scope, name: str, quantity: str) -> bool:
-        """Whether what a function returns is made of a local name and of no other quantity: -G, G*sign."""
-        waiting = [used for value in scope.return_values for used in (value.names or (value.local,))]
-        seen: set[str] = set()
-        while waiting:
-            used = waiting.pop()
-            if used in seen:
-                continue
-            seen.add(used)
-            if used == name:
-                continue
-            other = self.quantities.quantity(used) or next((t.quantity for t in self.quantities.entries(used)), "")
-            is_known = self.names.is_vector(used) or self.names.find(used) is not None
-            if ((other and other != quantity) or is_known) and not self.quantities.is_parameter(used) and used != "t":
-                return False
-            formulas = [binding.formula for binding in scope.bindings.get(used, ())]
-            waiting += [word for formula in formulas if formula is not None for word in NAME.findall(formula.text)]
-        return name in seen
-
-    def _given_by_name(self, scope: Scope, name: str, called: str) -> Iterable[_Candidate]:
-        """Yield what a name gives that is called as a quantity or an entry is."""
+    def _given_by(self, scope: Scope, name: str, called: str, function: str = "") -> Iterator[_Candidate]:
+        """Yield the quantity, or the entries, that a name gives that is called so."""
+        bound = scope.names[name]
+        value: Value = bound.value
+        if scope.key(name) in self.record.broken:
+            value = Unread(self.record.broken[scope.key(name)])
+        if isinstance(value, Given):
+            value = self._of_given(scope, value, bound.line)
+        one = _Candidate(Target("M"), bound.line, Unread(""), name, scope.key(name), function=function)
         quantity = self.quantities.quantity(called)
-        entries = [] if quantity else self.quantities.entries(called)
-        bindings = scope.bindings[name]
-        resolution = self.names.resolve(scope, name) if quantity or entries else Resolution()
         if quantity:
-            yield from self._given_whole(scope, name, called, quantity, resolution)
-        scalars = [b for b in bindings if b.index is None and b.formula is not None and not b.formula.is_matrix]
-        if not entries or not scalars or any(b.index is not None for b in bindings):
+            yield from self._given_whole(
+                replace(one, is_alias=self.quantities.is_alias(called)), quantity, called, value
+            )
+        elif isinstance(value, Scalar | Unread):
+            yield from self._given_entry(one, called, value)
+
+    @staticmethod
+    def _of_given(scope: Scope, value: Given, line: str) -> Value:
+        """Return the robot's name that a name stands for; an argument of a function as it is."""
+        if value.is_argument:
+            return value
+        try:
+            return scope.scalar(value)
+        except UnreadError as error:
+            return Unread(f"{line}: {error}", frozenset((value.name,)))
+
+    def _given_entry(self, one: _Candidate, called: str, value: Scalar | Unread) -> Iterator[_Candidate]:
+        entries = self.quantities.entries(called)
+        is_own_name = self.record.robot.is_reserved(called)
+        if not entries or is_own_name:
             return
-        line = scalars[0].line
+        if isinstance(value, Scalar) and value.is_name and self.record.robot.is_same(called, value.text):
+            return  # c12 = c12, and a symbol of the name of an entry
         if len(entries) > 1:
             readings = " or ".join(map(str, entries))
-            problem = f"{called} in {line} may be {readings}; write it with a comma or an underscore"
-            for target in entries:
-                yield _Candidate(Target(target.quantity), line, problem=problem, name=name)
-        elif resolution.problem:
-            yield _Candidate(entries[0], line, problem=resolution.problem, name=name, is_named_entry=True)
-        elif not resolution.has_usual_meaning:
-            yield _Candidate(entries[0], line, definition_of(scope, name, scalars[:1]), name=name, is_named_entry=True)
+            value = Unread(f"{called} in {one.line} may be {readings}; write it with a comma or an underscore")
+            entries = [Target(entry.quantity) for entry in entries]
+        for entry in entries:
+            yield replace(one, target=entry, value=value, is_named_entry=entry.index is not None)
 
-    def _given_whole(
-        self, scope: Scope, name: str, called: str, quantity: str, resolution: Resolution
-    ) -> Iterable[_Candidate]:
-        """Yield what a name gives that is called as a quantity: all of it, or its entries."""
-        bindings = scope.bindings[name]
-        is_alias = self.quantities.is_alias(called)
-        has_parts = any(b.index is not None for b in bindings)
-        is_fitting = any(b.index is None and self._fits(quantity, called, b.formula, is_alias) for b in bindings)
-        whole = _Candidate(Target(quantity), bindings[0].line, name=name, is_alias=is_alias)
-        if resolution.problem:
-            is_certain = not is_alias and quantity in ("M", "C", "h", "tau", "K", "V", "L")
-            is_certain = is_certain and not self.quantities.is_parameter(called)
-            if is_fitting or has_parts or (is_certain and any(b.is_not_understood for b in bindings)):
-                yield whole.refuse(resolution.problem)
-            return
-        if has_parts:
-            yield from self._given_by_parts(scope, quantity, resolution, whole)
-            return
-        binding = resolution.definition
-        formula = binding.formula if binding is not None else None
-        if binding is None or formula is None:
-            return
-        whole = replace(whole, line=binding.line)
-        followed = self._follow_renaming(scope, binding)
-        if is_fitting:
-            if formula.is_zeros:
-                zeros = Formula(_zeros(self.quantities.shape(quantity)))
-                yield replace(whole, definition=definition_of(scope, name, [replace(binding, value=zeros)]))
-            else:
-                yield replace(whole, definition=followed or definition_of(scope, name, [binding]))
-        elif followed is not None and not self.quantities.is_scalar(quantity):
-            yield replace(whole, definition=followed)
-        elif quantity not in ("T", "L") or formula.problem:
-            problem = f" ({formula.problem})" if formula.problem else ""
-            self.left_out.append(f"{binding.line}: {called} = {formula.text[:60]}{problem}")
+    def _given_whole(self, one: _Candidate, quantity: str, called: str, value: Value) -> Iterator[_Candidate]:
+        one = replace(one, target=Target(quantity))
+        match value:
+            case Unread():
+                if self._is_certain(quantity, called, value):
+                    yield replace(one, value=value)
+                elif not self.record.robot.is_reserved(called):
+                    self.record.left_out.append(f"{one.line}: {called} ({value.reason})")
+            case Matrix() | Scalar():
+                if not self._fits(quantity, called, value, one.is_alias):
+                    if not self.record.robot.is_reserved(called) and not self._is_minor(quantity, value):
+                        self.record.left_out.append(f"{one.line}: {called} = {value.text[:60]}")
+                elif quantity == "tau" and self._is_input(value):
+                    self.record.left_out.append(f"{one.line}: {called} = {value.text[:60]} (an input, not an answer)")
+                else:
+                    yield from self._with_entries(one, quantity, value)
+            case Several() | Structure():
+                self.record.left_out.append(f"{one.line}: {called}, which is several values")
 
-    def _given_by_parts(
-        self, scope: Scope, quantity: str, resolution: Resolution, whole: _Candidate
-    ) -> Iterable[_Candidate]:
-        if resolution.has_zeros:
-            self.zero_quantities.add(quantity)
-        for index, bindings in resolution.entries.items():
-            one = replace(whole, line=bindings[0].line)
+    def _is_certain(self, quantity: str, called: str, value: Unread) -> bool:
+        """Whether a name that is not read would be this quantity, and nothing else.
+
+        A matrix in brackets is; a calculation, such as tau = M*ddq + C*dq, is one of the program's own steps.
+        """
+        if value.is_written_out or not value.names:
+            return not (self.quantities.is_alias(called) and not value.is_written_out)
+        return self.quantities.is_scalar(quantity) and not self.quantities.is_alias(called)
+
+    @staticmethod
+    def _is_minor(quantity: str, value: Scalar | Matrix) -> bool:
+        """Whether a number of the name of a quantity is plainly something else: T = 10, a time."""
+        return isinstance(value, Scalar) and value.number is not None and quantity in ("T", "L")
+
+    def _is_input(self, value: Scalar | Matrix) -> bool:
+        """Whether a torque is given to the program: by numbers, or by names of its own."""
+        entries = value.entries.values() if isinstance(value, Matrix) else [value]
+        return all(entry.number is not None for entry in entries)
+
+    def _fits(self, quantity: str, called: str, value: Scalar | Matrix, is_alias: bool) -> bool:
+        """Whether a value may be a quantity: a matrix or a vector of a matrix, not a number of an energy."""
+        if isinstance(value, Scalar):
+            if not self.quantities.is_scalar(quantity):
+                return False
+            is_other_number = value.number is not None and (is_alias or quantity in ("K", "L"))
+            return not self.record.robot.is_reserved(called) and not is_other_number
+        if quantity in ENERGIES:
+            return len(value.entries) == 1
+        return True
+
+    def _with_entries(self, one: _Candidate, quantity: str, value: Scalar | Matrix) -> Iterator[_Candidate]:
+        """Yield a matrix whole, or the entries of one that was assigned entry by entry."""
+        if isinstance(value, Scalar) or not self._is_by_entries(one, value):
+            yield replace(one, value=value)
+            return
+        for index, entry in value.entries.items():
             inside = self.quantities.index_in(quantity, index)
             if inside is not None:
                 target = Target(quantity, inside) if self.quantities.shape(quantity) else Target(quantity)
-                yield replace(one, target=target, definition=definition_of(scope, whole.name, bindings))
-            elif len(resolution.entries) > 1 or not whole.is_alias:
+                yield replace(one, target=target, value=entry)
+            elif len(value.entries) > 1 or not one.is_alias:
                 place = ", ".join(str(k + 1) for k in index)
-                yield one.refuse(f"{whole.name} has no entry ({place}), which {one.line} assigns")
+                yield replace(one, value=Unread(f"{one.name} has no entry ({place}), which {one.line} assigns"))
 
-    def _fits(self, quantity: str, called: str, formula: Formula | None, is_alias: bool) -> bool:
-        """Whether a formula may be a quantity: a matrix or a vector of a matrix, no number of an energy."""
-        if formula is None:
-            return False
-        if self.quantities.is_scalar(quantity) and not formula.is_matrix:
-            is_other_number = formula.number is not None and (is_alias or quantity in ("K", "L"))
-            return not self.quantities.is_parameter(called) and not is_other_number
-        if quantity in ("K", "V", "L"):
-            return formula.entries is not None and len(formula.entries) == 1
-        return formula.is_matrix
+    def _is_by_entries(self, one: _Candidate, value: Matrix) -> bool:
+        """Whether a matrix was assigned entry by entry, and may lack some."""
+        number, name = one.key.split(":", 1)
+        scopes = [self.program.main, *self._function_scopes]
+        scope = next((x for x in scopes if str(x.number) == number), None)
+        return scope is not None and bool(scope.assigned_entries.get(name))
 
-    def _follow_renaming(self, scope: Scope, binding: Binding) -> Definition | None:
-        """Return the matrix that a name is another name of: M = mass."""
-        for _ in range(MAX_RENAMINGS):
-            formula = binding.formula
-            if formula is None or formula.is_matrix or len(formula.reads) != 1:
-                return None
-            (read,) = formula.reads
-            owner = scope.owner(read.name)
-            is_whole = (read.start, read.end) == (0, len(formula.text)) and read.index is None and not read.member
-            if owner is None or not is_whole or read.use is not Use.VALUE:
-                return None
-            resolution = self.names.resolve(owner, read.name)
-            definition = resolution.definition
-            if resolution.problem or definition is None or definition.order >= binding.order:
-                return None
-            if definition.formula is not None and definition.formula.entries is not None:
-                return definition_of(owner, read.name, [definition])
-            scope, binding = owner, definition
-        return None
+    # Functions
 
-    # Names that stand for something else
+    def _given_by_functions(self, known: set[str]) -> list[_Candidate]:
+        """Return what functions give: by what they return, and, of quantities that nothing gives, by local names."""
+        self._function_scopes = []
+        returned: list[_Candidate] = []
+        local: list[_Candidate] = []
+        for function in self.program.functions:
+            count = len(self.record.left_out)
+            quantity = self.quantities.quantity(function.name)
+            if quantity and self.quantities.is_parameter(function.name):
+                reason = f"{function.name} is the robot's parameter; name the function {function.name.upper()}"
+                returned.append(self._unread(function, quantity, reason))
+                continue
+            try:
+                value, scope = self.program.applied(function, self.program.arguments_as_given(function))
+            except UnreadError as error:
+                quantity = self.quantities.quantity(self._called(function))
+                if quantity and not self.quantities.is_parameter(self._called(function)):
+                    returned.append(self._unread(function, quantity, f"{function.line}: {error}"))
+                continue
+            self._function_scopes.append(scope)
+            names = self._returned_names(function, value)
+            for name, called, result in names:
+                returned += self._returned_value(function, scope, name, called, result)
+            given = {name for name, _, _ in names}
+            local += self._local_to(function, scope, value, given)
+            del self.record.left_out[count:]
+        returned = [self._against_main(one) for one in returned]
+        known = known | {one.target.quantity for one in returned}
+        return [*returned, *self._noted([one for one in local if one.target.quantity not in known])]
 
-    def _refuse_rebound(self, candidates: Sequence[_Candidate]) -> list[_Candidate]:
-        """Refuse what functions give where the program binds the function, or the quantity, to something else."""
+    @staticmethod
+    def _called(function: Function) -> str:
+        """Return what a function is called: dhkit's own names of functions stand for the quantities."""
+        return WRITTEN_BY_DHKIT.get(function.name, function.name)
+
+    def _unread(self, function: Function, quantity: str, reason: str) -> _Candidate:
+        key = self.program.main.key(function.name)
+        return _Candidate(Target(quantity), function.line, Unread(reason), function.name, key)
+
+    def _local_to(self, function: Function, scope: Scope, value: Value, given: set[str]) -> Iterator[_Candidate]:
+        """Yield the quantities that a function assigns and does not return."""
+        quantity = self.quantities.quantity(self._called(function))
+        for name in list(scope.names):
+            if name in given or name in function.parameters:
+                continue
+            for one in self._given_by(scope, name, name, function.name):
+                if quantity == one.target.quantity and not self._all_scalars(value):
+                    reason = f"{function.name}, in {function.line}, returns nothing that is read"
+                    yield replace(one, value=Unread(reason))
+                elif self._is_changed_on_return(function, scope, value, one):
+                    reason = f"{function.name} returns something else that it makes of {name}"
+                    yield replace(one, value=Unread(f"{reason}, which {one.line} assigns"))
+                else:
+                    yield one
+
+    def _noted(self, local: Sequence[_Candidate]) -> Sequence[_Candidate]:
+        """Note the first local name of each quantity."""
+        noted: set[str] = set()
+        for one in local:
+            if not isinstance(one.value, Unread) and one.target.quantity not in noted:
+                noted.add(one.target.quantity)
+                self.record.note(f"{one.line}: {one.name} is a local name of a function, which does not return it")
+        return local
+
+    def _against_main(self, one: _Candidate) -> _Candidate:
+        """Refuse what a function gives where the program binds the same name to something that is not read."""
         main = self.program.main
-        understood = {one.name for one in candidates if not one.is_in_function}
-        for one in candidates:
-            if not one.is_local and one.called in (one.function, WRITTEN_BY_DHKIT.get(one.function)):
-                understood.add(one.function)
-        others = [name for name in main.bindings if name not in understood]
-        kept = []
-        for one in candidates:
-            problem = ""
-            if one.is_in_function and not one.problem:
-                rival = next(
-                    (x for x in others if self._is_rival(x, one) and not self._is_plain_call(x, one.function)), ""
-                )
-                if one.function in main.bindings:
-                    problem = self.names.resolve(main, one.function).problem
-                if rival and not problem:
-                    problem = f"{rival} is bound in {main.bindings[rival][-1].line} to what is not read"
-            elif one.is_named_entry and not one.problem:
-                whole = next((x for x in others if self._is_made_of(x, one)), "")
-                line = main.bindings[whole][-1].line if whole else ""
-                problem = f"{whole} is made of {one.name} in {line}, in a way that is not read" if whole else ""
-            kept.append(one.refuse(problem) if problem else one)
-        return kept
+        for name in (
+            one.name,
+            *(other for other in main.names if self.quantities.quantity(other) == one.target.quantity),
+        ):
+            bound = main.names.get(name)
+            if bound is None or isinstance(bound.value, Function) or self.record.robot.is_reserved(name):
+                continue
+            if isinstance(bound.value, Matrix) or (name != one.name and isinstance(bound.value, Given)):
+                continue
+            if isinstance(bound.value, Scalar) and self.quantities.is_scalar(one.target.quantity):
+                continue
+            if isinstance(bound.value, Unread) and self._is_call_at_numbers(bound.value, one.function):
+                continue
+            return replace(one, value=Unread(f"{name} is bound in {bound.line} to what is not read"))
+        return one
 
-    def _is_rival(self, name: str, one: _Candidate) -> bool:
-        """Whether a name of the program is that of a quantity that a function gives."""
-        if not _whole_bindings(self.program.main, name):
+    def _is_call_at_numbers(self, value: Unread, function: str) -> bool:
+        """Whether what is not read calls a function at names that stand for numbers."""
+        main = self.program.main
+        others = value.names - {function}
+        if function not in value.names or not others <= main.names.keys():
             return False
-        is_same = self.quantities.quantity(name) == one.target.quantity and not self.quantities.is_alias(name)
-        if name not in (one.called, one.name) and not is_same:
+        scalars = [_scalars(main.names[name].value) for name in others]
+        return bool(scalars) and all(one and all(x.number is not None for x in one) for one in scalars)
+
+    def _is_changed_on_return(self, function: Function, scope: Scope, value: Value, one: _Candidate) -> bool:
+        """Whether what a function returns is made of a local name and of no other quantity: -G, G*sign."""
+        names = set(self.program.returned_names(function))
+        uses = frozenset[str]().union(*(x.uses for x in self._all_scalars(value)))
+        keys = {key.partition("[")[0] for key in self._all_uses(uses)}
+        names |= {name for name in scope.names if scope.key(name) in keys}
+        waiting = list(names)
+        while waiting:  # what is not read is made of the names in it
+            bound = scope.names.get(waiting.pop())
+            for name in bound.value.names - names if bound is not None and isinstance(bound.value, Unread) else ():
+                names.add(name)
+                waiting.append(name)
+        if one.name not in names:
             return False
-        if self.quantities.is_parameter(name):
-            resolution = self.names.resolve(self.program.main, name)
-            return bool(resolution.problem) or not resolution.has_usual_meaning
+        robot = self.record.robot
+        others = [name for name in names - {one.name} if name not in function.parameters or robot.is_vector(name)]
+        for name in others:
+            quantity = self.quantities.quantity(name) or next((t.quantity for t in self.quantities.entries(name)), "")
+            if (quantity and quantity != one.target.quantity) or (robot.is_vector(name) and not quantity):
+                return False
         return True
 
-    def _is_made_of(self, name: str, one: _Candidate) -> bool:
-        """Whether a name of the program is that of a whole quantity that is made of an entry of it: G = -[G1, G2]."""
-        if self.quantities.quantity(name) != one.target.quantity or self.quantities.is_parameter(name):
-            return False
-        formulas = [binding.formula for binding in self.program.main.bindings[name]]
-        return any(one.name in NAME.findall(formula.text) for formula in formulas if formula is not None)
+    @staticmethod
+    def _all_scalars(value: Value) -> list[Scalar]:
+        """Return the scalars of what a function returns."""
+        values = value.values if isinstance(value, Several) else (value,)
+        return [x for one in values for x in _scalars(one)]
 
-    def _is_plain_call(self, name: str, function: str) -> bool:
-        """Whether a name is bound to a call of the function that gives the quantity, with its own arguments."""
-        main = self.program.main
-        scopes = (s for s in self.program.functions if any(value.function == function for value in s.return_values))
-        scope = next(scopes, None)
-        bindings = _whole_bindings(main, name)
-        formula = bindings[0].formula if len(bindings) == 1 else None
-        match = PLAIN_CALL.fullmatch(formula.text) if formula is not None else None
-        if scope is None or match is None or match[1] != function:
-            return False
-        formal = [argument for argument, bound in scope.bindings.items() if bound[0].is_argument]
-        actual = [argument.strip() for argument in match[2].split(",")] if match[2].strip() else []
-        is_own = all(isinstance(b.value, OwnFunction) for b in _whole_bindings(main, function))
-        return is_own and len(actual) <= len(formal) and all(map(self._is_own_argument, actual, formal))
+    def _all_uses(self, uses: frozenset[str]) -> set[str]:
+        """Return the keys that formulas are made of, those not to be relied on included."""
+        found, waiting = set(uses), list(uses)
+        while waiting:
+            definition = self.record.definitions.get(waiting.pop())
+            for key in definition[1].uses if definition is not None else ():
+                if key not in found:
+                    found.add(key)
+                    waiting.append(key)
+        return found
 
-    def _is_own_argument(self, actual: str, formal: str) -> bool:
-        """Whether a call gives an argument by its own name, unchanged by the program, or as a number."""
-        if re.fullmatch(r"[\d.]+", actual) and not self.quantities.is_parameter(formal):
-            return True
-        is_bound = bool(_whole_bindings(self.program.main, actual))
-        return actual == formal and (not is_bound or self._is_state_or_numbers(actual))
+    def _returned_names(self, function: Function, value: Value) -> list[tuple[str, str, Value]]:
+        """Return each local name that a function returns, what it is called, and its value."""
+        own = self._called(function)
+        match value:
+            case Several(values, names):
+                return [(name, name, one) for name, one in zip(names or ("",) * len(values), values, strict=True)]
+            case Structure(fields):
+                return [(name, name, one) for name, one in fields.items()]
+        local = self._local_name(function)
+        is_named = self.quantities.quantity(own) or self.quantities.entries(own)
+        return [(local, own if is_named else local, value)]
 
-    def _is_state_or_numbers(self, name: str) -> bool:
-        """Whether a name of the program is what the notation says, or numbers for joint variables."""
-        resolution = self.names.resolve(self.program.main, name)
-        if resolution.has_usual_meaning and not resolution.problem and resolution.definition is None:
-            return True
-        bindings = _whole_bindings(self.program.main, name)
-        formula = bindings[0].formula if len(bindings) == 1 else None
-        if self.quantities.is_parameter(name) or formula is None:
+    def _local_name(self, function: Function) -> str:
+        """Return the local name that a function returns alone; empty where it returns a formula."""
+        find: Callable[[Function], str] | None = getattr(self.program, "returned_name", None)
+        return find(function) if find is not None else ""
+
+    def _returned_value(
+        self, function: Function, scope: Scope, name: str, called: str, value: Value
+    ) -> Iterable[_Candidate]:
+        if name in scope.names and name not in function.parameters:
+            return [*self._given_by(scope, name, called, function.name)]
+        quantity = self.quantities.quantity(called) if called else ""
+        one = _Candidate(
+            Target(quantity or "M"), function.line, Unread(""), called, f"{scope.number}:", function=function.name
+        )
+        if isinstance(value, Given):
+            return []
+        if quantity and isinstance(value, Unread):
+            return [replace(one, value=value)]
+        if quantity:
+            return [
+                *self._given_whole(replace(one, is_alias=self.quantities.is_alias(called)), quantity, called, value)
+            ]
+        if called and isinstance(value, Scalar | Unread):
+            return [*self._given_entry(one, called, value)]
+        return []
+
+    # Names that stand for one thing
+
+    def _without_calls(self, candidates: Sequence[_Candidate]) -> list[_Candidate]:
+        """Leave out what the program makes by calling a function of its own that gives the same quantity."""
+        by_functions = {one.target.quantity: one.function for one in candidates if one.function}
+        kept = []
+        for one in candidates:
+            maker = by_functions.get(one.target.quantity, "")
+            if not one.function and maker and self._is_call_of(one, maker):
+                continue
+            kept.append(one)
+        return kept
+
+    def _is_call_of(self, one: _Candidate, function: str) -> bool:
+        """Whether a value is a function's at numbers for the joint variables, as a test of it."""
+        scalars = _scalars(one.value)
+        key = self.program.main.key(function)
+        if not scalars or not all(key in scalar.uses for scalar in scalars):
             return False
-        return all(entry.number is not None for entry in (formula.entries or {(): formula}).values())
+        definitions = self.record.definitions
+        texts = [scalar.text for scalar in scalars]
+        for used in self._all_uses(frozenset[str]().union(*(scalar.uses for scalar in scalars))):
+            texts += [definitions[used][1].text] if used in definitions else []
+        words = {word for text in texts for word in re.findall(r"[A-Za-z]\w*", text, re.ASCII)}
+        return not any(self.record.robot.vocabulary.is_state(word) for word in words)
 
     def _without_aliases(self, candidates: Sequence[_Candidate]) -> list[_Candidate]:
         """Leave aliases out where the quantity goes by its own name too."""
         own = {one.target.quantity for one in candidates if not one.is_alias and not one.is_named_entry}
-        kept, noted = [], set()
+        kept = []
         for one in candidates:
             quantity = one.target.quantity
             if one.is_alias and quantity in own:
-                self.left_out.append(f"{one.line}: {one.name} (read as a name, since {quantity} is given too)")
+                self.record.left_out.append(f"{one.line}: {one.name} (read as a name, since {quantity} is given too)")
                 continue
-            if one.is_alias and one.name not in noted:
-                self.notes.append(f"{one.line}: {one.name} is read as {quantity}")
-                noted.add(one.name)
+            if one.is_alias and not isinstance(one.value, Unread):
+                self.record.note(f"{one.line}: {one.name} is read as {quantity}")
             kept.append(one)
         return kept
 
     # One quantity
 
-    def _answer(self, quantity: str, candidates: Sequence[_Candidate]) -> str | Entries | Refusal | None:
-        own = [one for one in candidates if one.target.quantity == quantity]
+    def _answer(self, own: Sequence[_Candidate], candidates: Sequence[_Candidate]) -> str | Entries | Refusal | None:
         whole = [one for one in own if one.target.index is None]
         entries = [one for one in own if one.target.index is not None]
-        if refused := next((one for one in whole if one.problem), None):
-            return Refusal(refused.problem)
+        for one in whole:
+            if isinstance(one.value, Unread):
+                return Refusal(one.value.reason)
         if whole:
-            return self._whole_answer(quantity, whole, entries)
+            return self._whole_answer(whole, entries)
         entries = [one for one in entries if not self._is_part_of_energy(one, candidates)]
-        return self._entries_answer(quantity, entries) if entries else None
+        return self._entries_answer(entries) if entries else None
 
     def _text_of(self, one: _Candidate) -> str | Refusal:
-        return self.definitions.text_of(one.definition) if one.definition is not None else Refusal(one.problem)
+        """Return the text of an answer; what it is made of is defined beside the answers."""
+        value = one.value
+        if isinstance(value, Unread):
+            return Refusal(value.reason)
+        keys = [one.key, *([self.program.main.key(one.function)] if one.function else [])]
+        scalars = value.entries.values() if isinstance(value, Matrix) else [value]
+        uses = frozenset[str]().union(*(scalar.uses for scalar in scalars))
+        try:
+            needed = self.record.closure([*uses, *keys])
+        except UnreadError as error:
+            return Refusal(str(error))
+        for used in needed:
+            if used in self.record.definitions and used not in keys:
+                name, definition = self.record.definitions[used]
+                self.parameters[name] = definition.text
+        if len(self.parameters) > MAX_DEFINITIONS:
+            raise AnswerError(f"answers are made of more than {MAX_DEFINITIONS} names")
+        return value.text
 
-    def _whole_answer(self, quantity: str, whole: Sequence[_Candidate], entries: Sequence[_Candidate]) -> str | Refusal:
+    def _whole_answer(self, whole: Sequence[_Candidate], entries: Sequence[_Candidate]) -> str | Refusal:
+        quantity = whole[0].target.quantity
         texts = [self._text_of(one) for one in whole]
-        if any(text != texts[0] for text in texts):
+        if refused := next((text for text in texts if isinstance(text, Refusal)), None):
+            return refused
+        whole_texts = [self._spelt_out(one) for one in whole]
+        if any(text != whole_texts[0] for text in whole_texts):
             return Refusal(f"{quantity} is assigned twice, in {whole[0].line} and in {whole[-1].line}")
         for one in entries:
-            if one.definition is None:
-                return Refusal(one.problem)
-            self._text_of(one)
+            text = self._text_of(one)
+            if isinstance(text, Refusal):
+                return text
             if not (self._is_made_with(whole[0], one) or self._is_made_with(one, whole[0])):
                 return Refusal(f"{quantity} is given in {whole[0].line} and its entry {one.name} apart, in {one.line}")
         return texts[0]
 
+    def _spelt_out(self, one: _Candidate) -> list[str]:
+        """Return the texts of an answer's entries, each with its definition if it is a single name."""
+        definitions = dict(self.record.definitions.values())
+        texts = []
+        for scalar in _scalars(one.value):
+            text = scalar.text
+            while text in definitions:
+                text = definitions[text].text
+            texts.append(text)
+        return texts
+
     def _is_made_with(self, one: _Candidate, part: _Candidate) -> bool:
-        """Whether a formula reads the name of another, or is it."""
-        if one.definition is None or part.definition is None:
+        """Whether a formula is made with the name of another."""
+        if isinstance(one.value, Unread):
             return False
-        key = (id(part.definition.scope), part.definition.name)
-        return any(used[:2] == key for used in self.definitions.closure(one.definition))
+        scalars = one.value.entries.values() if isinstance(one.value, Matrix) else [one.value]
+        uses = frozenset[str]().union(*(scalar.uses for scalar in scalars))
+        try:
+            return part.key in self.record.closure(uses)
+        except UnreadError:
+            return False
 
     def _is_part_of_energy(self, one: _Candidate, candidates: Sequence[_Candidate]) -> bool:
         """Whether a name is rather a height or a transform that an energy is made of than an entry of h, T, J or A."""
         if not one.is_named_entry or one.target.quantity in ("M", "C", "g", "tau"):
             return False
-        energies = (other for other in candidates if other.target.quantity in ("K", "V", "L"))
+        energies = (other for other in candidates if other.target.quantity in ENERGIES)
         user = next((other.target.quantity for other in energies if self._is_made_with(other, one)), "")
         if user:
-            self.notes.append(f"{one.line}: {one.name} is read as the program's own name, which {user} uses")
+            self.record.note(f"{one.line}: {one.name} is read as the program's own name, which {user} uses")
         return bool(user)
 
-    def _entries_answer(self, quantity: str, entries: Sequence[_Candidate]) -> Entries | Refusal:
+    def _entries_answer(self, entries: Sequence[_Candidate]) -> Entries | Refusal:
         texts: dict[tuple[int, ...], str | Chain | Refusal] = {}
         lines: dict[tuple[int, ...], str] = {}
         for one in entries:
@@ -427,16 +533,11 @@ class _ProgramAnswers:
             if texts.setdefault(index, text) != text:
                 return Refusal(f"{one.target} is assigned twice, in {lines[index]} and in {one.line}")
             lines.setdefault(index, one.line)
-        if quantity in self.zero_quantities:
-            texts = dict.fromkeys(product(*map(range, self.quantities.shape(quantity))), "0") | texts
         return Entries(dict(sorted(texts.items())))
 
 
-def _whole_bindings(scope: Scope, name: str) -> list[Binding]:
-    """Return what binds a name, without calls that may change a matrix that it stands for."""
-    bindings = scope.bindings.get(name, ())
-    return [b for b in bindings if not (isinstance(b.value, NotUnderstood) and b.value.only_matrices)]
-
-
-def _zeros(shape: tuple[int, ...]) -> str:
-    return "[" + ", ".join([_zeros(shape[1:])] * shape[0]) + "]" if shape else "0"
+def _scalars(value: Value) -> list[Scalar]:
+    """Return the scalars of a value."""
+    if isinstance(value, Matrix):
+        return list(value.entries.values())
+    return [value] if isinstance(value, Scalar) else []

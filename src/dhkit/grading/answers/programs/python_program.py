@@ -1,51 +1,80 @@
-"""Python programs as bindings: a closed list of statements is understood, and every other one is noted as a change."""
+"""Python programs: a closed list of statements and expressions is read, and nothing is run."""
 
 from __future__ import annotations
 
 import ast
 import re
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 
 from dhkit.errors import AnswerError
-from dhkit.grading.answers.programs.bindings import (
-    MAX_STATEMENTS,
-    RETURNED_FORMULA,
-    DefaultArgument,
-    Formula,
-    LibraryFunction,
-    Module,
-    NotUnderstood,
-    OwnFunction,
-    Program,
-    Read,
-    ReturnValue,
-    Scope,
-    Symbol,
-    Value,
-    vector_of_names,
+from dhkit.grading.answers.programs.library import SCALAR, as_matrix, called, flat, unchanged
+from dhkit.grading.answers.programs.python_changes import (
+    CHANGING_KEYWORDS,
+    PURE,
+    assigned_names,
+    changed_by_calls,
+    changed_parts,
+    is_unbounded,
+    names_in,
+    shared_names,
 )
-from dhkit.grading.answers.programs.python_effects import SideEffectAnalysis, bound_names, names_in, part_names
-from dhkit.grading.answers.programs.python_formulas import EXACT, PythonFormulas, constant_index, has_starred
-from dhkit.grading.answers.programs.python_text import ascii_name
-from dhkit.grading.answers.programs.python_values import PythonValues, class_fields
-from dhkit.grading.answers.tokens import word_set
+from dhkit.grading.answers.programs.scope import Record, Scope
+from dhkit.grading.answers.programs.values import (
+    MAX_INDEX,
+    Function,
+    Given,
+    Index,
+    Library,
+    Matrix,
+    Module,
+    Part,
+    Scalar,
+    Several,
+    Structure,
+    Text,
+    Unread,
+    UnreadError,
+    Value,
+    calculated,
+    matrix_of,
+    number,
+    opposite,
+    transposed,
+    vector_of,
+)
+from dhkit.grading.answers.rewriting import MODULES as USUAL_MODULES
+from dhkit.grading.answers.tokens import rate_name, to_ascii, word_set
 from dhkit.grading.answers.vocabulary import plain_name
 
 MODULES = word_set(
     """
     numpy sympy math cmath mpmath casadi jax.numpy autograd.numpy numpy.lib.scimath sympy.physics.mechanics
-    sympy.physics.vector sympy.matrices sympy.abc symengine pylab
+    sympy.physics.vector sympy.matrices sympy.abc symengine pylab sympy.functions sympy.core numpy.linalg
     """
 )
 """Modules whose sin is the sine, and whose other functions mean what their names say."""
-
+NUMPY = ("numpy", "jax.numpy", "autograd.numpy", "numpy.lib.scimath", "pylab", "np")
+"""Modules whose matrices multiply entry by entry."""
 EXPORTED_LETTERS = frozenset("EINOQSe")
 """Names of one letter that these modules export."""
+MAX_STATEMENTS = 5_000
+"""Largest number of statements that are read, those of functions each time that they are applied."""
+MAX_DEPTH = 20
+"""Largest depth of calls of the program's own functions."""
+MAX_SYMBOLS = 1_000
+"""Largest index in symbols('q1:4')."""
+
+MATRICES = word_set("Matrix ImmutableMatrix MutableDenseMatrix ImmutableDenseMatrix DM SX MX matrix vertcat")
+ARRAYS = word_set("array asarray asanyarray")
+SYMBOLS = frozenset(("symbols", "Symbol", "dynamicsymbols", "var", "Dummy"))
+SIGNS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "^", ast.MatMult: "@"}
+PLAIN_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
 
-def python_program(text: str, file: str, line_name: Callable[[int], str], n: int) -> Program:
-    """Read a program of Python's; nothing in it is run.
+class PythonProgram:
+    """A program of Python's, read as bindings of names.
 
     Parameters
     ----------
@@ -55,391 +84,1026 @@ def python_program(text: str, file: str, line_name: Callable[[int], str], n: int
         What messages begin with.
     line_name
         How messages name a line, which counts from 1.
-    n
-        The number of joints: ``q1, q2 = q`` takes a vector of them apart.
+    record
+        What is known of the program.
 
     Raises
     ------
     AnswerError
         No Python, more statements than are read, or one that may change any name.
     """
-    text = text.replace("\r\n", "\n").replace("\r", "\n")
-    for line in text.split("\n")[:2]:
-        coding = re.match(r"[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)", line)
-        if coding and coding[1].lower().replace("_", "-") not in ("utf-8", "utf8", "utf-8-sig", "ascii", "us-ascii"):
-            raise AnswerError(f"{file}: {line_name(1)}: written in {coding[1][:20]!r}; expected UTF-8")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            tree = ast.parse(text, filename=file or "program")
-    except SyntaxError as error:
-        at = line_name(error.lineno) if error.lineno else "the program"
-        raise AnswerError(f"{file}: {at}: no Python: {str(error.msg)[:100]}") from None
-    except (RecursionError, MemoryError):
-        raise AnswerError(f"{file}: brackets or sums nested too deep to be read; write long sums in parts") from None
-    except ValueError as error:
-        raise AnswerError(f"{file}: no Python: {str(error)[:100]}") from None
-    try:
-        return _ProgramReader(text, file, line_name, n).read(tree)
-    except RecursionError:
-        raise AnswerError(f"{file}: statements nested too deep to be read") from None
 
-
-class _ProgramReader:
-    """Reads statement after statement; ``scope`` and ``statement`` are the current ones."""
-
-    def __init__(self, text: str, file: str, line_name: Callable[[int], str], n: int) -> None:
-        self.n = n
+    def __init__(self, text: str, file: str, line_name: Callable[[int], str], record: Record) -> None:
+        self.text = text.replace("\r\n", "\n").replace("\r", "\n")
+        self.lines = self.text.split("\n")
         self.file = file
         self.line_name = line_name
-        self.program = Program()
-        self.scope = self.program.main
-        self.statement: ast.stmt = ast.Pass(lineno=1, col_offset=0)
-        self.statement_count = 0
-        self.analysis = SideEffectAnalysis()
-        self.formulas = PythonFormulas(text)
-        self.values = PythonValues(self.analysis, self.formulas)
+        self.record = record
+        self.main = Scope(record)
+        self.functions: list[Function] = []
+        self.statements = 0
+        self.depth = 0
+        self.star_modules: list[str] = []
+        tree = self._parsed()
+        try:
+            self._refuse_unbounded(tree)
+            self._block(tree.body, self.main)
+        except RecursionError:
+            raise AnswerError(f"{file}: nested too deep to be read; write long sums in parts") from None
 
-    def read(self, tree: ast.Module) -> Program:
-        self.analysis.own |= {ascii_name(name) for name in bound_names(tree.body)}
+    def _parsed(self) -> ast.Module:
+        for line in self.lines[:2]:
+            coding = re.match(r"[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)", line)
+            if coding and coding[1].lower().replace("_", "-") not in (
+                "utf-8",
+                "utf8",
+                "utf-8-sig",
+                "ascii",
+                "us-ascii",
+            ):
+                raise AnswerError(f"{self.file}: {self.line_name(1)}: written in {coding[1][:20]!r}; expected UTF-8")
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                return ast.parse(self.text, filename=self.file or "program")
+        except SyntaxError as error:
+            at = self.line_name(error.lineno) if error.lineno else "the program"
+            raise AnswerError(f"{self.file}: {at}: no Python: {str(error.msg)[:100]}") from None
+        except (RecursionError, MemoryError):
+            raise AnswerError(
+                f"{self.file}: brackets or sums nested too deep to be read; write long sums in parts"
+            ) from None
+        except ValueError as error:
+            raise AnswerError(f"{self.file}: no Python: {str(error)[:100]}") from None
+
+    def _refuse_unbounded(self, tree: ast.Module) -> None:
         for node in ast.walk(tree):
-            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-                for returned in _returns([node]):
-                    if returned.value is not None:
-                        self.analysis.add_alias(node.name, self.analysis.shared_names(returned.value))
-        self._block(tree.body)
-        for scope in self.program.functions:
-            self._take_changes_outside(scope)
-        return self.program
+            if is_unbounded(node):
+                name = getattr(node, "id", "") or getattr(node, "attr", "") or getattr(node, "name", "")
+                raise AnswerError(
+                    f"{self.file}: {self.line_name(getattr(node, 'lineno', 1))}: found {name[:40]!r}, which may change "
+                    "any name; a program is read, not run"
+                )
 
-    @property
-    def is_in_main(self) -> bool:
-        return self.scope is self.program.main
-
-    def _line(self, node: ast.stmt | ast.expr | None = None) -> str:
-        return self.line_name((node or self.statement).lineno)
-
-    def _bind(self, name: str, value: Value) -> None:
-        self.program.bind(self.scope, ascii_name(name), self._line(), value)
-
-    def _bind_changed(
-        self, names: Iterable[str], what: str, scope: Scope | None = None, node: ast.stmt | None = None
-    ) -> None:
-        """Note that a statement changes names, whatever they stand for, in a way that is not read."""
-        line = self._line(node)
-        for name in names:
-            reason = f"{ascii_name(name)[:40]} is changed by {what} in {line}"
-            self.program.bind(scope or self.scope, ascii_name(name), line, NotUnderstood(reason))
-
-    def _bind_changed_matrix(self, name: str, change: str, node: ast.expr | None = None) -> None:
-        """Note that a name may be changed in a way that is not read, where it stands for a matrix or a list."""
-        value = NotUnderstood(f"{ascii_name(name)[:40]} {change}", only_matrices=True)
-        self.program.bind(self.scope, ascii_name(name), self._line(node), value)
-
-    def _bind_changed_aliases(self, name: str) -> None:
-        """Note that other names of a matrix change with it."""
-        for other in self.analysis.aliases(name):
-            reason = f"{other[:40]} may be the same matrix as {name[:40]}, which is changed in {self._line()}"
-            self._bind(other, NotUnderstood(reason, only_matrices=True))
-
-    def _take_changes_outside(self, scope: Scope) -> None:
-        """Bind what a function changes of the program's matrices in the program."""
-        for name, bindings in list(scope.bindings.items()):
-            is_local = any(b.index is None and not isinstance(b.value, NotUnderstood) for b in bindings)
-            if is_local or name == RETURNED_FORMULA or scope.outer is None:
-                continue
-            for binding in bindings:
-                value = binding.value
-                if not isinstance(value, NotUnderstood):
-                    value = NotUnderstood(f"{name} is changed inside a function, in {binding.line}")
-                self.program.bind(scope.outer, name, binding.line, value)
+    def line(self, node: ast.stmt | ast.expr) -> str:
+        """Return how messages name the line of a node."""
+        return self.line_name(node.lineno)
 
     # Statements
 
-    def _block(self, statements: Sequence[ast.stmt]) -> None:
-        outer = self.statement
+    def _block(self, statements: Sequence[ast.stmt], scope: Scope) -> None:
         for statement in statements:
-            self.statement = statement
-            self.statement_count += 1
-            if self.statement_count > MAX_STATEMENTS:
+            self.statements += 1
+            if self.statements > MAX_STATEMENTS:
                 raise AnswerError(f"{self.file}: more than {MAX_STATEMENTS} statements")
-            self._side_effects(statement)
-            self._statement(statement)
-        self.statement = outer
+            self._statement(statement, scope)
 
-    def _side_effects(self, statement: ast.stmt) -> None:
-        """Note what the calls of a statement may change."""
-        effects = self.analysis.effects_of(statement)
-        if effects.unbounded:
-            raise AnswerError(
-                f"{self.file}: {self._line(effects.unbounded)}: found {self._quote(effects.unbounded)}, which may "
-                "change any name; a program is read, not run"
-            )
-        for name, call in effects.changed.items():
-            self._bind_changed_matrix(name, f"may be changed by {self._quote(call)} in {self._line(call)}", call)
-        if not isinstance(statement, ast.FunctionDef | ast.ClassDef):
-            self._bind_changed(effects.walrus_names, ":=", node=statement)
-
-    def _quote(self, node: ast.expr) -> str:
-        return repr(self.formulas.source.segment(node)[:40])
-
-    def _statement(self, statement: ast.stmt) -> None:
+    def _statement(self, statement: ast.stmt, scope: Scope) -> None:
+        line = self.line(statement)
         match statement:
-            case ast.Expr() | ast.Pass() | ast.Assert() | ast.Raise() | ast.Return() | ast.Global() | ast.Nonlocal():
-                return
             case ast.Assign(targets, value):
                 for target in targets:
-                    self._assign(target, value)
-                    if len(targets) > 1 and isinstance(target, ast.Name) and not isinstance(value, ast.Constant):
-                        self.analysis.add_alias(target.id, [name for other in targets for name in names_in(other)])
-            case ast.AnnAssign(target, _, value):
-                if value is not None:
-                    self._assign(target, value)
+                    self._assign(target, value, scope, line)
+                names = [name for target in targets for name in names_in(target)]
+                if len(targets) > 1 and not isinstance(value, ast.Constant):
+                    for name in names:
+                        scope.add_alias(name, names)
+            case ast.AnnAssign(target, _, ast.expr() as value):
+                self._assign(target, value, scope, line)
             case ast.AugAssign(ast.Subscript(ast.Name(name), index), ast.Add(), value):
-                self._assign_entry(name, [index], value, is_added=True)
-            case ast.AugAssign():
-                for name in bound_names([statement]):
-                    self._bind_changed_aliases(name)
-                    reason = f"{ascii_name(name)[:40]} is changed after it is assigned, in {self._line()}"
-                    self._bind(name, NotUnderstood(reason))
+                self._assign_entry(name, [index], value, scope, line, is_added=True)
             case ast.Import(aliases):
                 for alias in aliases:
-                    self._import(alias)
+                    self._import(alias, scope, line)
             case ast.ImportFrom(module, aliases):
                 for alias in aliases:
-                    self._import_from(module or ".", alias)
-            case ast.FunctionDef(name, arguments, body, decorators) if self.is_in_main:
-                self._function(name, arguments, body, bool(decorators))
-            case ast.ClassDef():
-                self._class(statement)
+                    self._import_from(module or ".", alias, scope, line)
+            case ast.FunctionDef(name, arguments, body, []) if scope is self.main:
+                self._define(name, arguments, body, scope, line)
+            case ast.If(test, body, []) if scope is self.main and _is_main(test):
+                self._block(body, scope)
+                return
+            case ast.Expr() | ast.Pass() | ast.AnnAssign() | ast.Assert() | ast.Return():
+                pass
             case _:
-                self._bind_changed_parts(self.analysis.changed_by_block(statement))
-                kind = {"FunctionDef": "a function of this name", "Delete": "'del'"}.get(type(statement).__name__)
-                self._bind_changed(bound_names([statement]), kind or f"{type(statement).__name__.lower()!r}")
+                self._leave(statement, scope, line)
+                return
+        if not isinstance(statement, ast.FunctionDef):
+            self._changes(statement, scope, line)
 
-    def _class(self, statement: ast.ClassDef) -> None:
-        if self.is_in_main:
-            self.values.structures[statement.name] = class_fields(statement)
-        self._bind_changed([statement.name], "a class of this name")
-        self._bind_changed(_global_names(statement.body), "'global'")
-        self._bind_changed_parts(self.analysis.changed_by_class(statement))
-        if self.is_in_main and any(isinstance(x, ast.FunctionDef) for x in statement.body):
-            self.program.left_out.append(f"{self._line()}: class {statement.name[:40]}")
+    def _leave(self, statement: ast.stmt, scope: Scope, line: str) -> None:
+        """Note what a statement that is not read may change."""
+        kind = {
+            "FunctionDef": "a function",
+            "Delete": "'del'",
+        }
+        if isinstance(statement, ast.AugAssign):
+            for name in dict.fromkeys(assigned_names(statement)):
+                scope.change(
+                    _ascii(name), f"{name[:40]} is changed after it is assigned, in {line}", only_matrices=False
+                )
+            self._changes(statement, scope, line)
+            return
+        what = kind.get(type(statement).__name__, repr(type(statement).__name__.lower()))
+        if isinstance(statement, ast.ClassDef):
+            self._leave_class(statement, scope, line)
+            return
+        read = set(names_in(statement)) - self._modules(scope)
+        assigned = list(dict.fromkeys(assigned_names(statement)))
+        for name in assigned:
+            scope.add_alias(_ascii(name), map(_ascii, read))
+        for name in assigned:
+            scope.change(_ascii(name), f"{name[:40]} is changed by {what} in {line}", only_matrices=False)
+        self._changes(statement, scope, line)
+        for name in changed_parts(statement):
+            scope.change(_ascii(name), f"{name[:40]} may be changed by {what} in {line}")
 
-    def _bind_changed_parts(self, names: Iterable[str]) -> None:
-        """Note what a block that is not understood may change under another name."""
-        for name in names:
-            self._bind_changed_matrix(name, f"may be changed in the block of {self._line()}")
+    def _leave_class(self, statement: ast.ClassDef, scope: Scope, line: str) -> None:
+        """Read a class of fields alone as a structure; of another one note what it may change."""
+        if (fields := self._fields(statement, scope)) is not None:
+            scope.bind(_ascii(statement.name), Structure(fields), line)
+            return
+        scope.change(_ascii(statement.name), f"{statement.name[:40]} is a class, in {line}", only_matrices=False)
+        if any(isinstance(inner, ast.FunctionDef) for inner in statement.body):
+            self.record.left_out.append(f"{line}: class {statement.name[:40]}")
+        modules = self._modules(scope)
+        changed: set[str] = set()
+        for inner in statement.body:
+            read = set(names_in(inner)) - modules
+            if isinstance(inner, ast.FunctionDef | ast.AsyncFunctionDef):
+                arguments = {x.arg for x in ast.walk(inner.args) if isinstance(x, ast.arg)}
+                if any(name not in arguments for name in changed_parts(inner)):
+                    changed |= read - arguments
+                continue
+            for name in assigned_names(inner):
+                scope.add_alias(_ascii(name), map(_ascii, read))
+            changed |= set(changed_parts(inner))
+        for node in ast.walk(statement):
+            if isinstance(node, ast.Global):
+                for name in node.names:
+                    scope.change(_ascii(name), f"{name[:40]} is changed in a class, in {line}", only_matrices=False)
+        for name in sorted(changed):
+            scope.change(_ascii(name), f"{name[:40]} may be changed in the class of {line}")
+        self._changes(statement, scope, line)
+
+    def _fields(self, statement: ast.ClassDef, scope: Scope) -> dict[str, Value] | None:
+        """Return what the body of a class assigns, as the fields of its objects; None where it has more."""
+        fields: dict[str, Value] = {}
+        for inner in statement.body:
+            match inner:
+                case ast.AnnAssign(ast.Name(name), _, ast.expr() as value) | ast.Assign([ast.Name(name)], value):
+                    if name in fields:
+                        return None
+                    fields[name] = self._right_side(value, scope, self.line(inner))
+                case ast.Expr(ast.Constant()) | ast.Pass():
+                    pass
+                case _:
+                    return None
+        return fields
+
+    def _changes(self, statement: ast.stmt, scope: Scope, line: str) -> None:
+        """Note what the calls of a statement, and ``:=``, may change."""
+        for node in ast.walk(statement):
+            match node:
+                case ast.NamedExpr(target, value) | ast.comprehension(target, value):
+                    for name in names_in(target):
+                        scope.add_alias(_ascii(name), map(_ascii, set(names_in(value)) - self._modules(scope)))
+                    if isinstance(node, ast.NamedExpr):
+                        for name in names_in(target):
+                            scope.change(_ascii(name), f"{name[:40]} is changed by := in {line}", only_matrices=False)
+
+        def is_pure(name: str) -> bool:
+            owner = scope.owner(_ascii(name))
+            bound = owner.names.get(_ascii(name)) if owner is not None else None
+            match bound.value if bound is not None else None:
+                case None:
+                    return name in PURE
+                case Library() | Structure():  # a class of fields alone makes objects and changes nothing
+                    return True
+                case Function() as function:
+                    return not function.changes
+            return False
+
+        modules = self._modules(scope)
+        for name in dict.fromkeys(changed_by_calls(statement, is_pure, modules.__contains__)):
+            scope.change(_ascii(name), f"{name[:40]} may be changed by a call in {line}")
+            owner = scope.owner(_ascii(name))
+            bound = owner.names.get(_ascii(name)) if owner is not None else None
+            if bound is not None and isinstance(bound.value, Function):
+                for other in bound.value.changes:
+                    scope.change(_ascii(other), f"{other[:40]} may be changed by {name[:40]} in {line}", False)
+
+    def _modules(self, scope: Scope) -> set[str]:
+        return {name for name, bound in self.main.names.items() if isinstance(bound.value, Module)}
 
     # Assignments
 
-    def _assign(self, target: ast.expr, value: ast.expr) -> None:
+    def _assign(self, target: ast.expr, value: ast.expr, scope: Scope, line: str) -> None:
         match target:
+            case ast.Name(name) if isinstance(value, ast.Lambda) and scope is self.main:
+                self._define(name, value.args, value.body, scope, line)
             case ast.Name(name):
-                self._assign_name(name, value)
+                self._share(name, value, scope)
+                scope.bind(_ascii(name), self._right_side(value, scope, line), line)
             case ast.Tuple(targets) | ast.List(targets):
-                self._assign_several(targets, value)
+                self._assign_several(targets, value, scope, line)
             case ast.Subscript(ast.Name(name), index):
-                self._assign_entry(name, [index], value)
+                self._assign_entry(name, [index], value, scope, line)
             case ast.Subscript(ast.Subscript(ast.Name(name), first), second):
-                self._assign_entry(name, [first, second], value)
+                self._assign_entry(name, [first, second], value, scope, line)
             case _:
-                names = bound_names([self.statement])
-                shared = sorted(self.analysis.shared_names(value))
-                self._alias_parts(names, shared)
-                self._bind_changed(names, "an assignment to a part of it")
-                for name in shared:
-                    change = f"is stored in a part of {names[0] if names else 'another'}"
-                    self._bind_changed_matrix(name, f"{change} in {self._line()}, and may be changed there")
+                shared = [_ascii(x) for x in shared_names(value)]
+                for name in dict.fromkeys(assigned_names(target)):
+                    scope.change(
+                        _ascii(name), f"{name[:40]} is changed by an assignment to a part of it in {line}", False
+                    )
+                    scope.add_alias(_ascii(name), shared)
+                for other in shared:
+                    scope.change(other, f"{other[:40]} is stored in a part of another, in {line}")
 
-    def _alias_parts(self, names: Iterable[str], shared: Iterable[str]) -> None:
-        """Note other names of the matrices whose parts the statement assigns, and those that it makes."""
-        for name in part_names(self.statement):
-            self._bind_changed_aliases(name)
-        for name in names:
-            self.analysis.add_alias(name, shared)
+    def _share(self, name: str, value: ast.expr, scope: Scope) -> None:
+        keywords = {k.arg for k in value.keywords} if isinstance(value, ast.Call) else set()
+        shared = set(names_in(value)) if keywords & CHANGING_KEYWORDS else shared_names(value)
+        scope.add_alias(_ascii(name), map(_ascii, shared - self._modules(scope)))
 
-    def _assign_name(self, name: str, value: ast.expr) -> None:
-        if self.values.is_unchanged(name, value):
-            return
-        self.analysis.add_alias(name, self.analysis.shared_names(value))
-        structures = self.values.structures
-        if self.is_in_main and (fields := self.values.fields(value)):
-            structures[name] = {} if name in structures else fields
-        if isinstance(value, ast.Lambda) and self.is_in_main:
-            self._function(name, value.args, value.body, False)
-        elif symbols := self.values.symbols(value):
-            vector = vector_of_names([plain_name(symbol) for symbol in symbols], symbols)
-            self._bind(name, Symbol(symbols[0]) if len(symbols) == 1 else vector)
-        else:
-            function = self.values.library_function(value)
-            self._bind(name, LibraryFunction(function) if function else self.formulas.formula(value))
+    def _right_side(self, value: ast.expr, scope: Scope, line: str) -> Value:
+        try:
+            return self.value(value, scope)
+        except UnreadError as error:
+            return Unread(f"{line}: {error}", frozenset(map(_ascii, names_in(value))), _is_written_out(value))
 
-    def _assign_several(self, targets: Sequence[ast.expr], value: ast.expr) -> None:
+    def _assign_several(self, targets: Sequence[ast.expr], value: ast.expr, scope: Scope, line: str) -> None:
         names = [target.id for target in targets if isinstance(target, ast.Name)]
-        everything = bound_names([self.statement])
-        self._alias_parts(everything, self.analysis.shared_names(value))
-        symbols = self.values.symbols(value)
-        if len(names) == len(targets):
-            if symbols is not None and len(symbols) == len(names):
-                for name, symbol in zip(names, symbols, strict=True):
-                    self._bind(name, Symbol(symbol))
-                return
-            match value:
-                case ast.Tuple(values) | ast.List(values) if len(values) == len(names) and not has_starred(values):
-                    self._assign_pairwise(names, values)
-                    return
-                case ast.Call(ast.Attribute(ast.Name(module), "broadcast_arrays"), values) if (
-                    len(values) == len(names) and module in self.analysis.modules
-                ):
-                    self._assign_pairwise(names, values)
-                    return
-                case ast.Name(vector) if len(names) == self.n:
-                    for k, name in enumerate(names):
-                        text = f"{ascii_name(vector)}[{k}]"
-                        self._bind(name, Formula(text, (Read(ascii_name(vector), 0, len(text), (k,)),)))
-                    return
-        self._bind_changed(everything, "an unpacking that is not read")
-
-    def _assign_pairwise(self, names: Sequence[str], values: Sequence[ast.expr]) -> None:
-        """Bind several names at once: what is read on the right was bound before."""
-        order = self.program.order
-        for name, value in zip(names, values, strict=True):
-            self.program.order = order
-            self._assign_name(name, value)
-        self.program.order = order + 1
-
-    def _assign_entry(self, name: str, indices: Sequence[ast.expr], value: ast.expr, is_added: bool = False) -> None:
-        formula = self.formulas.formula(value)
-        self._bind_changed_aliases(name)
-        self.analysis.add_alias(name, self.analysis.shared_names(value) if not isinstance(value, ast.Subscript) else ())
-        numbers = [constant_index(index) for index in indices]
-        if any(index is None for index in numbers) or formula.is_matrix:
-            self._bind_changed([name], "an assignment to a part of it")
+        if len(names) != len(targets):
+            for name in dict.fromkeys(x for target in targets for x in assigned_names(target)):
+                scope.change(_ascii(name), f"{name[:40]} is changed by an unpacking in {line}", only_matrices=False)
             return
-        index = tuple(k for part in numbers if part is not None for k in part)
-        self.program.bind(self.scope, ascii_name(name), self._line(), formula, index, is_added)
+        for name in names:
+            self._share(name, value, scope)
+        if isinstance(value, ast.Tuple | ast.List) and len(value.elts) == len(names):
+            values = [self._right_side(one, scope, line) for one in value.elts]
+        else:
+            values = self._taken_apart(self._right_side(value, scope, line), len(names), scope, line)
+        for name, one in zip(names, values, strict=True):
+            scope.bind(_ascii(name), one, line)
+
+    def _taken_apart(self, value: Value, count: int, scope: Scope, line: str) -> list[Value]:
+        match value:
+            case Several(values) if len(values) == count:
+                return list(values)
+            case Matrix() if len(value.rows) * len(value.rows[0]) == count:
+                return [x for row in value.rows for x in row]
+            case Given(vector) if not self.record.robot.vocabulary.knows(vector) or count > 1:
+                try:
+                    return [scope.entry(value, (k,)) for k in range(count)]
+                except UnreadError as error:
+                    return [Unread(f"{line}: {error}")] * count
+            case Unread():
+                return [value] * count
+        return [Unread(f"{line}: an unpacking that is not read")] * count
+
+    def _assign_entry(
+        self, name: str, indices: Sequence[ast.expr], value: ast.expr, scope: Scope, line: str, is_added: bool = False
+    ) -> None:
+        name = _ascii(name)
+        owner = scope.owner(name)
+        if owner is not None and owner is not scope:
+            scope.change(name, f"{name[:40]} is changed inside a function, in {line}")
+            return
+        try:
+            stored = self.value(value, scope)
+            if _is_ellipsis(indices) and scope.is_bare_zero(name):
+                scope.bind(name, stored, line)
+                return
+            parts = [constant_index(index) for index in indices]
+            if any(part is None for part in parts):
+                raise UnreadError(f"{name[:40]} is changed by an assignment to a part of it")
+            scalar = scope.scalar(stored)
+        except UnreadError as error:
+            self._alias(name, shared_names(value), scope)
+            scope.change(name, f"{error}, in {line}", only_matrices=False)
+            return
+        if isinstance(stored, Matrix):
+            self._alias(name, shared_names(value), scope)
+        for other in list(scope.same_matrices(name)):
+            scope.change(other, f"{other[:40]} may be the same matrix as {name[:40]}, which is changed in {line}")
+        index = tuple(k for part in parts if part is not None for k in part)
+        scope.bind_entry(name, index, scalar, line, is_added)
 
     # Imports
 
-    def _import(self, alias: ast.alias) -> None:
+    def _import(self, alias: ast.alias, scope: Scope, line: str) -> None:
         first = alias.name.split(".")[0]
         name, module = alias.asname or first, alias.name if alias.asname else first
-        if module in MODULES:
-            self.analysis.modules.add(name)
-            self._bind(name, Module(module))
+        harmless = module.split(".")[0] in ("matplotlib", "scipy", "time", "os", "sys", "IPython")
+        if module in MODULES or harmless:
+            scope.bind(_ascii(name), Module(module), line)
         else:
-            self._bind(name, NotUnderstood(f"{name[:40]} is the module {module[:40]} since {self._line()}"))
+            scope.bind(_ascii(name), Unread(f"{name[:40]} is the module {module[:40]} since {line}"), line)
 
-    def _import_from(self, module: str, alias: ast.alias) -> None:
-        name, full_name = alias.asname or alias.name, f"{module}.{alias.name}"
+    def _import_from(self, module: str, alias: ast.alias, scope: Scope, line: str) -> None:
+        name, full_name = _ascii(alias.asname or alias.name), f"{module}.{alias.name}"
+        value: Value
         if alias.name == "*":
-            self._import_everything(module)
-        elif module == "sympy.abc":
-            self._bind(name, Symbol(alias.name))
-        elif module in MODULES or module in ("sympy.functions", "sympy.core"):
-            self.analysis.imported.add(name)
-            if alias.name in EXACT and alias.name != name:
-                reason = f"{name[:40]} is {alias.name} in {self._line()}, which is read by its own name"
-                self._bind(name, NotUnderstood(reason))
-            else:
-                self._bind(name, Symbol("pi") if alias.name == "pi" else LibraryFunction(alias.name))
+            self._import_everything(module, line)
+            return
+        if module == "sympy.abc":
+            value = Given(alias.name)
         elif full_name in MODULES:
-            self.analysis.modules.add(name)
-            self._bind(name, Module(full_name))
+            value = Module(full_name)
+        elif module in MODULES:
+            value = Scalar("pi") if alias.name == "pi" else Library(alias.name)
+            if module in NUMPY and alias.name in (*ARRAYS, "zeros", "eye"):
+                value = Library(f"numpy.{alias.name}")
         else:
-            self._bind(name, NotUnderstood(f"{name[:40]} comes from {module[:40]} in {self._line()}"))
+            value = Unread(f"{name[:40]} comes from {module[:40]} in {line}")
+        scope.bind(name, value, line)
 
-    def _import_everything(self, module: str) -> None:
+    def _import_everything(self, module: str, line: str) -> None:
         """Note which names ``from module import *`` may replace; the names of the module mean what they say."""
         if module not in MODULES or module == "sympy.abc":
             raise AnswerError(
-                f"{self.file}: {self._line()}: found 'from {module[:40]} import *', which may change any "
-                "name; expected numpy, sympy or math"
+                f"{self.file}: {line}: found 'from {module[:40]} import *', which may change any name; expected "
+                "numpy, sympy or math"
             )
-        main = self.program.main
-        for name, bindings in list(main.bindings.items()):
+        self.star_modules.append(module)
+        for name, bound in list(self.main.names.items()):
             is_exported = name in EXPORTED_LETTERS if len(name) == 1 else not any(c.isdigit() for c in name)
-            has_value = any(isinstance(b.value, Formula | Symbol | OwnFunction) for b in bindings)
+            has_value = not isinstance(bound.value, Module | Library | Unread)
             if is_exported and has_value and name not in ("tau", "KE", "PE", "Tau", "Jac"):
-                self._bind_changed([name], f"'from {module} import *'", main)
+                self.main.change(name, f"{name} is changed by 'from {module} import *' in {line}", only_matrices=False)
 
     # Functions
 
-    def _function(
-        self, name: str, arguments: ast.arguments, body: Sequence[ast.stmt] | ast.expr, is_decorated: bool
+    def _define(
+        self, name: str, arguments: ast.arguments, body: Sequence[ast.stmt] | ast.expr, scope: Scope, line: str
     ) -> None:
-        self._bind(name, OwnFunction())
-        main, self.scope = self.scope, self.program.add_function(outer=self.scope)
-        self._arguments(arguments)
-        if isinstance(body, ast.expr):
-            self._side_effects(ast.copy_location(ast.Expr(body), body))
-            self._return_value(name, body, self.statement)
-        else:
-            self._bind_changed(_global_names(body), "'global' in a function", main)
-            self._function_body(name, body, is_decorated)
-        self.scope = main
+        function = self._function(name, arguments, body, scope, line)
+        self.functions.append(function)
+        scope.bind(_ascii(name), function, line)
+        pieces: Sequence[ast.AST] = [body] if isinstance(body, ast.expr) else body
+        for node in (x for piece in pieces for x in ast.walk(piece)):
+            match node:
+                case ast.Global(names):
+                    for one in names:
+                        reason = f"{one[:40]} is changed by 'global' in a function, in {line}"
+                        scope.change(_ascii(one), reason, only_matrices=False)
+                case ast.Return(ast.expr() as value) | ast.Yield(ast.expr() as value):
+                    self._alias(name, shared_names(value), scope)
+                case ast.Assign(targets, value):
+                    for one in (x for target in targets for x in names_in(target)):
+                        self._alias(one, shared_names(value), scope)
 
-    def _arguments(self, arguments: ast.arguments) -> None:
+    def _alias(self, name: str, others: Iterable[str], scope: Scope) -> None:
+        """Note that a name may be the same matrix as others."""
+        scope.add_alias(_ascii(name), map(_ascii, set(others) - self._modules(scope)))
+
+    def _function(
+        self, name: str, arguments: ast.arguments, body: Sequence[ast.stmt] | ast.expr, scope: Scope, line: str
+    ) -> Function:
         positional = [*arguments.posonlyargs, *arguments.args]
-        for argument in [*positional, *arguments.kwonlyargs]:
-            is_object = argument.arg in ("self", "cls")
-            reason = f"{argument.arg} is an object, in {self._line()}"
-            symbol = Symbol(ascii_name(argument.arg), is_argument=True)
-            self._bind(argument.arg, NotUnderstood(reason) if is_object else symbol)
-        defaults = [
+        parameters = [argument.arg for argument in [*positional, *arguments.kwonlyargs]]
+        pairs = [
             *zip(reversed(positional), reversed(arguments.defaults), strict=False),
             *zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True),
         ]
-        for argument, default in defaults:
-            if default is None:
+        defaults: dict[str, Value] = {}
+        for argument, default in pairs:
+            if default is not None:
+                defaults[_ascii(argument.arg)] = self._right_side(default, scope, line)
+        problem = ""
+        if arguments.vararg is not None or arguments.kwarg is not None:
+            problem = f"{name} takes any arguments, in {line}"
+        elif not isinstance(body, ast.expr):
+            returns = [
+                x for statement in body[:-1] for x in ast.walk(statement) if isinstance(x, ast.Return | ast.Yield)
+            ]
+            if returns or isinstance(body[-1], ast.If | ast.For | ast.While | ast.Try | ast.With):
+                problem = f"{name} has 'return' in a branch or several, in {line}" if _returns_inside(body) else ""
+        function = Function(_ascii(name), tuple(map(_ascii, parameters)), body, line, defaults, problem)
+        for parameter in parameters:
+            if any(parameter in names_in(default) for _, default in pairs if default is not None):
                 continue
-            self.analysis.add_alias(argument.arg, self.analysis.shared_names(default))
-            fields = self.values.fields(default)
-            for field, value in fields.items():
-                self._bind(f"{ascii_name(argument.arg)}.{ascii_name(field)}", self.formulas.formula(value))
-            self._bind(argument.arg, DefaultArgument(self.formulas.formula(default), bool(fields)))
-        for rest in (arguments.vararg, arguments.kwarg):
-            if rest is not None:
-                self._bind_changed([rest.arg], "'*'")
+        return replace(function, changes=self._changes_of(body, set(parameters), [d for _, d in pairs if d], scope))
 
-    def _function_body(self, name: str, body: Sequence[ast.stmt], is_decorated: bool) -> None:
-        *before, last = body
-        early = _returns(before)
-        self._block(body)
-        for global_name in _global_names(body):
-            self.scope.bindings.pop(ascii_name(global_name), None)
-        if isinstance(last, ast.Return) and last.value is not None and not is_decorated and not early:
-            self._return_value(name, last.value, last)
-        elif isinstance(last, ast.Return) or early:
-            cause = "a decorator" if is_decorated else "several 'return'" if early else "'return'"
-            where = self._line(early[0] if early and isinstance(early[0], ast.stmt) else self.statement)
-            self._bind(RETURNED_FORMULA, NotUnderstood(f"{name} has {cause}, in {where}"))
-            self.scope.return_values.append(ReturnValue(name, RETURNED_FORMULA))
+    def _changes_of(
+        self, body: Sequence[ast.stmt] | ast.expr, parameters: set[str], defaults: Iterable[ast.expr], scope: Scope
+    ) -> frozenset[str]:
+        """Return the names outside a function, or its arguments, that it may change."""
+        statements = [ast.Expr(body)] if isinstance(body, ast.expr) else body
+        shared: dict[str, set[str]] = {}
+        local: set[str] = set()
+        for node in (x for statement in statements for x in ast.walk(statement)):
+            match node:
+                case ast.Assign(targets, value):
+                    for name in (x for target in targets for x in names_in(target)):
+                        shared.setdefault(name, set()).update(shared_names(value))
+                case ast.comprehension(target, value) | ast.For(target, value) | ast.NamedExpr(target, value):
+                    for name in names_in(target):
+                        shared.setdefault(name, set()).update(names_in(value))
+                case ast.Name(name, ast.Store()):
+                    pass
+                case ast.Global(names) | ast.Nonlocal(names):
+                    return frozenset(names) | parameters | {"?"}
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                local.add(node.id)
+        default_names = {x for default in defaults for x in names_in(default)}
 
-    def _return_value(self, name: str, value: ast.expr, statement: ast.stmt) -> None:
-        """Note what a function returns: local names, or a formula."""
+        def is_pure(name: str) -> bool:
+            bound = self.main.names.get(_ascii(name))
+            if bound is not None and isinstance(bound.value, Function):
+                return not bound.value.changes
+            return name in PURE or (bound is not None and isinstance(bound.value, Library))
+
+        modules = self._modules(scope)
+        changed: set[str] = set()
+        for statement in statements:
+            changed |= set(changed_parts(statement))
+            changed |= set(changed_by_calls(statement, is_pure, modules.__contains__))
+        waiting = list(changed)
+        while waiting:
+            for other in shared.get(waiting.pop(), ()):
+                if other not in changed:
+                    changed.add(other)
+                    waiting.append(other)
+        if changed & parameters:
+            changed |= default_names
+        return frozenset(changed - (local - parameters) - modules)
+
+    def arguments_as_given(self, function: Function) -> dict[str, Value]:
+        """Return a function's arguments as themselves; those whose default changes what is computed are not read."""
+        robot = self.record.robot
+        values: dict[str, Value] = {}
+        for name in function.parameters:
+            values[name] = Given(name, is_argument=True)
+            default = function.defaults.get(name)
+            if name in ("self", "cls"):
+                values[name] = Unread(f"{name} is an object, in {function.line}")
+            elif default is not None and not isinstance(default, Structure):
+                try:
+                    same = robot.is_reserved(name) and robot.keeps_meaning(name, default)
+                except UnreadError as error:
+                    values[name] = Unread(f"{error}, as a default in {function.line}")
+                    continue
+                if not same:
+                    shown = default.text if isinstance(default, Scalar) else "something else"
+                    values[name] = Unread(f"an argument has the default {name} = {shown[:40]} in {function.line}")
+            elif isinstance(default, Structure):
+                values[name] = default
+        return values
+
+    def apply(self, function: Function, arguments: dict[str, Value]) -> Value:
+        """Return what a function of the program returns for some arguments.
+
+        Raises
+        ------
+        UnreadError
+            The function is not read.
+        """
+        value, _ = self.applied(function, arguments)
+        if isinstance(value, Unread):
+            raise UnreadError(value.reason)
+        return value
+
+    def applied(self, function: Function, arguments: dict[str, Value]) -> tuple[Value, Scope]:
+        """Return what a function returns, and its local names."""
+        if function.problem:
+            raise UnreadError(function.problem)
+        if self.depth >= MAX_DEPTH:
+            raise UnreadError(f"{function.name} calls itself, or functions nested too deep")
+        body = function.definition
+        if isinstance(body, ast.expr):
+            scope = Scope(self.record, self.main, frozenset(function.parameters))
+        else:
+            local = {_ascii(x) for statement in body for x in assigned_names(statement)}
+            scope = Scope(self.record, self.main, frozenset(local) | frozenset(function.parameters))
+        for name, value in arguments.items():
+            scope.set_argument(name, value, function.line)
+        self.depth += 1
+        try:
+            if isinstance(body, ast.expr):
+                return self._right_side(body, scope, function.line), scope
+            self._block(body, scope)
+            last = body[-1]
+            if not isinstance(last, ast.Return) or last.value is None:
+                return Several(()), scope
+            try:
+                return self._returned(last.value, scope), scope
+            except UnreadError as error:
+                names = frozenset(map(_ascii, names_in(last.value)))
+                return Unread(f"{self.line(last)}: {error}", names, _is_written_out(last.value)), scope
+        finally:
+            self.depth -= 1
+
+    def _returned(self, node: ast.expr, scope: Scope) -> Value:
+        if isinstance(node, ast.Tuple):
+            values = tuple(self._right_side(one, scope, self.line(node)) for one in node.elts)
+            return Several(values, tuple(local_name(one) for one in node.elts))
+        return self.value(node, scope)
+
+    @staticmethod
+    def returned_names(function: Function) -> list[str]:
+        """Return the names in what a function returns."""
+        body = function.definition
+        last = body if isinstance(body, ast.expr) else body[-1]
+        return list(dict.fromkeys(map(_ascii, names_in(last)))) if isinstance(last, ast.expr | ast.Return) else []
+
+    @staticmethod
+    def returned_name(function: Function) -> str:
+        """Return the local name that a function returns, as it is or as an array; empty where it returns a formula."""
+        body = function.definition
+        last = body if isinstance(body, ast.expr) else body[-1]
+        node = last.value if isinstance(last, ast.Return) else last
+        return local_name(node) if isinstance(node, ast.expr) else ""
+
+    # Expressions
+
+    def value(self, node: ast.expr, scope: Scope) -> Value:
+        """Return the value of an expression.
+
+        Raises
+        ------
+        UnreadError
+            It is not read.
+        """
+        match node:
+            case ast.Constant(value) if type(value) in (int, float):
+                return self._number(node)
+            case ast.Constant(str(text)):
+                return Text(text)
+            case ast.Name(name):
+                return scope.value(_ascii(name))
+            case ast.BinOp(left, op, right) if type(op) in SIGNS:
+                values = self._operand(left, scope), self._operand(right, scope)
+                return calculated(values[0], SIGNS[type(op)], values[1], self.record.power)
+            case ast.UnaryOp(ast.USub(), operand):
+                return opposite(self._operand(operand, scope))
+            case ast.UnaryOp(ast.UAdd(), operand):
+                return self._operand(operand, scope)
+            case ast.List(parts) | ast.Tuple(parts):
+                return self._listed(parts, scope)
+            case ast.Dict(keys, values) if all(isinstance(k, ast.Constant) for k in keys):
+                line = self.line(node)
+                fields = [self._right_side(one, scope, line) for one in values]
+                names = [str(k.value) for k in keys if isinstance(k, ast.Constant)]
+                return Structure(dict(zip(names, fields, strict=True)))
+            case ast.Lambda(arguments, body):
+                return self._function("lambda", arguments, body, scope, self.line(node))
+            case ast.Attribute(inner, name):
+                return self._attribute(self._object(inner, scope), name, scope)
+            case ast.Subscript(inner, index):
+                return self._subscript(inner, index, scope)
+            case ast.Call():
+                return self._call(node, scope)
+        raise UnreadError(f"{self._quote(node)} is not read")
+
+    def _quote(self, node: ast.expr) -> str:
+        return repr((ast.get_source_segment(self.text, node) or "")[:40])
+
+    def _number(self, node: ast.Constant) -> Scalar:
+        line = self.lines[node.lineno - 1].encode()
+        typed = line[node.col_offset : node.end_col_offset].decode()
+        if PLAIN_NUMBER.fullmatch(typed) is None:
+            raise UnreadError(f"the number {typed[:20]!r} is not read")
+        return number(f"{typed}0" if typed.endswith(".") else typed)
+
+    def _object(self, node: ast.expr, scope: Scope) -> Value:
+        """Return the value in front of a dot: a module by its usual name needs no import."""
+        if isinstance(node, ast.Name) and node.id in USUAL_MODULES and scope.owner(node.id) is None:
+            scope.value(node.id)
+            return Module("numpy" if node.id in ("np", "numpy") else node.id)
+        return self.value(node, scope)
+
+    def _operand(self, node: ast.expr, scope: Scope) -> Value:
+        """Return a value with which is calculated: a name of the robot's as a scalar, or as the vector that it is."""
+        value = self.value(node, scope)
+        if isinstance(value, Matrix):
+            return value
+        robot = self.record.robot
+        if isinstance(value, Given) and not robot.vocabulary.knows(value.name) and robot.is_vector(value.name):
+            return vector_of([scope.scalar(scope.entry(value, (k,))) for k in range(robot.n)])
+        return scope.scalar(value)
+
+    def _listed(self, nodes: Sequence[ast.expr], scope: Scope) -> Value:
+        # (*q.shape[:-1], 2, 2) is the shape of a batch of matrices.
+        batch = [one for one in nodes if _is_batch_shape(one)]
+        nodes = [one for one in nodes if one not in batch]
+        if batch and not nodes:
+            return Several(())
+        values = [self.value(one, scope) for one in nodes]
+        if all(isinstance(value, Matrix) and value.is_flat and value.is_list for value in values) and values:
+            return matrix_of([list(x.entries.values()) for x in values if isinstance(x, Matrix)], is_list=True)
+        if any(isinstance(value, Matrix | Function | Structure | Several | Text | Module) for value in values):
+            return Several(tuple(values), tuple(local_name(one) for one in nodes))
+        if all(isinstance(value, Part) for value in values) and values:
+            return Several(tuple(values))
+        return vector_of([scope.scalar(value) for value in values], is_list=True)
+
+    def _attribute(self, value: Value, name: str, scope: Scope) -> Value:
         match value:
-            case ast.Tuple(values) | ast.Dict(_, values):
-                is_only = False
+            case Module(module):
+                if name == "pi":
+                    return Scalar("pi")
+                if f"{module}.{name}" in MODULES or name in ("linalg", "physics", "mechanics", "matrices"):
+                    return Module(f"{module}.{name}")
+                return Library(f"numpy.{name}" if module in NUMPY else name)
+            case Matrix() if name == "T":
+                return transposed(value)
+        return scope.field(value, name)
+
+    def _subscript(self, inner: ast.expr, index: ast.expr, scope: Scope) -> Value:
+        value = self.value(inner, scope)
+        if isinstance(index, ast.Constant) and isinstance(index.value, str):
+            return scope.field(value, index.value)
+        if isinstance(index, ast.Tuple) and not index.elts:
+            return value
+        numbers = constant_index(index)
+        if numbers is None:
+            return self._slice(value, index, scope)
+        if isinstance(value, Several) and len(numbers) == 1 and numbers[0] < len(value.values):
+            return value.values[numbers[0]]
+        if isinstance(value, Matrix) and len(numbers) == 1 and not value.is_flat and 1 not in value.shape:
+            return vector_of(value.rows[numbers[0]], is_list=value.is_list) if numbers[0] < len(value.rows) else value
+        return scope.entry(value, numbers)
+
+    def _slice(self, value: Value, index: ast.expr, scope: Scope) -> Value:
+        """Return M[:3, 3] of a matrix, and x[:2] of a vector."""
+        match value, index:
+            case Given(name), ast.Slice(low, high, None) if not self.record.robot.vocabulary.knows(name):
+                ends = [0 if low is None else constant_index(low), constant_index(high) if high is not None else None]
+                first = ends[0] if isinstance(ends[0], int) else (ends[0] or (0,))[0]
+                last = ends[1][0] if isinstance(ends[1], tuple) else first + self.record.robot.n
+                return Part(name, tuple(range(first, min(last, MAX_INDEX))), is_slice=True)
+            case Matrix(), ast.Tuple([rows, columns]) if not value.is_flat:
+                m, n = value.shape
+                i, j = _chosen(rows, m), _chosen(columns, n)
+                chosen = [[value.entries[(a, b)] for b in j] for a in i]
+                if isinstance(rows, ast.Slice) and isinstance(columns, ast.Slice):
+                    return matrix_of(chosen, multiplies_entries=value.multiplies_entries)
+                entries = [x for row in chosen for x in row]
+                if value.multiplies_entries:
+                    return vector_of(entries, multiplies_entries=True)
+                return matrix_of(chosen)
+            case Matrix(), ast.Slice() if value.is_flat:
+                return vector_of([value.entries[(k,)] for k in _chosen(index, value.shape[0])])
+        raise UnreadError(f"{self._quote(index)} as an index is not read")
+
+    # Calls
+
+    def _call(self, node: ast.Call, scope: Scope) -> Value:
+        if any(isinstance(x, ast.Starred) for x in node.args) or any(k.arg is None for k in node.keywords):
+            raise UnreadError(f"{self._quote(node)} is not read")
+        derivative = self._time_derivative(node, scope)
+        if derivative is not None:
+            return derivative
+        if isinstance(node.func, ast.Call):
+            return self._of_time(node, scope)
+        if isinstance(node.func, ast.Attribute):
+            receiver = self._object(node.func.value, scope)
+            if not isinstance(receiver, Module | Structure):
+                return self._method(receiver, node.func.attr, node, scope)
+            function = self._attribute(receiver, node.func.attr, scope)
+        else:
+            function = self.value(node.func, scope)
+        match function:
+            case Function():
+                return self._own_call(function, node, scope)
+            case Structure(fields) if not node.args:
+                line = self.line(node)
+                given = {str(k.arg): self._right_side(k.value, scope, line) for k in node.keywords}
+                return Structure({**fields, **given})
+            case Library(name):
+                return self._used(self._library_call(name, node, scope), node, scope)
+            case Given(name) if isinstance(node.func, ast.Name):
+                if [ast.dump(x) for x in node.args] == ["Name(id='t', ctx=Load())"] and name not in SCALAR:
+                    return function
+                if scope.owner(name) is None:
+                    return self._used(self._library_call(name, node, scope), node, scope)
+        raise UnreadError(f"{self._quote(node.func)}(...) is not read")
+
+    def _used(self, value: Value, node: ast.Call, scope: Scope) -> Value:
+        """Return a value that knows of which name its function was called."""
+        root = node.func
+        while isinstance(root, ast.Attribute):
+            root = root.value
+        if not isinstance(root, ast.Name):
+            return value
+        key = scope.key_of(_ascii(root.id))
+        if isinstance(value, Scalar):
+            return replace(value, uses=value.uses | {key})
+        if isinstance(value, Matrix):
+            return replace(value, entries={k: replace(x, uses=x.uses | {key}) for k, x in value.entries.items()})
+        return value
+
+    def _library_call(self, name: str, node: ast.Call, scope: Scope) -> Value:
+        of_numpy = name.startswith("numpy.") or (bool(self.star_modules) and self.star_modules[-1] in NUMPY)
+        name = name.removeprefix("numpy.")
+        keywords = {k.arg: k.value for k in node.keywords}
+        if name in SYMBOLS:
+            return self._symbols(name, node)
+        if name in ("dict", "SimpleNamespace"):
+            line = self.line(node)
+            return Structure({str(k): self._right_side(x, scope, line) for k, x in keywords.items()})
+        dtype = keywords.pop("dtype", None)
+        if dtype is not None and not (
+            isinstance(dtype, ast.Name | ast.Attribute) and _last(dtype) in ("object", "float", "float64")
+        ):
+            raise UnreadError(f"{self._quote(node)} is not read")
+        if name in (*MATRICES, *ARRAYS):
+            if keywords:
+                raise UnreadError(f"{self._quote(node)} is not read")
+            arguments = [self.value(x, scope) for x in node.args]
+            return self._matrix(name, arguments, scope)
+        if name == "broadcast_arrays" and not keywords:
+            return Several(tuple(self.value(x, scope) for x in node.args))
+        if set(keywords) & {"out", "inplace"}:
+            raise UnreadError(f"{self._quote(node)} is not read")
+        arguments = [self._operand_or_list(x, scope) for x in node.args]
+        return called(scope, name, arguments, of_numpy)
+
+    def _operand_or_list(self, node: ast.expr, scope: Scope) -> Value:
+        value = self.value(node, scope)
+        if isinstance(value, Given) and not self.record.robot.vocabulary.knows(value.name):
+            return value
+        return scope.scalar(value) if isinstance(value, Given | Part) else value
+
+    def _matrix(self, name: str, arguments: Sequence[Value], scope: Scope) -> Value:
+        of_numpy = name in ARRAYS
+        match arguments:
+            case [Scalar() as m, Scalar() as n, Matrix() as entries] if m.text.isdecimal() and n.text.isdecimal():
+                row_count, columns = int(m.text[:6]), int(n.text[:6])
+                flat_entries = [x for row in entries.rows for x in row]
+                if row_count * columns != len(flat_entries):
+                    raise UnreadError("a matrix whose entries do not fit its size is not read")
+                return matrix_of([flat_entries[k * columns : (k + 1) * columns] for k in range(row_count)])
+            case [Matrix() as entries]:
+                return as_matrix(entries, of_numpy)
+            case [Several(values)] if values and all(isinstance(x, Matrix) for x in values):
+                rows = [
+                    row
+                    for x in values
+                    if isinstance(x, Matrix)
+                    for row in ([list(x.entries.values())] if x.is_flat else x.rows)
+                ]
+                return matrix_of(rows, multiplies_entries=of_numpy)
+            case [Given() as vector] if of_numpy:
+                return vector
+        if name == "vertcat" and arguments:
+            return matrix_of([[scope.scalar(x)] for x in arguments])
+        raise UnreadError("a matrix of something else than rows of numbers is not read")
+
+    def _own_call(self, function: Function, node: ast.Call, scope: Scope) -> Value:
+        """Return the value of a call of one of the program's functions."""
+        if function.changes:
+            raise UnreadError(f"{function.name}(...) is a function that may change other names, and is not read")
+        values: dict[str, Value] = dict(function.defaults)
+        if len(node.args) > len(function.parameters):
+            raise UnreadError(f"{function.name}(...) is called with too many arguments")
+        for name, argument in zip(function.parameters, node.args, strict=False):
+            values[name] = self.value(argument, scope)
+        for keyword in node.keywords:
+            values[_ascii(str(keyword.arg))] = self.value(keyword.value, scope)
+        missing = [name for name in function.parameters if name not in values]
+        if missing:
+            raise UnreadError(f"{function.name}(...) is called without {missing[0]}")
+        return self._used(self.apply(function, values), node, scope)
+
+    def _method(self, value: Value, method: str, node: ast.Call, scope: Scope) -> Value:
+        arguments = node.args
+        match value, method:
+            case Matrix(), "transpose" if not arguments:
+                return transposed(value)
+            case Matrix(), "dot" if len(arguments) == 1:
+                return calculated(value, "@", self._operand(arguments[0], scope), self.record.power)
+            case _, "flatten" | "ravel" | "squeeze" if not arguments:
+                return flat(value)
+            case Library("Matrix") | Given("Matrix"), "zeros" | "eye":
+                return called(scope, method, [self.value(x, scope) for x in arguments], False)
+            case _, "applyfunc" if len(arguments) == 1 and _last(arguments[0]) in UNCHANGED_METHODS:
+                return unchanged(value)
+            case _, name if name in UNCHANGED_METHODS and name != "applyfunc":
+                plain = all(_last(x) in UNCHANGED_METHODS for x in arguments)
+                if plain and not any(k.arg == "inplace" for k in node.keywords):
+                    return unchanged(value)
+        raise UnreadError(f"{self._quote(node)} is not read")
+
+    # Symbols and time
+
+    def _symbols(self, function: str, node: ast.Call) -> Value:
+        """Return the names of symbols('q1 q2'), Symbol('m1') and dynamicsymbols('q1', 1)."""
+        match node.args:
+            case [ast.Constant(str(text)), *rest]:
+                names = _symbol_names(text)
             case _:
-                values, is_only = [value], True
-        locals_ = [self.values.local_name(x, self.scope) for x in values]
-        if all(locals_):
-            self.scope.return_values += [ReturnValue(name, local, is_only) for local in locals_]
-            return
-        self.program.bind(self.scope, RETURNED_FORMULA, self._line(statement), self.formulas.formula(value))
-        names = dict.fromkeys(ascii_name(x) for x in names_in(value))
-        self.scope.return_values.append(ReturnValue(name, RETURNED_FORMULA, names=tuple(names)))
+                raise UnreadError(f"{self._quote(node)} is not read")
+        match rest:
+            case []:
+                pass
+            case [ast.Constant(int(order))] if function == "dynamicsymbols" and order in (0, 1, 2):
+                marks = ("", "dot", "ddot")[order]
+                names = [rate_name(plain_name(name), marks) for name in names] if order else names
+            case _:
+                raise UnreadError(f"{self._quote(node)} is not read")
+        symbols = tuple(Given(name, is_symbol=True) for name in names)
+        if len(symbols) == 1:
+            return symbols[0]
+        return Several(symbols, tuple(names))
+
+    def _of_time(self, node: ast.Call, scope: Scope) -> Value:
+        """Return Function('q1')(t), and symbols('q1', cls=Function)(t)."""
+        inner = node.func
+        assert isinstance(inner, ast.Call)  # noqa: S101
+        is_time = [ast.dump(x) for x in node.args] == ["Name(id='t', ctx=Load())"]
+        if is_time and _last(inner.func) == "Function" and inner.args and isinstance(inner.args[0], ast.Constant):
+            names = _symbol_names(str(inner.args[0].value))
+            if len(names) == 1:
+                self._used(Scalar("0"), inner, scope)
+                return Given(names[0], is_symbol=True)
+        raise UnreadError(f"{self._quote(node)} is not read")
+
+    def _time_derivative(self, node: ast.Call, scope: Scope) -> Value | None:
+        """Return the rate that diff(q1, t), q1.diff(t, 2) and Derivative(q1(t), t) are; None of another call."""
+        arguments = list(node.args)
+        match node.func:
+            case ast.Name("diff" | "Derivative"):
+                pass
+            case ast.Attribute(ast.Name(module), "diff" | "Derivative") if isinstance(
+                self._value_or_none(ast.Name(module, ast.Load()), scope), Module
+            ):
+                pass
+            case ast.Attribute(inner, "diff"):
+                arguments.insert(0, inner)
+            case _:
+                return None
+        order = 0
+        match arguments[1:]:
+            case [time] if _is_time(time):
+                order = 1
+            case [time, ast.Constant(2)] | [ast.Tuple([time, ast.Constant(2)])] if _is_time(time):
+                order = 2
+            case [time, other] if _is_time(time) and _is_time(other):
+                order = 2
+        if not order:
+            raise UnreadError(f"{self._quote(node)} is not read")
+        value = self.value(arguments[0], scope)
+        name = (
+            value.name
+            if isinstance(value, Given)
+            else value.text
+            if isinstance(value, Scalar) and value.is_name
+            else ""
+        )
+        if not name:
+            raise UnreadError(f"{self._quote(node)} is not read")
+        vocabulary = self.record.robot.vocabulary
+        plain = plain_name(name)
+        for base in (plain, plain.replace("dot", "")):
+            known = rate_name(base, ("dot", "ddot")[order - 1 if base == plain else min(order, 1)])
+            if vocabulary.is_position(base) and vocabulary.is_state(known):
+                return self._used(scope.known(known), node, scope)
+        raise UnreadError(f"{self._quote(node)}: {name} is the program's own name, of which no rate is read")
+
+    def _value_or_none(self, node: ast.expr, scope: Scope) -> Value | None:
+        try:
+            return self.value(node, scope)
+        except UnreadError:
+            return None
 
 
-def _nodes(statements: Sequence[ast.stmt]) -> Iterator[ast.AST]:
-    return (node for statement in statements for node in ast.walk(statement))
+UNCHANGED_METHODS = word_set(
+    """
+    simplify expand trigsimp factor cancel together powsimp expand_trig radsimp collect doit applyfunc copy
+    as_immutable as_mutable
+    """
+)
+"""Methods that write an expression in another way, or copy it."""
 
 
-def _returns(statements: Sequence[ast.stmt]) -> list[ast.Return | ast.Yield | ast.YieldFrom]:
-    return [node for node in _nodes(statements) if isinstance(node, ast.Return | ast.Yield | ast.YieldFrom)]
+def constant_index(node: ast.expr) -> Index | None:
+    """Return the numbers of an index; ``[..., 0, 1]`` counts behind leading axes. None of any other index."""
+    parts = node.elts if isinstance(node, ast.Tuple) else [node]
+    if parts and isinstance(parts[0], ast.Constant) and parts[0].value is Ellipsis:
+        parts = parts[1:]
+    numbers = [part.value if isinstance(part, ast.Constant) else None for part in parts]
+    index = tuple(k for k in numbers if type(k) is int and 0 <= k <= MAX_INDEX)
+    return index if index and len(index) == len(parts) else None
 
 
-def _global_names(statements: Sequence[ast.stmt]) -> list[str]:
-    return [name for node in _nodes(statements) if isinstance(node, ast.Global | ast.Nonlocal) for name in node.names]
+def _is_written_out(node: ast.expr) -> bool:
+    """Whether an expression is a matrix in brackets, perhaps with a factor, or simplified."""
+    match node:
+        case ast.List() | ast.Tuple():
+            return True
+        case ast.BinOp(left, ast.Mult() | ast.Div(), right):
+            return _is_written_out(left) or _is_written_out(right)
+        case ast.Call(function, arguments):
+            if _last(function) in (*MATRICES, *ARRAYS):
+                return True
+            inner = [*arguments, *([function.value] if isinstance(function, ast.Attribute) else [])]
+            return any(_is_written_out(x) for x in inner)
+    return False
+
+
+def local_name(node: ast.expr) -> str:
+    """Return the name that an expression is, as it is or as an array; empty of another expression."""
+    while True:
+        match node:
+            case ast.Name(name):
+                return _ascii(name)
+            case ast.Subscript(inner, ast.Tuple([])):
+                node = inner
+            case ast.Call(ast.Name(), [inner], []) | ast.Call(ast.Attribute(ast.Name()), [inner], []):
+                node = inner
+            case ast.Call(ast.Attribute(inner), [], []):
+                node = inner
+            case _:
+                return ""
+
+
+def _chosen(index: ast.expr, length: int) -> range:
+    """Return the places that a slice or a number chooses."""
+    if isinstance(index, ast.Slice) and index.step is None:
+        ends = []
+        for end, default in ((index.lower, 0), (index.upper, length)):
+            found = (default,) if end is None else constant_index(end)
+            if found is None or len(found) != 1:
+                raise UnreadError("a slice of other numbers than whole ones is not read")
+            ends.append(found[0])
+        return range(min(ends[0], length), min(ends[1], length))
+    found = constant_index(index)
+    if found is None or len(found) != 1 or found[0] >= length:
+        raise UnreadError("an index that the matrix does not have is read")
+    return range(found[0], found[0] + 1)
+
+
+def _symbol_names(text: str) -> list[str]:
+    names: list[str] = []
+    for piece in re.split(r"[\s,]+", text.strip().strip(",")):
+        span = re.fullmatch(r"(\w*?)\(?(\d*):(\d+)\)?", piece)
+        if span and int(span[3][:6]) <= MAX_SYMBOLS:
+            names += [f"{span[1]}{k}" for k in range(int(span[2] or 0), int(span[3]))]
+        else:
+            names.append(piece)
+    if not names or not all(re.fullmatch(r"[\w\\{}]+", name) for name in names):
+        raise UnreadError(f"symbols of {text[:40]!r} are not read")
+    return names
+
+
+def _is_main(test: ast.expr) -> bool:
+    """Whether a condition is ``__name__ == "__main__"``."""
+    match test:
+        case ast.Compare(ast.Name("__name__"), [ast.Eq()], [ast.Constant("__main__")]):
+            return True
+    return False
+
+
+def _is_batch_shape(node: ast.expr) -> bool:
+    """Whether an entry of a tuple is ``*q.shape[:-1]``."""
+    match node:
+        case ast.Starred(
+            ast.Subscript(ast.Attribute(_, "shape"), ast.Slice(None, ast.UnaryOp(ast.USub(), ast.Constant(1))))
+        ):
+            return True
+    return False
+
+
+def _is_ellipsis(indices: Sequence[ast.expr]) -> bool:
+    """Whether an index is ``...`` alone."""
+    match indices:
+        case [ast.Constant(value)]:
+            return value is Ellipsis
+    return False
+
+
+def _is_time(node: ast.expr) -> bool:
+    match node:
+        case ast.Name("t") | ast.Attribute(ast.Name(), "_t"):
+            return True
+    return False
+
+
+def _returns_inside(body: Sequence[ast.stmt]) -> bool:
+    """Whether a function returns anywhere but at its end."""
+    inner = [
+        x for statement in body for x in ast.walk(statement) if isinstance(x, ast.Return | ast.Yield | ast.YieldFrom)
+    ]
+    return len(inner) > (1 if isinstance(body[-1], ast.Return) else 0)
+
+
+def _last(node: ast.expr) -> str:
+    """Return the name, or the last attribute, that an expression is; empty of another expression."""
+    match node:
+        case ast.Name(name) | ast.Attribute(_, name):
+            return str(name)
+    return ""
+
+
+def _ascii(name: str) -> str:
+    """Return an identifier in ASCII: Greek letters by their names, as the reader of formulas has them."""
+    if name.isascii():
+        return name
+    try:
+        plain, _ = to_ascii(name)
+    except AnswerError:
+        plain = ""
+    return plain if plain.isidentifier() and plain.isascii() else "u" + name.encode("unicode_escape").hex()
