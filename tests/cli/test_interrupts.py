@@ -9,11 +9,13 @@ import subprocess
 import sys
 import time
 
+import psutil
 import pytest
 
 from acceptance import ACCEPTING
 from dhkit.cli import _reliable_interrupts
 from dhkit.planning.solver import delayed_interrupts
+from dhkit.programs import find_isolation
 from waiting import HANGS, wait_for
 
 PLANNING = """
@@ -68,8 +70,9 @@ def test_a_command_ends_in_one_line(command, seconds):
 
 
 WAITS = """
+import subprocess
 def fk(q):
-    open("called", "w").close()
+    subprocess.Popen(["sleep", "MARK"])
     while True:
         pass
 """
@@ -79,18 +82,24 @@ def fk(q):
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP", "SIGKILL"])
 @pytest.mark.slow
 def test_a_check_that_is_ended_leaves_nothing(name, tmp_path):
-    (tmp_path / "student.py").write_text(WAITS)
+    mark = f"{10**6 + os.getpid()}"
+
+    def sleeping():
+        return [one for one in psutil.process_iter(["cmdline"]) if (one.info["cmdline"] or [])[-1:] == [mark]]
+
+    (tmp_path / "student.py").write_text(WAITS.replace("MARK", mark))
     command = [sys.executable, "-m", "dhkit", "check", "planar2r", str(tmp_path / "student.py"), "--seconds", "3600"]
     process = subprocess.Popen(
         command, env=os.environ | {"TMPDIR": str(tmp_path)}, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
-    wait_for(lambda: list(tmp_path.glob("dhkit-program-*/called")), "the call of the program")
+    wait_for(sleeping, "the call of the program")
     process.send_signal(getattr(signal, name))
     _, err = process.communicate(timeout=HANGS)
     if name != "SIGKILL":
         assert (process.returncode, err) == (130, "dhkit: interrupted\n")
         assert not list(tmp_path.glob("dhkit-program-*"))
-    wait_for(lambda: not list(tmp_path.glob("dhkit-program-*")), "the end of the folder")
+    wait_for(lambda: not sleeping(), "the end of the program and of what it has started")
+    assert not list(tmp_path.glob("dhkit-program-*")) or not find_isolation()
 
 
 @pytest.mark.parametrize("seconds", [0.0, 0.01, 0.05, 0.3, 0.6, 0.9] if ACCEPTING else [0.0, 0.05, 0.3])

@@ -10,6 +10,7 @@ import typer
 
 from dhkit.cli.endings import end_in_order_on_signals
 from dhkit.cli.exit_status import ExitStatus
+from dhkit.cli.isolating import Isolated, isolation_for
 from dhkit.cli.options import Robot, load_arm
 from dhkit.cli.output import PAGES, check_outputs, say
 from dhkit.errors import DescriptionError
@@ -46,7 +47,7 @@ def lab(
         str | None, typer.Option(help="Your program in place of a file; ARGUMENTS follow the robot.")
     ] = None,
     arguments: Annotated[list[str] | None, typer.Argument(help="Arguments of the program of --run.")] = None,
-    sandbox: Annotated[str | None, typer.Option(help="bwrap: run your program in bubblewrap.")] = None,
+    isolated: Isolated = False,
     solid: Annotated[Path | None, typer.Option(help="STL file for the panel of transforms.")] = None,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Print the address, and open no browser.")] = False,
 ) -> ExitStatus:
@@ -59,15 +60,17 @@ def lab(
     assignment = Assignment.read(robot) if is_assignment(robot) else None
     arm = load_arm(robot) if assignment is None else assignment.arm
     what = f"the lab of {arm.name}" if assignment is None else f"{assignment.title}: the lab"
+    found = None
     if own is not None:
         protect_from_children()
+        found = isolation_for(Path(str(mine or run)).name, isolated)
     with serve(
         arm,
         block=False,
         port=port,
         open_browser=False,
         own=own,
-        sandbox=sandbox,
+        isolation=found,
         solid=solid,
         assignment=assignment,
     ) as served:

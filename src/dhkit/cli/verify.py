@@ -13,6 +13,7 @@ import typer
 from dhkit.cli.endings import end_in_order_on_signals
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.extract import chain_of
+from dhkit.cli.isolating import Isolated, isolation_for
 from dhkit.cli.options import Json, Robot, Seed, Uniform, load_arm, read_arm
 from dhkit.cli.output import finite, print_json, say
 from dhkit.description import write_atomically
@@ -83,9 +84,7 @@ def check(
     seconds: Annotated[
         float, typer.Option(min=0.01, max=3600, help="Processor time of a call, s; four times as long on the clock.")
     ] = 5.0,
-    sandbox: Annotated[
-        str | None, typer.Option(help="bwrap: run the program in bubblewrap, for strangers' files.")
-    ] = None,
+    isolated: Isolated = False,
     json: Json = False,
 ) -> ExitStatus:
     """Score a program's forward and inverse kinematics and its controller, and say where it fails first.
@@ -98,7 +97,8 @@ def check(
     protect_from_children()
     end_in_order_on_signals()
     points = None if rubric is None else CheckRubric.read(rubric)
-    with Program(source, Limits(seconds=seconds), sandbox) as loaded:
+    place = isolation_for(Path(program[0]).name, isolated, [] if rubric is None else [rubric])
+    with Program(source, Limits(seconds=seconds), place) as loaded:
         try:
             report = score(arm, loaded, points, seed, samples)
         except ProgramError as error:

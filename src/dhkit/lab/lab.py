@@ -28,7 +28,7 @@ from dhkit.lab.task_panel import TaskPanel
 from dhkit.lab.tool_panel import ToolPanel
 from dhkit.lab.transforms_panel import Solid, TransformsPanel
 from dhkit.lab.workspace_panel import WorkspacePanel
-from dhkit.programs import random_states
+from dhkit.programs import Isolation, random_states
 from dhkit.viewer import View
 
 
@@ -45,8 +45,8 @@ class Lab:
     own
         A program with ``fk``, ``ik`` or ``controller`` that is compared with the arm: a ``.py`` or ``.m`` file, or a
         command; see :class:`dhkit.programs.Program`.
-    sandbox
-        The sandbox of that program: ``"bwrap"``, or None.
+    isolation
+        What that program can see and reach; None for the best that works here.
     solid
         An ``.stl`` file with the solid of the panel of transforms; by default a box.
     assignment
@@ -74,7 +74,7 @@ class Lab:
         port: int = 0,
         token: str | None = None,
         own: str | Path | Sequence[str] | None = None,
-        sandbox: str | None = None,
+        isolation: Isolation | None = None,
         solid: str | Path | None = None,
         assignment: Assignment | None = None,
     ) -> None:
@@ -91,7 +91,7 @@ class Lab:
         self._tool = ToolPanel(desk)
         table = TablePanel(desk)
         self._motions = MotionPanel(desk, Jobs(lambda state: self.view.panel("job", state), self._lock))
-        self._own = OwnPanel(desk, own, sandbox, self._lock)
+        self._own = OwnPanel(desk, own, isolation, self._lock)
         self._control = ControlPanel(desk, self._motions, self._own)
         self._panels: tuple[Panel, ...] = (
             JointPanel(desk),

@@ -17,7 +17,7 @@ from dhkit.errors import DhkitError
 from dhkit.lab.desk import Desk
 from dhkit.lab.jobs import Job, Jobs
 from dhkit.lab.requests import Fields, JsonObject, Panel, answers
-from dhkit.programs import Limits, Program, ProgramError, check
+from dhkit.programs import Isolation, Limits, Program, ProgramError, check
 
 log = logging.getLogger(__name__)
 
@@ -44,8 +44,8 @@ class OwnPanel(Panel):
         The arm and its state.
     source
         The program, as :class:`dhkit.programs.Program` takes it; None if there is none.
-    sandbox
-        The sandbox of the program: ``"bwrap"``, or None.
+    isolation
+        What the program can see and reach; None for the best that works here.
     lock
         Held while a score is taken.
     """
@@ -54,11 +54,11 @@ class OwnPanel(Panel):
         self,
         desk: Desk,
         source: str | Path | Sequence[str] | None,
-        sandbox: str | None = None,
+        isolation: Isolation | None = None,
         lock: AbstractContextManager[object] | None = None,
     ) -> None:
         super().__init__(desk)
-        self.source, self._sandbox = source, sandbox
+        self.source, self._isolation = source, isolation
         self.on_change: list[Callable[[], None]] = []
         """Called when the program has been loaded, with the functions that it defines now."""
         self.on_score: list[Callable[[Arm, Mapping[str, object]], None]] = []
@@ -115,7 +115,7 @@ class OwnPanel(Panel):
             raise ValueError("control: there is no controller of your own; expected --mine FILE with one")
         if self._controller_program is not None:
             self._controller_program.close()
-        program = self._controller_program = Program(self.source, CALL_LIMITS, self._sandbox)
+        program = self._controller_program = Program(self.source, CALL_LIMITS, self._isolation)
         program.start()
         return program.controller
 
@@ -163,7 +163,7 @@ class OwnPanel(Panel):
         assert self.source is not None  # noqa: S101 - for mypy: the thread runs only with a program
         if self._program is not None:
             self._program.close()
-        program = self._program = Program(self.source, CALL_LIMITS, self._sandbox)
+        program = self._program = Program(self.source, CALL_LIMITS, self._isolation)
         self._compared, self._functions = None, ()
         self._state = {"file": program.name, "functions": [], "loading": True, "report": None}
         self.publish()
@@ -233,7 +233,7 @@ class OwnPanel(Panel):
         arm = self.desk.arm
         if self._scored_program is not None:
             self._scored_program.close()
-        program = self._scored_program = Program(source, Limits(), self._sandbox)
+        program = self._scored_program = Program(source, Limits(), self._isolation)
 
         def work(job: Job) -> Mapping[str, object]:
             try:

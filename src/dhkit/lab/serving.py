@@ -13,6 +13,7 @@ from dhkit.description import Robot, write_atomically
 from dhkit.errors import ModelError
 from dhkit.lab.assignment import Assignment
 from dhkit.lab.lab import Lab
+from dhkit.programs import Isolation
 from dhkit.viewer.opening import open_in_browser
 
 TOKEN_LENGTH = 22
@@ -28,7 +29,7 @@ def serve(
     port: int | None = None,
     open_browser: bool = True,
     own: str | Path | Sequence[str] | None = None,
-    sandbox: str | None = None,
+    isolation: Isolation | None = None,
     solid: str | Path | None = None,
     assignment: Assignment | str | Path | None = None,
 ) -> Lab:
@@ -45,8 +46,8 @@ def serve(
         for this port, in a file that this user alone can read. By default any free port, and a new token.
     open_browser
         Whether the page is opened in the default browser.
-    own, sandbox
-        A program that is compared with the arm, and its sandbox: see :class:`Lab`.
+    own, isolation
+        A program that is compared with the arm, and its isolation: see :class:`Lab`.
     solid
         An ``.stl`` file for the panel of transforms; by default a box.
     assignment
@@ -78,7 +79,7 @@ def serve(
         raise ValueError(f"port is {port}; expected 1024 to 65535")
     if isinstance(assignment, (str, Path)):
         assignment = Assignment.read(assignment)
-    lab = Lab(arm, port or 0, None if port is None else kept_token(port), own, sandbox, solid, assignment)
+    lab = Lab(arm, port or 0, None if port is None else kept_token(port), own, isolation, solid, assignment)
     try:
         if open_browser:
             open_in_browser(lab.url)

@@ -1,6 +1,7 @@
 """Programs of other people, run in processes of their own and compared with an arm."""
 
 from dhkit.programs.checks import check
+from dhkit.programs.isolation import Isolation, IsolationError, find_isolation
 from dhkit.programs.process import Limits, ProgramError
 from dhkit.programs.program import FUNCTIONS, Program, protect_from_children
 from dhkit.programs.random_poses import random_states
@@ -11,11 +12,14 @@ __all__ = [
     "FUNCTIONS",
     "CheckReport",
     "CheckRubric",
+    "Isolation",
+    "IsolationError",
     "Limits",
     "Part",
     "Program",
     "ProgramError",
     "check",
+    "find_isolation",
     "protect_from_children",
     "random_states",
 ]

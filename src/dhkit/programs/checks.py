@@ -77,8 +77,8 @@ def check(
         score = {"fk": score_forward, "ik": score_inverse, "controller": score_controller}[name]
         functions[name] = tuple(score(arm, Caller(program, name), rubric, rng, samples))
     notes = [f"{program.name} imports {module}" for module in program.imported]
-    if program.sees_dhkit and not program.imported:
-        notes.append(f"no Landlock (Linux 5.13) on this system: {program.name} may use dhkit in ways that are not seen")
+    if not program.isolation:
+        notes.append(f"{program.name} was {program.isolation}: it may have used dhkit in ways that are not seen")
     other = {"fk": "ik", "ik": "fk"}
     absent = [other[name] for name in scored if name in other and other[name] not in program.functions]
     if absent and rubric.named == ():

@@ -6,14 +6,14 @@ import json
 import os
 import queue
 import select
-import shutil
 import signal
+import stat
 import subprocess
 import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
@@ -23,9 +23,8 @@ import psutil
 
 from dhkit.errors import DhkitError
 from dhkit.grading.isolation import WAITING_FACTOR
-from dhkit.programs.confinement import Confinement
-from dhkit.programs.files_written import WrittenFiles
-from dhkit.programs.orphans import begin_adoption, end_adoption, end_orphans
+from dhkit.programs.isolation import Isolation, Kind, end_processes_of, remove_files_of
+from dhkit.programs.launcher import MAX_PROCESSES
 
 HERE = Path(__file__).parent
 MAX_LINE_BYTES = 1 << 22
@@ -34,9 +33,8 @@ MAX_UNREAD_ANSWERS = 1_000
 """Most answers that wait to be read."""
 MAX_OUTPUT_BYTES = 1 << 16
 """Bytes that are kept of a program's printed output: the last ones."""
-MAX_PROCESSES = 64
 MAX_WRITTEN_BYTES = 128 << 20
-"""Largest size of all files together that a program may write, bytes."""
+"""Largest size together of a program's files in its folder and of those without a name, bytes."""
 EXIT_DELAY = 0.3
 """Longest time from the end of a program's answers to its own end, s."""
 WATCH_PERIOD = 0.05
@@ -44,7 +42,9 @@ WATCH_PERIOD = 0.05
 LAST_WORDS_TIME = 1.0
 """Longest time for the printed output of a program that has ended, s: children may hold it open."""
 MAX_END_TIME = 5.0
-"""Longest time that the supervisor may take to end the processes that a program started, s."""
+"""Longest time that processes may take to end when they are killed, s."""
+BLOCK_BYTES = 512
+"""Unit of ``st_blocks``."""
 
 
 class Failure(StrEnum):
@@ -142,31 +142,31 @@ class Process:
     Parameters
     ----------
     command
-        Called with the program's folder; returns what is executed.
+        Called with the program's folder on this system, into which it copies the program's files; returns what is
+        executed, with paths as the program sees them.
     limits
         Limits of the program.
-    sandbox
-        ``"bwrap"``, or None.
-    confinement
-        Rights that the program does not have.
+    isolation
+        What the program can see and reach.
+    shown
+        Further files that the program may read, at their own paths.
     """
 
     def __init__(
-        self, command: Callable[[Path], list[str]], limits: Limits, sandbox: str | None, confinement: Confinement
+        self, command: Callable[[Path], list[str]], limits: Limits, isolation: Isolation, shown: Iterable[Path] = ()
     ) -> None:
         self.failure: Failure | None = None
         self._limits = limits
+        self._user = isolation.user()
+        self._has_own_root = isolation.kind is Kind.BUBBLEWRAP
         self._folder = tempfile.TemporaryDirectory(prefix="dhkit-program-", ignore_cleanup_errors=True)
-        begin_adoption()
         try:
-            self._start(command, sandbox, confinement)
+            self._start(command, isolation, shown)
         except BaseException:
-            end_adoption()
             self._folder.cleanup()
             raise
         self.processor_time = 0.0
         """Processor time of all processes of the program, when the watch last looked, s."""
-        self._files = WrittenFiles(Path(self._folder.name))
         self._descendants: dict[int, psutil.Process] = {}
         self._processor_times: dict[int, float] = {}
         self._lines: queue.Queue[bytes | None] = queue.Queue(MAX_UNREAD_ANSWERS)
@@ -243,33 +243,31 @@ class Process:
             return
         self.failure = self.failure or Failure.ENDED
         self._closed.set()
-        self._find_descendants()
-        with suppress(OSError):
-            self._process.send_signal(signal.SIGTERM)  # the supervisor ends the program's processes and itself
-        try:
+        self._kill()
+        with suppress(subprocess.TimeoutExpired):
             self._process.wait(MAX_END_TIME)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        self._kill_descendants()
-        end_adoption()
         os.close(self._requests)
         for thread in self._threads:
             if thread is not threading.current_thread():
                 thread.join(MAX_END_TIME)
+        if self._user:
+            remove_files_of(self._user)
         self._folder.cleanup()
 
-    def _start(self, command: Callable[[Path], list[str]], sandbox: str | None, confinement: Confinement) -> None:
+    def _start(self, command: Callable[[Path], list[str]], isolation: Isolation, shown: Iterable[Path]) -> None:
         folder = Path(self._folder.name).resolve()
-        program = _sandboxed(confinement.command(command(folder)), folder, sandbox)
+        program = isolation.command(command(folder), folder, shown)
+        if self._user:
+            for path in (folder, *folder.rglob("*")):
+                os.chown(path, self._user, self._user, follow_symlinks=False)
         requests, self._requests = os.pipe()
         os.set_blocking(self._requests, False)
         self._answers, answers = os.pipe()
         try:
             self._process = subprocess.Popen(  # noqa: S603 - this module is made to run programs of others
                 [
-                    *(sys.executable, "-I", "-S", str(HERE / "supervisor.py")),
-                    *map(str, (requests, answers, 4 * self._limits.memory, folder)),
+                    *(sys.executable, "-I", "-S", str(HERE / "launcher.py")),
+                    *map(str, (requests, answers, 4 * self._limits.memory, self._user)),
                     *program,
                 ],
                 stdin=subprocess.DEVNULL,
@@ -277,7 +275,7 @@ class Process:
                 stderr=subprocess.STDOUT,
                 pass_fds=(requests, answers),
                 cwd=folder,
-                env=_environment(folder),
+                env=_environment(isolation.folder(folder)),
                 start_new_session=True,
             )
         finally:
@@ -305,9 +303,10 @@ class Process:
         """Return the status or the signal that the program ended with, as text; empty if it still runs."""
         with suppress(subprocess.TimeoutExpired):
             status = self._process.wait(EXIT_DELAY)
-            if status > 128:
+            number = -status if status < 0 else status - 128  # bubblewrap tells a signal as a shell does
+            if number > 0:
                 with suppress(ValueError):
-                    return f" by {signal.Signals(status - 128).name}"
+                    return f" by {signal.Signals(number).name}"
             return f" with status {status}"
         return ""
 
@@ -315,6 +314,8 @@ class Process:
         """Queue the lines of answers; a line that is too long, or too many of them, ends the process."""
         with os.fdopen(self._answers, "rb") as file:
             while line := file.readline(MAX_LINE_BYTES):
+                if self._has_own_root:
+                    self._folder.cleanup()  # what is mounted from it stays; nothing is left even if dhkit is killed
                 try:
                     self._lines.put_nowait(line if line.endswith(b"\n") else b"")
                 except queue.Full:
@@ -351,34 +352,59 @@ class Process:
                 except psutil.Error:
                     self._descendants.pop(process.pid, None)
             self.processor_time = sum(self._processor_times.values())
-            if (self._process.poll() or 0) < 0:  # the supervisor was killed
-                self.failure = self.failure or Failure.ENDED
-                self._kill_descendants()
-            elif memory > self._limits.memory:
+            if memory > self._limits.memory:
                 self._terminate(Failure.MEMORY)
             elif len(self._descendants) > MAX_PROCESSES:
                 self._terminate(Failure.PROCESSES)
-            elif self._files.size(list(self._descendants), MAX_WRITTEN_BYTES) > MAX_WRITTEN_BYTES:
+            elif _written_bytes(Path(self._folder.name), list(self._descendants)) > MAX_WRITTEN_BYTES:
                 self._terminate(Failure.FILES)
 
     def _find_descendants(self) -> None:
-        """Note the processes that the program has started."""
+        """Note the processes that the program has started; the first is the program itself, or bubblewrap."""
         with suppress(psutil.Error):
-            for process in psutil.Process(self._process.pid).children(recursive=True):
+            own = psutil.Process(self._process.pid)
+            for process in (own, *own.children(recursive=True)):
                 self._descendants.setdefault(process.pid, process)
-
-    def _kill_descendants(self) -> None:
-        """Kill the processes that were seen, and all others if the supervisor was killed and has not ended them."""
-        for process in list(self._descendants.values()):
-            with suppress(psutil.Error):
-                process.kill()
-        if (self._process.poll() or 0) < 0:
-            end_orphans()
 
     def _terminate(self, failure: Failure) -> None:
         self.failure = self.failure or failure
+        self._kill()
+
+    def _kill(self) -> None:
+        """Kill the program and all that it started.
+
+        With bubblewrap all end with the first. Those of another user are found by it. Otherwise a process that has left
+        its family before anybody saw it lives on.
+        """
+        self._find_descendants()
         with suppress(OSError):
-            self._process.send_signal(signal.SIGTERM)
+            os.killpg(self._process.pid, signal.SIGKILL)
+        for process in list(self._descendants.values()):
+            with suppress(psutil.Error):
+                process.kill()
+        if self._user:
+            end_processes_of(self._user)
+
+
+def _written_bytes(folder: Path, processes: Sequence[int]) -> int:
+    """Return the size of a program's files on disk and in memory, bytes.
+
+    Those without a name, which were deleted while open or are in memory (Linux: ``memfd_create``), are found in /proc.
+    """
+    total = 0
+    for place, folders, names in os.walk(folder):
+        for name in (*folders, *names):
+            with suppress(OSError):
+                total += BLOCK_BYTES * os.lstat(os.path.join(place, name)).st_blocks  # noqa: PTH118 - many files
+    unnamed: dict[tuple[int, int], int] = {}
+    for pid in processes:
+        with suppress(OSError):
+            for descriptor in os.listdir(f"/proc/{pid}/fd"):  # noqa: PTH208 - names alone
+                with suppress(OSError):
+                    status = os.stat(f"/proc/{pid}/fd/{descriptor}")  # noqa: PTH116 - many files
+                    if stat.S_ISREG(status.st_mode) and status.st_nlink == 0:
+                        unnamed[status.st_dev, status.st_ino] = BLOCK_BYTES * status.st_blocks
+    return total + sum(unnamed.values())
 
 
 def printable(text: str) -> str:
@@ -391,24 +417,3 @@ def _environment(folder: Path) -> dict[str, str]:
     threads = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     paths = {"HOME": str(folder), "TMPDIR": str(folder), "PATH": "/usr/local/bin:/usr/bin:/bin"}
     return {"LANG": "C.UTF-8"} | paths | dict.fromkeys(threads, "1")
-
-
-def _sandboxed(program: list[str], folder: Path, sandbox: str | None) -> list[str]:
-    if sandbox is None:
-        return program
-    if sandbox != "bwrap":
-        raise ProgramError(f"sandbox {sandbox!r}: expected 'bwrap'", Failure.UNREADABLE)
-    bwrap = shutil.which("bwrap")
-    if bwrap is None:
-        raise ProgramError("bwrap is not installed (Debian: apt-get install bubblewrap)", Failure.UNREADABLE)
-    home = str(Path.home())
-    hidden = [part for path in dict.fromkeys((home, "/tmp", "/run")) for part in ("--tmpfs", path)]  # noqa: S108
-    needed = dict.fromkeys((sys.prefix, sys.base_prefix, str(HERE)))
-    bound = [part for path in needed for part in ("--ro-bind", path, path)]
-    return [
-        *(bwrap, "--unshare-all", "--die-with-parent", "--new-session", "--ro-bind", "/", "/"),
-        *hidden,
-        *bound,
-        *("--bind", str(folder), str(folder), "--dev", "/dev", "--proc", "/proc", "--chdir", str(folder), "--"),
-        *program,
-    ]

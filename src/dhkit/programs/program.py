@@ -8,8 +8,7 @@ import os
 import shutil
 import sys
 import threading
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,11 +16,8 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.display import repr_line
-from dhkit.errors import DhkitError
-from dhkit.kernels.store import cache_folder
-from dhkit.programs.confinement import Confinement, landlock_version
+from dhkit.programs.isolation import Isolation, find_isolation
 from dhkit.programs.process import HERE, CallTime, Failure, Limits, Process, ProgramError, printable
-from dhkit.programs.python_runner import dhkit_packages
 
 if TYPE_CHECKING:
     from dhkit.control import Setpoint
@@ -33,19 +29,13 @@ MAX_SOLUTIONS = 64
 """Most solutions of a pose: no arm of six joints has more than 16."""
 MAX_START_TIME = 30.0
 """Processor time from the start to the first line, s: importing numpy may take some seconds."""
-RUNNERS = HERE / "python_runner.py", HERE / "octave_runner.m"
-"""Files of dhkit that every program may read: they are executed in its process."""
-
-
-class _DhkitImportedError(Exception):
-    """A program asks for dhkit, which it could not read so far."""
 
 
 class Program:
     """A program that is started when it is first called, and again after a failure that ended it.
 
-    It cannot read dhkit's files, unless it imports dhkit openly: then it is started again with them, and
-    :attr:`imported` says so. Where the system cannot hide files (:attr:`sees_dhkit`), it may use dhkit unseen.
+    Isolated, it cannot read dhkit's files. Otherwise :attr:`imported` says whether it imports dhkit: that is a hint,
+    since such a program may do anything.
 
     Parameters
     ----------
@@ -54,8 +44,8 @@ class Program:
         protocol of docs/own-code.md on its descriptors 3 and 4. No shell reads the command.
     limits
         Limits of time and memory.
-    sandbox
-        ``"bwrap"`` runs the program in bubblewrap: without a network, and with one writable folder of its own.
+    isolation
+        What the program can see and reach; by default the best that works on this system, or none.
 
     Raises
     ------
@@ -64,7 +54,7 @@ class Program:
     """
 
     def __init__(
-        self, source: str | Path | Sequence[str], limits: Limits | None = None, sandbox: str | None = None
+        self, source: str | Path | Sequence[str], limits: Limits | None = None, isolation: Isolation | None = None
     ) -> None:
         if os.name != "posix":
             raise ProgramError("programs run on Linux and macOS alone", Failure.UNREADABLE)
@@ -74,17 +64,12 @@ class Program:
         self.functions: tuple[str, ...] = ()
         self.imported: tuple[str, ...] = ()
         """Modules that it imported although it should not: ``dhkit``."""
-        self._source, self._sandbox = source, sandbox
+        self._source = source
+        self.isolation = find_isolation() if isolation is None else isolation
         self._process: Process | None = None
         self._lock = threading.Lock()
         self._closed = False
         self._ended_time = 0.0
-        self._landlock = landlock_version()
-
-    @property
-    def sees_dhkit(self) -> bool:
-        """Whether this system cannot keep the program from reading dhkit's files: it has no Landlock (Linux 5.13)."""
-        return self._landlock == 0
 
     def start(self) -> None:
         """Start the program, unless it runs, and wait until it has named its functions.
@@ -113,10 +98,7 @@ class Program:
             The call failed. If the process has ended or cannot be trusted any more, the next call starts another.
         """
         with self._lock:
-            try:
-                answer = self._answer_to(function, arguments)
-            except _DhkitImportedError:  # raised once at most
-                answer = self._answer_to(function, arguments)
+            answer = self._answer_to(function, arguments)
         if "error" in answer:
             raise ProgramError(_text(answer["error"]), Failure.RAISED, _line(answer))
         if "value" not in answer:
@@ -201,15 +183,12 @@ class Program:
         running = self._process
         if running is not None and running.failure is None:
             return running
-        try:
-            return self._start()
-        except _DhkitImportedError:  # raised once at most
-            return self._start()
+        return self._start()
 
     def _start(self) -> Process:
         """Start a process, and wait until it has named its functions."""
         self._end()
-        running = self._process = Process(self._command, self.limits, self._sandbox, self._confinement())
+        running = self._process = Process(self._command, self.limits, self.isolation, self._shown())
         if self._closed:  # meanwhile, by another thread, which has not seen this process
             self._end()
             raise ProgramError(f"{self.name} was closed", Failure.ENDED)
@@ -251,10 +230,8 @@ class Program:
             except ProgramError:
                 self._end(keep=True)
                 raise
-            if message.get("imported") == ["dhkit"] and not self.imported:
+            if message.get("imported") == ["dhkit"]:
                 self.imported = ("dhkit",)
-                self._end()
-                raise _DhkitImportedError
             if is_answer(message):
                 return message
 
@@ -265,16 +242,14 @@ class Program:
                 self._ended_time += self._process.processor_time
                 self._process = None
 
-    def _confinement(self) -> Confinement:
-        """Return the rights that the program does not have: to read dhkit and its kernels, unless it imports dhkit."""
-        if self.imported:
-            return Confinement(self._landlock)
-        hidden = dhkit_packages()
-        with suppress(DhkitError):
-            kernels = cache_folder()
-            if kernels is not None:
-                hidden.append(str(kernels))
-        return Confinement(self._landlock, tuple(hidden), tuple(str(path.resolve()) for path in RUNNERS))
+    def _shown(self) -> Iterator[Path]:
+        """Yield the files of a command and its arguments, which it may read where it is isolated."""
+        if isinstance(self._source, Path):
+            return
+        for argument in (shutil.which(self._source[0]) or "", *self._source[1:]):
+            path = Path(argument)
+            if path.is_absolute() and path.is_file():
+                yield path
 
     def _command(self, folder: Path) -> list[str]:
         """Copy the source into the program's folder, and return the command to execute."""
@@ -289,20 +264,20 @@ class Program:
                 raise ProgramError(f"{source}: expected a file", Failure.UNREADABLE)
             if source.stat().st_size > MAX_SOURCE_BYTES:
                 raise ProgramError(f"{source}: expected at most {MAX_SOURCE_BYTES} bytes", Failure.UNREADABLE)
-            copy = folder / source.name
-            copy.write_bytes(source.read_bytes())
+            (folder / source.name).write_bytes(source.read_bytes())
         except OSError as error:
             raise ProgramError(f"{source}: {error.strerror}", Failure.UNREADABLE) from None
+        inside = str(self.isolation.folder(folder) / source.name)
         if source.suffix == ".py":
-            options = ["with-dhkit"] if self.imported else []
-            return [sys.executable, "-I", "-B", "-u", str(HERE / "python_runner.py"), str(copy), *options]
+            return [*self.isolation.python(HERE / "python_runner.py", folder), inside]
         if source.suffix == ".m":
             octave = shutil.which("octave-cli") or shutil.which("octave")
             if octave is None:
                 raise ProgramError(
                     f"{source.name}: GNU Octave, which runs .m files, is not installed", Failure.UNREADABLE
                 )
-            return [octave, "--no-gui", "--quiet", "--norc", "--no-history", str(HERE / "octave_runner.m"), str(copy)]
+            runner = self.isolation.runner(HERE / "octave_runner.m", folder)
+            return [octave, "--no-gui", "--quiet", "--norc", "--no-history", str(runner), inside]
         raise ProgramError(f"{source}: expected a .py or .m file", Failure.UNREADABLE)
 
 

@@ -4,7 +4,7 @@ This file is executed by its path in a process of its own, and imports nothing o
 descriptor 3, answers lines of JSON on descriptor 4: docs/own-code.md has the protocol. The file's printed output goes
 to standard output.
 
-Arguments: the file; ``with-dhkit`` if it may import dhkit.
+Arguments: the folder of the packages that the file may import, empty where it may import all; the file.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ REQUESTS, ANSWERS = 3, 4
 FUNCTIONS = ("fk", "ik", "controller")
 
 
-def main(path: str, *options: str) -> None:
+def main(packages: str, path: str) -> None:
     """Load the file, name the functions that it defines, and answer requests until they end."""
+    if packages:
+        sys.path.append(packages)
+    sys.addaudithook(import_hook())
     import numpy as np
-
-    if not options:
-        sys.addaudithook(dhkit_hook())
 
     requests, answers = os.fdopen(REQUESTS, "rb"), os.fdopen(ANSWERS, "wb", 0)
     name = os.path.basename(path)  # noqa: PTH119
@@ -64,43 +64,16 @@ def main(path: str, *options: str) -> None:
         write(answer)
 
 
-def dhkit_hook() -> Callable[[str, tuple[Any, ...]], None]:
-    """Return an audit hook that says when dhkit is imported or one of its files is opened, and ends this process.
-
-    dhkit then starts the file anew with the right to import it. An audit hook cannot be removed, but what a file does
-    in another process is not seen here: there, dhkit's files cannot be read.
-    """
-    own = os.path.realpath(__file__)
-    packages = tuple(f"{package}{os.sep}" for package in dhkit_packages())
-    realpath = os.path.realpath
-    write = os.write
-    leave = os._exit
+def import_hook() -> Callable[[str, tuple[Any, ...]], None]:
+    """Return an audit hook that says when dhkit is imported: a hint for readers of the report, and no defence."""
+    write, said = os.write, list[str]()
 
     def hook(event: str, arguments: tuple[Any, ...]) -> None:
-        if event == "import":
-            uses_dhkit = arguments[0] == "dhkit" or str(arguments[0]).startswith("dhkit.")
-        elif event == "open" and isinstance(arguments[0], (str, bytes)):
-            try:
-                opened = realpath(os.fsdecode(arguments[0]))
-            except ValueError:
-                return
-            uses_dhkit = opened.startswith(packages) and opened != own  # tracebacks read this file
-        else:
-            return
-        if uses_dhkit:
+        if event == "import" and not said and str(arguments[0]).partition(".")[0] == "dhkit":
+            said.append("dhkit")
             write(ANSWERS, b'{"imported": ["dhkit"]}\n')
-            leave(0)
 
     return hook
-
-
-def dhkit_packages() -> list[str]:
-    """Return the folders of dhkit: the one with this file, and those from which Python may import it."""
-    packages = {os.path.dirname(os.path.dirname(os.path.realpath(__file__)))}  # noqa: PTH120
-    for folder in sys.path:
-        if os.path.isfile(os.path.join(folder, "dhkit", "__init__.py")):  # noqa: PTH113, PTH118
-            packages.add(os.path.realpath(os.path.join(folder, "dhkit")))  # noqa: PTH118
-    return sorted(packages)
 
 
 def argument(np: Any, value: Any) -> Any:
