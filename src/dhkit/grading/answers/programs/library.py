@@ -63,11 +63,13 @@ def called(scope: Scope, function: str, arguments: Sequence[Value], of_numpy: bo
     match function, arguments:
         case ("zeros", [Several(())]):  # zeros((*q.shape[:-1],)): one number a state
             return Matrix({}, is_zeros=True)
+        case ("zeros", [Scalar() as n]) if not of_numpy and n.text.isdecimal():  # sympy's and MATLAB's are square
+            return zeros(int(n.text[:6]), int(n.text[:6]))
         case ("zeros", _) if arguments:
             return zeros(*shape_of(arguments), multiplies_entries=of_numpy)
         case ("zeros_like", [Matrix() as matrix]):
             return matrix.mapped(lambda x: zeros(1).entries[(0,)])
-        case ("eye" | "identity", [Scalar() as n, *_]):
+        case ("eye" | "identity", [Scalar() as n]):
             return identity(int(n.number or 0), of_numpy)
         case ("transpose", [Matrix() as matrix]):
             return transposed(matrix)

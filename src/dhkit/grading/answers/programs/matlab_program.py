@@ -41,7 +41,6 @@ from dhkit.grading.answers.programs.values import (
     number,
     opposite,
     transposed,
-    vector_of,
 )
 from dhkit.grading.answers.tokens import rate_name, word_set
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, plain_name
@@ -239,7 +238,7 @@ class MatlabProgram:
 
     def arguments_as_given(self, function: Function) -> dict[str, Value]:
         """Return a function's arguments as themselves."""
-        values: dict[str, Value] = {name: Given(name, is_argument=True) for name in function.parameters}
+        values: dict[str, Value] = {name: self.record.argument(name) for name in function.parameters}
         if function.name in function.definition.results:
             values = {}
         for name in set(function.definition.results) & set(values):
@@ -265,8 +264,9 @@ class MatlabProgram:
         # A handle sees the program's names as they are, a function only the file's functions.
         outer = self.main if definition.formula else self.own
         scope = Scope(self.record, outer, frozenset(local))
-        for name, value in arguments.items():
+        for name, value in {**function.captured, **arguments}.items():
             scope.set_argument(name, value, function.line)
+        self._refuse_later_names(function)
         self.depth += 1
         try:
             if definition.formula:
@@ -285,6 +285,15 @@ class MatlabProgram:
             values.append(bound.value if bound is not None else Unread(f"{result} is not assigned, in {function.line}"))
         return Several(tuple(values), tuple(names)), scope
 
+    def _refuse_later_names(self, function: Function) -> None:
+        """Refuse a handle that reads a name which the program assigns only after it."""
+        known = {*function.captured, *function.parameters, *self.own.names}
+        for token in function.definition.formula:
+            if token.kind == "name" and token.text in self.bound and token.text not in known:
+                raise UnreadError(
+                    f"{token.text} is assigned after the handle of {function.line}, which does not see it"
+                )
+
     @staticmethod
     def returned_names(function: Function) -> list[str]:
         """Return the names in what a function returns."""
@@ -297,9 +306,11 @@ class MatlabProgram:
         k = 0
         while k < len(statements):
             match [statement.texts for statement in statements[k : k + 3]]:
-                case [["if", "nargin", "<", _], [argument, "=", default, "(", ")"], ["end"]] if (
+                case [["if", "nargin", "<", count], [argument, "=", default, "(", ")"], ["end"]] if (
                     argument in function.parameters
-                    and (default in self.signature_names or default.endswith("_parameters"))
+                    and count.isdecimal()
+                    and int(count[:4]) <= len(function.parameters)
+                    and (default in self.own.names or default.endswith("_parameters"))
                 ):
                     k += 3
                     continue
@@ -361,6 +372,10 @@ class MatlabProgram:
         if word in ("global", "persistent"):
             for name in statement.command_names:
                 scope.change(name, f"{name[:40]} is changed by {word!r} in {line}", only_matrices=False)
+        elif word in ("clear", "clearvars"):
+            named = [name for name in statement.command_names if name in scope.names]
+            for name in named if statement.command_names else list(scope.names):
+                scope.change(name, f"{name[:40]} is cleared in {line}", only_matrices=False)
         elif word == "syms":
             self._syms(tokens[0].words, scope, line)
         elif len(equals) > 1 or (equals and (is_change or assigning is None)):
@@ -386,21 +401,23 @@ class MatlabProgram:
                 continue
             if shape:
                 lengths = [int(k) for k in re.findall(r"\d{1,3}", shape)]
-                if len(lengths) > 2 or (len(lengths) == 2 and min(lengths) > 1) or not lengths:
+                if len(lengths) != 2 or min(lengths) != 1:
                     scope.change(name, f"{name[:40]} is made by 'syms' of a matrix in {line}", only_matrices=False)
                     continue
-                scope.bind(name, self._symbols(name, max(lengths), scope, line), line)
+                scope.bind(name, self._symbols(name, lengths, scope, line), line)
             elif arguments and arguments.replace(" ", "") != "(t)":
                 reason = f"{name[:40]} is made by 'syms' of a function of other names than t in {line}"
                 scope.change(name, reason, only_matrices=False)
             else:
-                scope.bind(name, Given(name, is_symbol=True), line)
+                scope.bind(name, Given(name, is_symbol=True, is_constant=not arguments), line)
 
-    def _symbols(self, name: str, count: int, scope: Scope, line: str) -> Matrix:
-        names = [f"{name}{k + 1}" for k in range(count)]
+    def _symbols(self, name: str, lengths: Sequence[int], scope: Scope, line: str) -> Matrix:
+        """Return the row or the column of symbols of ``syms q [2 1]``."""
+        names = [f"{name}{k + 1}" for k in range(max(lengths))]
         for one in names:
-            scope.bind(one, Given(one, is_symbol=True), line)
-        return vector_of([Scalar(one, uses=frozenset((scope.key(one),))) for one in names])
+            scope.bind(one, Given(one, is_symbol=True, is_constant=True), line)
+        scalars = [Scalar(one, uses=frozenset((scope.key(one),))) for one in names]
+        return matrix_of([[x] for x in scalars] if lengths[0] > 1 else [scalars])
 
     def _assign(self, statement: MatlabStatement, left: Tokens, right: Tokens, scope: Scope, line: str) -> None:
         if left[0].is_sign("[") and closing(left, 0) == len(left) - 1:
@@ -439,7 +456,7 @@ class MatlabProgram:
         names = [entry[0].text if len(entry) == 1 else "" for entry in targets]
         values: Sequence[Value] = ()
         try:
-            if is_call(right, "deal"):
+            if is_call(right, "deal") and "deal" not in self.own.names and "deal" not in self.bound:
                 values = [self.value(x, scope) for x in _arguments(right[2:-1])]
             else:
                 value = self.value(right, scope, "", count=len(names))
@@ -504,7 +521,15 @@ class MatlabProgram:
         if not tokens[end + 1 :]:
             raise UnreadError("'@' is not read")
         line = self.line_name(tokens[0].line)
-        return Function(name, parameters, _Definition(formula=tuple(tokens[end + 1 :])), line)
+        formula = tuple(tokens[end + 1 :])
+        captured: dict[str, Value] = {}
+        for token in formula:
+            if token.kind == "name" and token.text in scope.names and token.text not in parameters:
+                try:
+                    captured[token.text] = scope.value(token.text)
+                except UnreadError as error:
+                    captured[token.text] = Unread(str(error))
+        return Function(name, parameters, _Definition(formula=formula), line, captured=captured)
 
     def call(self, function: Function, arguments: Sequence[Value], scope: Scope, name: str, count: int) -> Value:
         """Return the value of a call of one of the program's functions."""
@@ -546,7 +571,7 @@ class _Expression:
             entries = [self.scope.scalar(self.scope.entry(value, (k,))) for k in range(robot.n)]
             return matrix_of([[entry] for entry in entries])
         if isinstance(value, Matrix):
-            return _as_column(value)
+            return _as_row(value)
         return self.scope.scalar(value)
 
     def sum(self) -> Value:
@@ -577,13 +602,17 @@ class _Expression:
                 raise UnreadError("a power of a power without brackets is not read")
             has_power = True
             minus = self._next("+", "-")
-            exponent = self._operand(self.postfix())
+            exponent = self._operand(self.primary())
             exponent = opposite(exponent) if minus == "-" else exponent
-            value = calculated(self._operand(value), POWERS[sign], exponent, "^")
+            # Powers and transposes bind alike, from the left: B^2' is (B^2)'.
+            value = self._transposed(calculated(self._operand(value), POWERS[sign], exponent, "^"))
         return value
 
     def postfix(self) -> Value:
-        value = self.primary()
+        return self._transposed(self.primary())
+
+    def _transposed(self, value: Value) -> Value:
+        """Return a value with the transposes behind it."""
         while self._next("'", ".'"):
             value = self._operand(value)
             value = transposed(value) if isinstance(value, Matrix) else value
@@ -689,9 +718,9 @@ class _Expression:
             return self.scope.entry(value, index)
         places = [_places(part) for part in _arguments(inside)]
         match value, places:
-            case Given(vector), [range() as one] if not self.program.record.robot.vocabulary.knows(vector):
+            case Given(vector, number=call), [range() as one] if not self.program.record.robot.vocabulary.knows(vector):
                 if one:
-                    return Part(vector, tuple(one), is_slice=True)
+                    return Part(vector, tuple(one), is_slice=True, number=call)
             case Matrix(), [rows, columns] if not value.is_flat:
                 m, n = value.shape
                 i = range(m) if rows == "all" else rows
@@ -758,11 +787,11 @@ class _Expression:
             match = re.fullmatch(r"([A-Za-z]\w*)(\(t\))?", quoted, re.ASCII)
             if match and rest and rest[0].is_sign("["):
                 lengths = [int(token.text[:4]) for token in rest if token.kind == "number" and token.text.isdecimal()]
-                if 1 <= len(lengths) <= 2 and (len(lengths) == 1 or min(lengths) == 1):
-                    names = [f"{match[1]}{k + 1}" for k in range(max(lengths))]
-                    return vector_of([self.scope.known(one) for one in names])
-            if match and not any(token.is_sign("[") for token in inside):
-                return Given(match[1], is_symbol=True)
+                if len(lengths) == 2 and min(lengths) == 1:
+                    scalars = [self.scope.known(f"{match[1]}{k + 1}") for k in range(max(lengths))]
+                    return matrix_of([[x] for x in scalars] if lengths[0] > 1 else [scalars])
+            if match and not any(token.is_sign("[") or token.kind == "number" for token in inside):
+                return Given(match[1], is_symbol=True, is_constant=not match[2])
             text = quoted
         elif inside:
             value = self.program.value(inside, self.scope)
@@ -791,11 +820,11 @@ def with_use(value: Value, key: str) -> Value:
     return value
 
 
-def _as_column(matrix: Matrix) -> Matrix:
+def _as_row(matrix: Matrix) -> Matrix:
     """Return a vector that was assigned entry by entry as the row that MATLAB makes of it."""
     if not matrix.is_flat:
         return matrix
-    return matrix_of([[matrix.entries[(k,)]] for k in range(matrix.shape[0])])
+    return matrix_of([[matrix.entries[(k,)] for k in range(matrix.shape[0])]])
 
 
 def _target(tokens: Tokens) -> tuple[str, Index | None]:

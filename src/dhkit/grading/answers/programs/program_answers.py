@@ -385,7 +385,7 @@ class _ProgramAnswers:
     def _returned_value(
         self, function: Function, scope: Scope, name: str, called: str, value: Value
     ) -> Iterable[_Candidate]:
-        if name in scope.names and name not in function.parameters:
+        if name in scope.names and name not in function.parameters and scope.stands_for(name, value):
             return [*self._given_by(scope, name, called, function.name)]
         quantity = self.quantities.quantity(called) if called else ""
         one = _Candidate(

@@ -5,20 +5,20 @@ from __future__ import annotations
 import ast
 import re
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.programs.library import SCALAR, as_matrix, called, flat, unchanged
 from dhkit.grading.answers.programs.python_changes import (
-    CHANGING_KEYWORDS,
-    PURE,
+    Changes,
+    Effects,
+    ascii_name,
     assigned_names,
-    changed_by_calls,
-    changed_parts,
+    bound_names,
     is_unbounded,
     names_in,
-    shared_names,
+    value_of,
 )
 from dhkit.grading.answers.programs.scope import Record, Scope
 from dhkit.grading.answers.programs.values import (
@@ -45,7 +45,7 @@ from dhkit.grading.answers.programs.values import (
     vector_of,
 )
 from dhkit.grading.answers.rewriting import MODULES as USUAL_MODULES
-from dhkit.grading.answers.tokens import rate_name, to_ascii, word_set
+from dhkit.grading.answers.tokens import rate_name, word_set
 from dhkit.grading.answers.vocabulary import plain_name
 
 MODULES = word_set(
@@ -66,8 +66,16 @@ MAX_DEPTH = 20
 MAX_SYMBOLS = 1_000
 """Largest index in symbols('q1:4')."""
 
+ASSUMPTIONS = word_set("cls real positive nonnegative nonzero integer commutative finite seq")
+"""Keywords of symbols that change nothing of what is judged."""
+KNOWN_KEYWORDS = word_set(
+    "deep ratio trig force inverse rational method measure power_base power_exp mul log syms dtype"
+)
+"""Keywords with which a function writes an expression in another way."""
 MATRICES = word_set("Matrix ImmutableMatrix MutableDenseMatrix ImmutableDenseMatrix DM SX MX matrix vertcat")
 ARRAYS = word_set("array asarray asanyarray")
+CASADI = word_set("DM SX MX vertcat horzcat")
+"""Matrices of casadi, which multiply entry by entry."""
 SYMBOLS = frozenset(("symbols", "Symbol", "dynamicsymbols", "var", "Dummy"))
 SIGNS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "^", ast.MatMult: "@"}
 PLAIN_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
@@ -100,6 +108,7 @@ class PythonProgram:
         self.line_name = line_name
         self.record = record
         self.main = Scope(record)
+        self.changes = Changes(self.main)
         self.functions: list[Function] = []
         self.statements = 0
         self.depth = 0
@@ -164,10 +173,6 @@ class PythonProgram:
             case ast.Assign(targets, value):
                 for target in targets:
                     self._assign(target, value, scope, line)
-                names = [name for target in targets for name in names_in(target)]
-                if len(targets) > 1 and not isinstance(value, ast.Constant):
-                    for name in names:
-                        scope.add_alias(name, names)
             case ast.AnnAssign(target, _, ast.expr() as value):
                 self._assign(target, value, scope, line)
             case ast.AugAssign(ast.Subscript(ast.Name(name), index), ast.Add(), value):
@@ -178,73 +183,66 @@ class PythonProgram:
             case ast.ImportFrom(module, aliases):
                 for alias in aliases:
                     self._import_from(module or ".", alias, scope, line)
-            case ast.FunctionDef(name, arguments, body, []) if scope is self.main:
+            case ast.FunctionDef(name, arguments, body, []):
                 self._define(name, arguments, body, scope, line)
             case ast.If(test, body, []) if scope is self.main and _is_main(test):
                 self._block(body, scope)
                 return
+            case ast.Expr(ast.Call(ast.Name("var") | ast.Attribute(_, "var"), [ast.Constant(str(text)), *_])):
+                for name in _symbol_names(text):
+                    scope.bind(ascii_name(name), Given(name, is_symbol=True, is_constant=True), line)
             case ast.Expr() | ast.Pass() | ast.AnnAssign() | ast.Assert() | ast.Return():
                 pass
             case _:
                 self._leave(statement, scope, line)
                 return
-        if not isinstance(statement, ast.FunctionDef):
-            self._changes(statement, scope, line)
+        pieces = _executed(statement)
+        for node in (x for piece in pieces for x in ast.walk(piece)):
+            if isinstance(node, ast.NamedExpr):
+                for one in names_in(node.target):
+                    scope.change(ascii_name(one), f"{one[:40]} is changed by := in {line}", only_matrices=False)
+        self._note(self.changes.of(pieces, scope, scope.local), scope, line)
+
+    def _note(self, effects: Effects, scope: Scope, line: str) -> None:
+        """Note what a statement may change, and which names may be the same matrix after it."""
+        for name, others in effects.shared.items():
+            if scope.is_mutable(name) or not isinstance(value_of(name, scope), Scalar | Function | Module | Library):
+                scope.add_alias(name, others)
+        for name in sorted(effects.changed):
+            scope.change(name, f"{name[:40]} may be changed in {line}")
 
     def _leave(self, statement: ast.stmt, scope: Scope, line: str) -> None:
         """Note what a statement that is not read may change."""
-        kind = {
-            "FunctionDef": "a function",
-            "Delete": "'del'",
-        }
-        if isinstance(statement, ast.AugAssign):
-            for name in dict.fromkeys(assigned_names(statement)):
-                scope.change(
-                    _ascii(name), f"{name[:40]} is changed after it is assigned, in {line}", only_matrices=False
-                )
-            self._changes(statement, scope, line)
-            return
-        what = kind.get(type(statement).__name__, repr(type(statement).__name__.lower()))
         if isinstance(statement, ast.ClassDef):
             self._leave_class(statement, scope, line)
             return
-        read = set(names_in(statement)) - self._modules(scope)
-        assigned = list(dict.fromkeys(assigned_names(statement)))
-        for name in assigned:
-            scope.add_alias(_ascii(name), map(_ascii, read))
-        for name in assigned:
-            scope.change(_ascii(name), f"{name[:40]} is changed by {what} in {line}", only_matrices=False)
-        self._changes(statement, scope, line)
-        for name in changed_parts(statement):
-            scope.change(_ascii(name), f"{name[:40]} may be changed by {what} in {line}")
+        kind = {"FunctionDef": "a function", "Delete": "'del'"}
+        what = kind.get(type(statement).__name__, repr(type(statement).__name__.lower()))
+        for name in dict.fromkeys(map(ascii_name, assigned_names(statement))):
+            after = "after it is assigned, " if isinstance(statement, ast.AugAssign) else f"by {what} "
+            scope.change(name, f"{name[:40]} is changed {after}in {line}", only_matrices=False)
+        self._note(self.changes.of([statement], scope, scope.local), scope, line)
 
     def _leave_class(self, statement: ast.ClassDef, scope: Scope, line: str) -> None:
         """Read a class of fields alone as a structure; of another one note what it may change."""
-        if (fields := self._fields(statement, scope)) is not None:
-            scope.bind(_ascii(statement.name), Structure(fields), line)
+        name = ascii_name(statement.name)
+        if _is_plain_class(statement) and (fields := self._fields(statement, scope)) is not None:
+            scope.bind(name, Structure(fields), line)
             return
-        scope.change(_ascii(statement.name), f"{statement.name[:40]} is a class, in {line}", only_matrices=False)
-        if any(isinstance(inner, ast.FunctionDef) for inner in statement.body):
-            self.record.left_out.append(f"{line}: class {statement.name[:40]}")
-        modules = self._modules(scope)
-        changed: set[str] = set()
+        self.changes.classes.add(name)
+        reached = {ascii_name(x) for x in names_in(statement)}
+        inside: set[str] = set()
         for inner in statement.body:
-            read = set(names_in(inner)) - modules
             if isinstance(inner, ast.FunctionDef | ast.AsyncFunctionDef):
-                arguments = {x.arg for x in ast.walk(inner.args) if isinstance(x, ast.arg)}
-                if any(name not in arguments for name in changed_parts(inner)):
-                    changed |= read - arguments
-                continue
-            for name in assigned_names(inner):
-                scope.add_alias(_ascii(name), map(_ascii, read))
-            changed |= set(changed_parts(inner))
+                self.record.note_left_out(f"{line}: class {statement.name[:40]}")
+                arguments = {ascii_name(x.arg) for x in ast.walk(inner.args) if isinstance(x, ast.arg)}
+                inside |= arguments | {ascii_name(x) for x in assigned_names(inner)}
+        scope.bind(name, Unread(f"{statement.name[:40]} is a class, in {line}", frozenset(reached - inside)), line)
         for node in ast.walk(statement):
             if isinstance(node, ast.Global):
-                for name in node.names:
-                    scope.change(_ascii(name), f"{name[:40]} is changed in a class, in {line}", only_matrices=False)
-        for name in sorted(changed):
-            scope.change(_ascii(name), f"{name[:40]} may be changed in the class of {line}")
-        self._changes(statement, scope, line)
+                for one in node.names:
+                    scope.change(ascii_name(one), f"{one[:40]} is changed in a class, in {line}", only_matrices=False)
+        self._note(self.changes.of([statement], scope, scope.local), scope, line)
 
     def _fields(self, statement: ast.ClassDef, scope: Scope) -> dict[str, Value] | None:
         """Return what the body of a class assigns, as the fields of its objects; None where it has more."""
@@ -252,7 +250,7 @@ class PythonProgram:
         for inner in statement.body:
             match inner:
                 case ast.AnnAssign(ast.Name(name), _, ast.expr() as value) | ast.Assign([ast.Name(name)], value):
-                    if name in fields:
+                    if name in fields or fields.keys() & set(names_in(value)):
                         return None
                     fields[name] = self._right_side(value, scope, self.line(inner))
                 case ast.Expr(ast.Constant()) | ast.Pass():
@@ -261,50 +259,14 @@ class PythonProgram:
                     return None
         return fields
 
-    def _changes(self, statement: ast.stmt, scope: Scope, line: str) -> None:
-        """Note what the calls of a statement, and ``:=``, may change."""
-        for node in ast.walk(statement):
-            match node:
-                case ast.NamedExpr(target, value) | ast.comprehension(target, value):
-                    for name in names_in(target):
-                        scope.add_alias(_ascii(name), map(_ascii, set(names_in(value)) - self._modules(scope)))
-                    if isinstance(node, ast.NamedExpr):
-                        for name in names_in(target):
-                            scope.change(_ascii(name), f"{name[:40]} is changed by := in {line}", only_matrices=False)
-
-        def is_pure(name: str) -> bool:
-            owner = scope.owner(_ascii(name))
-            bound = owner.names.get(_ascii(name)) if owner is not None else None
-            match bound.value if bound is not None else None:
-                case None:
-                    return name in PURE
-                case Library() | Structure():  # a class of fields alone makes objects and changes nothing
-                    return True
-                case Function() as function:
-                    return not function.changes
-            return False
-
-        modules = self._modules(scope)
-        for name in dict.fromkeys(changed_by_calls(statement, is_pure, modules.__contains__)):
-            scope.change(_ascii(name), f"{name[:40]} may be changed by a call in {line}")
-            owner = scope.owner(_ascii(name))
-            bound = owner.names.get(_ascii(name)) if owner is not None else None
-            if bound is not None and isinstance(bound.value, Function):
-                for other in bound.value.changes:
-                    scope.change(_ascii(other), f"{other[:40]} may be changed by {name[:40]} in {line}", False)
-
-    def _modules(self, scope: Scope) -> set[str]:
-        return {name for name, bound in self.main.names.items() if isinstance(bound.value, Module)}
-
     # Assignments
 
     def _assign(self, target: ast.expr, value: ast.expr, scope: Scope, line: str) -> None:
         match target:
-            case ast.Name(name) if isinstance(value, ast.Lambda) and scope is self.main:
+            case ast.Name(name) if isinstance(value, ast.Lambda):
                 self._define(name, value.args, value.body, scope, line)
             case ast.Name(name):
-                self._share(name, value, scope)
-                scope.bind(_ascii(name), self._right_side(value, scope, line), line)
+                scope.bind(ascii_name(name), self._right_side(value, scope, line), line)
             case ast.Tuple(targets) | ast.List(targets):
                 self._assign_several(targets, value, scope, line)
             case ast.Subscript(ast.Name(name), index):
@@ -312,40 +274,29 @@ class PythonProgram:
             case ast.Subscript(ast.Subscript(ast.Name(name), first), second):
                 self._assign_entry(name, [first, second], value, scope, line)
             case _:
-                shared = [_ascii(x) for x in shared_names(value)]
                 for name in dict.fromkeys(assigned_names(target)):
-                    scope.change(
-                        _ascii(name), f"{name[:40]} is changed by an assignment to a part of it in {line}", False
-                    )
-                    scope.add_alias(_ascii(name), shared)
-                for other in shared:
-                    scope.change(other, f"{other[:40]} is stored in a part of another, in {line}")
-
-    def _share(self, name: str, value: ast.expr, scope: Scope) -> None:
-        keywords = {k.arg for k in value.keywords} if isinstance(value, ast.Call) else set()
-        shared = set(names_in(value)) if keywords & CHANGING_KEYWORDS else shared_names(value)
-        scope.add_alias(_ascii(name), map(_ascii, shared - self._modules(scope)))
+                    reason = f"{name[:40]} is changed by an assignment to a part of it in {line}"
+                    scope.change(ascii_name(name), reason, only_matrices=False)
+                self._note(self.changes.of([ast.Assign([target], value)], scope, scope.local), scope, line)
 
     def _right_side(self, value: ast.expr, scope: Scope, line: str) -> Value:
         try:
             return self.value(value, scope)
         except UnreadError as error:
-            return Unread(f"{line}: {error}", frozenset(map(_ascii, names_in(value))), _is_written_out(value))
+            return Unread(f"{line}: {error}", frozenset(map(ascii_name, names_in(value))), _is_written_out(value))
 
     def _assign_several(self, targets: Sequence[ast.expr], value: ast.expr, scope: Scope, line: str) -> None:
         names = [target.id for target in targets if isinstance(target, ast.Name)]
         if len(names) != len(targets):
             for name in dict.fromkeys(x for target in targets for x in assigned_names(target)):
-                scope.change(_ascii(name), f"{name[:40]} is changed by an unpacking in {line}", only_matrices=False)
+                scope.change(ascii_name(name), f"{name[:40]} is changed by an unpacking in {line}", only_matrices=False)
             return
-        for name in names:
-            self._share(name, value, scope)
         if isinstance(value, ast.Tuple | ast.List) and len(value.elts) == len(names):
             values = [self._right_side(one, scope, line) for one in value.elts]
         else:
             values = self._taken_apart(self._right_side(value, scope, line), len(names), scope, line)
         for name, one in zip(names, values, strict=True):
-            scope.bind(_ascii(name), one, line)
+            scope.bind(ascii_name(name), one, line)
 
     def _taken_apart(self, value: Value, count: int, scope: Scope, line: str) -> list[Value]:
         match value:
@@ -365,7 +316,7 @@ class PythonProgram:
     def _assign_entry(
         self, name: str, indices: Sequence[ast.expr], value: ast.expr, scope: Scope, line: str, is_added: bool = False
     ) -> None:
-        name = _ascii(name)
+        name = ascii_name(name)
         owner = scope.owner(name)
         if owner is not None and owner is not scope:
             scope.change(name, f"{name[:40]} is changed inside a function, in {line}")
@@ -380,15 +331,20 @@ class PythonProgram:
                 raise UnreadError(f"{name[:40]} is changed by an assignment to a part of it")
             scalar = scope.scalar(stored)
         except UnreadError as error:
-            self._alias(name, shared_names(value), scope)
+            self._share_entry(name, value, scope, line)
             scope.change(name, f"{error}, in {line}", only_matrices=False)
             return
         if isinstance(stored, Matrix):
-            self._alias(name, shared_names(value), scope)
+            self._share_entry(name, value, scope, line)
         for other in list(scope.same_matrices(name)):
             scope.change(other, f"{other[:40]} may be the same matrix as {name[:40]}, which is changed in {line}")
         index = tuple(k for part in parts if part is not None for k in part)
         scope.bind_entry(name, index, scalar, line, is_added)
+
+    def _share_entry(self, name: str, value: ast.expr, scope: Scope, line: str) -> None:
+        """Note that a matrix or list may hold others after an entry is assigned."""
+        target = ast.Name(name, ast.Store())
+        self._note(self.changes.of([ast.Assign([target], value)], scope, scope.local), scope, line)
 
     # Imports
 
@@ -397,12 +353,12 @@ class PythonProgram:
         name, module = alias.asname or first, alias.name if alias.asname else first
         harmless = module.split(".")[0] in ("matplotlib", "scipy", "time", "os", "sys", "IPython")
         if module in MODULES or harmless:
-            scope.bind(_ascii(name), Module(module), line)
+            scope.bind(ascii_name(name), Module(module), line)
         else:
-            scope.bind(_ascii(name), Unread(f"{name[:40]} is the module {module[:40]} since {line}"), line)
+            scope.bind(ascii_name(name), Unread(f"{name[:40]} is the module {module[:40]} since {line}"), line)
 
     def _import_from(self, module: str, alias: ast.alias, scope: Scope, line: str) -> None:
-        name, full_name = _ascii(alias.asname or alias.name), f"{module}.{alias.name}"
+        name, full_name = ascii_name(alias.asname or alias.name), f"{module}.{alias.name}"
         value: Value
         if alias.name == "*":
             self._import_everything(module, line)
@@ -430,7 +386,11 @@ class PythonProgram:
         for name, bound in list(self.main.names.items()):
             is_exported = name in EXPORTED_LETTERS if len(name) == 1 else not any(c.isdigit() for c in name)
             has_value = not isinstance(bound.value, Module | Library | Unread)
-            if is_exported and has_value and name not in ("tau", "KE", "PE", "Tau", "Jac"):
+            if module == "math":
+                is_exported = name in ("tau", "e", "pi", "inf", "nan") or name in SCALAR
+            elif name in ("tau", "KE", "PE", "Tau", "Jac"):
+                is_exported = False
+            if is_exported and has_value:
                 self.main.change(name, f"{name} is changed by 'from {module} import *' in {line}", only_matrices=False)
 
     # Functions
@@ -439,24 +399,15 @@ class PythonProgram:
         self, name: str, arguments: ast.arguments, body: Sequence[ast.stmt] | ast.expr, scope: Scope, line: str
     ) -> None:
         function = self._function(name, arguments, body, scope, line)
-        self.functions.append(function)
-        scope.bind(_ascii(name), function, line)
+        if scope is self.main:
+            self.functions.append(function)
+        scope.bind(ascii_name(name), function, line)
         pieces: Sequence[ast.AST] = [body] if isinstance(body, ast.expr) else body
         for node in (x for piece in pieces for x in ast.walk(piece)):
-            match node:
-                case ast.Global(names):
-                    for one in names:
-                        reason = f"{one[:40]} is changed by 'global' in a function, in {line}"
-                        scope.change(_ascii(one), reason, only_matrices=False)
-                case ast.Return(ast.expr() as value) | ast.Yield(ast.expr() as value):
-                    self._alias(name, shared_names(value), scope)
-                case ast.Assign(targets, value):
-                    for one in (x for target in targets for x in names_in(target)):
-                        self._alias(one, shared_names(value), scope)
-
-    def _alias(self, name: str, others: Iterable[str], scope: Scope) -> None:
-        """Note that a name may be the same matrix as others."""
-        scope.add_alias(_ascii(name), map(_ascii, set(others) - self._modules(scope)))
+            if isinstance(node, ast.Global | ast.Nonlocal):
+                for one in node.names:
+                    reason = f"{one[:40]} is changed by 'global' in a function, in {line}"
+                    scope.change(ascii_name(one), reason, only_matrices=False)
 
     def _function(
         self, name: str, arguments: ast.arguments, body: Sequence[ast.stmt] | ast.expr, scope: Scope, line: str
@@ -470,72 +421,36 @@ class PythonProgram:
         defaults: dict[str, Value] = {}
         for argument, default in pairs:
             if default is not None:
-                defaults[_ascii(argument.arg)] = self._right_side(default, scope, line)
+                defaults[ascii_name(argument.arg)] = self._right_side(default, scope, line)
         problem = ""
         if arguments.vararg is not None or arguments.kwarg is not None:
             problem = f"{name} takes any arguments, in {line}"
+        elif not isinstance(body, ast.expr) and any(map(_ends, body)):
+            problem = f"{name} ends by an exception, in {line}"
         elif not isinstance(body, ast.expr):
             returns = [
                 x for statement in body[:-1] for x in ast.walk(statement) if isinstance(x, ast.Return | ast.Yield)
             ]
             if returns or isinstance(body[-1], ast.If | ast.For | ast.While | ast.Try | ast.With):
                 problem = f"{name} has 'return' in a branch or several, in {line}" if _returns_inside(body) else ""
-        function = Function(_ascii(name), tuple(map(_ascii, parameters)), body, line, defaults, problem)
-        for parameter in parameters:
-            if any(parameter in names_in(default) for _, default in pairs if default is not None):
-                continue
-        return replace(function, changes=self._changes_of(body, set(parameters), [d for _, d in pairs if d], scope))
-
-    def _changes_of(
-        self, body: Sequence[ast.stmt] | ast.expr, parameters: set[str], defaults: Iterable[ast.expr], scope: Scope
-    ) -> frozenset[str]:
-        """Return the names outside a function, or its arguments, that it may change."""
-        statements = [ast.Expr(body)] if isinstance(body, ast.expr) else body
-        shared: dict[str, set[str]] = {}
-        local: set[str] = set()
-        for node in (x for statement in statements for x in ast.walk(statement)):
-            match node:
-                case ast.Assign(targets, value):
-                    for name in (x for target in targets for x in names_in(target)):
-                        shared.setdefault(name, set()).update(shared_names(value))
-                case ast.comprehension(target, value) | ast.For(target, value) | ast.NamedExpr(target, value):
-                    for name in names_in(target):
-                        shared.setdefault(name, set()).update(names_in(value))
-                case ast.Name(name, ast.Store()):
-                    pass
-                case ast.Global(names) | ast.Nonlocal(names):
-                    return frozenset(names) | parameters | {"?"}
-            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-                local.add(node.id)
-        default_names = {x for default in defaults for x in names_in(default)}
-
-        def is_pure(name: str) -> bool:
-            bound = self.main.names.get(_ascii(name))
-            if bound is not None and isinstance(bound.value, Function):
-                return not bound.value.changes
-            return name in PURE or (bound is not None and isinstance(bound.value, Library))
-
-        modules = self._modules(scope)
-        changed: set[str] = set()
-        for statement in statements:
-            changed |= set(changed_parts(statement))
-            changed |= set(changed_by_calls(statement, is_pure, modules.__contains__))
-        waiting = list(changed)
-        while waiting:
-            for other in shared.get(waiting.pop(), ()):
-                if other not in changed:
-                    changed.add(other)
-                    waiting.append(other)
-        if changed & parameters:
-            changed |= default_names
-        return frozenset(changed - (local - parameters) - modules)
+        defaults_of = [x for _, default in pairs if default is not None for x in names_in(default)]
+        return Function(
+            ascii_name(name),
+            tuple(map(ascii_name, parameters)),
+            body,
+            line,
+            defaults,
+            problem,
+            frozenset(map(ascii_name, defaults_of)),
+            scope,
+        )
 
     def arguments_as_given(self, function: Function) -> dict[str, Value]:
         """Return a function's arguments as themselves; those whose default changes what is computed are not read."""
         robot = self.record.robot
         values: dict[str, Value] = {}
         for name in function.parameters:
-            values[name] = Given(name, is_argument=True)
+            values[name] = self.record.argument(name)
             default = function.defaults.get(name)
             if name in ("self", "cls"):
                 values[name] = Unread(f"{name} is an object, in {function.line}")
@@ -573,10 +488,10 @@ class PythonProgram:
             raise UnreadError(f"{function.name} calls itself, or functions nested too deep")
         body = function.definition
         if isinstance(body, ast.expr):
-            scope = Scope(self.record, self.main, frozenset(function.parameters))
+            scope = Scope(self.record, function.outer or self.main, frozenset(function.parameters))
         else:
-            local = {_ascii(x) for statement in body for x in assigned_names(statement)}
-            scope = Scope(self.record, self.main, frozenset(local) | frozenset(function.parameters))
+            local = {ascii_name(x) for statement in body for x in bound_names(statement)}
+            scope = Scope(self.record, function.outer or self.main, frozenset(local) | frozenset(function.parameters))
         for name, value in arguments.items():
             scope.set_argument(name, value, function.line)
         self.depth += 1
@@ -590,7 +505,7 @@ class PythonProgram:
             try:
                 return self._returned(last.value, scope), scope
             except UnreadError as error:
-                names = frozenset(map(_ascii, names_in(last.value)))
+                names = frozenset(map(ascii_name, names_in(last.value)))
                 return Unread(f"{self.line(last)}: {error}", names, _is_written_out(last.value)), scope
         finally:
             self.depth -= 1
@@ -606,7 +521,7 @@ class PythonProgram:
         """Return the names in what a function returns."""
         body = function.definition
         last = body if isinstance(body, ast.expr) else body[-1]
-        return list(dict.fromkeys(map(_ascii, names_in(last)))) if isinstance(last, ast.expr | ast.Return) else []
+        return list(dict.fromkeys(map(ascii_name, names_in(last)))) if isinstance(last, ast.expr | ast.Return) else []
 
     @staticmethod
     def returned_name(function: Function) -> str:
@@ -632,7 +547,7 @@ class PythonProgram:
             case ast.Constant(str(text)):
                 return Text(text)
             case ast.Name(name):
-                return scope.value(_ascii(name))
+                return scope.value(ascii_name(name))
             case ast.BinOp(left, op, right) if type(op) in SIGNS:
                 values = self._operand(left, scope), self._operand(right, scope)
                 return calculated(values[0], SIGNS[type(op)], values[1], self.record.power)
@@ -640,6 +555,8 @@ class PythonProgram:
                 return opposite(self._operand(operand, scope))
             case ast.UnaryOp(ast.UAdd(), operand):
                 return self._operand(operand, scope)
+            case ast.Tuple([one]) if not _is_batch_shape(one):
+                raise UnreadError("a tuple of one value is not read")
             case ast.List(parts) | ast.Tuple(parts):
                 return self._listed(parts, scope)
             case ast.Dict(keys, values) if all(isinstance(k, ast.Constant) for k in keys):
@@ -693,6 +610,8 @@ class PythonProgram:
         values = [self.value(one, scope) for one in nodes]
         if all(isinstance(value, Matrix) and value.is_flat and value.is_list for value in values) and values:
             return matrix_of([list(x.entries.values()) for x in values if isinstance(x, Matrix)], is_list=True)
+        if any(isinstance(value, Matrix) and value.is_list and not value.is_flat for value in values):
+            raise UnreadError("lists nested more than twice are not read")
         if any(isinstance(value, Matrix | Function | Structure | Several | Text | Module) for value in values):
             return Several(tuple(values), tuple(local_name(one) for one in nodes))
         if all(isinstance(value, Part) for value in values) and values:
@@ -706,6 +625,8 @@ class PythonProgram:
                     return Scalar("pi")
                 if f"{module}.{name}" in MODULES or name in ("linalg", "physics", "mechanics", "matrices"):
                     return Module(f"{module}.{name}")
+                if module not in MODULES and module not in USUAL_MODULES:
+                    raise UnreadError(f"{module}.{name} is not read")
                 return Library(f"numpy.{name}" if module in NUMPY else name)
             case Matrix() if name == "T":
                 return transposed(value)
@@ -723,17 +644,24 @@ class PythonProgram:
         if isinstance(value, Several) and len(numbers) == 1 and numbers[0] < len(value.values):
             return value.values[numbers[0]]
         if isinstance(value, Matrix) and len(numbers) == 1 and not value.is_flat and 1 not in value.shape:
-            return vector_of(value.rows[numbers[0]], is_list=value.is_list) if numbers[0] < len(value.rows) else value
+            k = numbers[0]
+            if not (value.multiplies_entries or value.is_list):  # sympy and casadi count through the matrix
+                return scope.scalar(_entry_counted(value, k))
+            if k >= len(value.rows):
+                raise UnreadError(f"{self._quote(index)} is an index that the matrix does not have")
+            return vector_of(value.rows[k], is_list=value.is_list, multiplies_entries=value.multiplies_entries)
         return scope.entry(value, numbers)
 
     def _slice(self, value: Value, index: ast.expr, scope: Scope) -> Value:
         """Return M[:3, 3] of a matrix, and x[:2] of a vector."""
         match value, index:
             case Given(name), ast.Slice(low, high, None) if not self.record.robot.vocabulary.knows(name):
-                ends = [0 if low is None else constant_index(low), constant_index(high) if high is not None else None]
-                first = ends[0] if isinstance(ends[0], int) else (ends[0] or (0,))[0]
-                last = ends[1][0] if isinstance(ends[1], tuple) else first + self.record.robot.n
-                return Part(name, tuple(range(first, min(last, MAX_INDEX))), is_slice=True)
+                ends = [end if end is None else constant_index(end) for end in (low, high)]
+                if (low is not None and ends[0] is None) or (high is not None and ends[1] is None):
+                    raise UnreadError(f"{self._quote(index)} as an index is not read")
+                first = 0 if ends[0] is None else ends[0][0]
+                last = first + self.record.robot.n if ends[1] is None else ends[1][0]
+                return Part(name, tuple(range(first, min(last, MAX_INDEX))), is_slice=True, number=value.number)
             case Matrix(), ast.Tuple([rows, columns]) if not value.is_flat:
                 m, n = value.shape
                 i, j = _chosen(rows, m), _chosen(columns, n)
@@ -788,7 +716,7 @@ class PythonProgram:
             root = root.value
         if not isinstance(root, ast.Name):
             return value
-        key = scope.key_of(_ascii(root.id))
+        key = scope.key_of(ascii_name(root.id))
         if isinstance(value, Scalar):
             return replace(value, uses=value.uses | {key})
         if isinstance(value, Matrix):
@@ -800,6 +728,8 @@ class PythonProgram:
         name = name.removeprefix("numpy.")
         keywords = {k.arg: k.value for k in node.keywords}
         if name in SYMBOLS:
+            if set(keywords) - ASSUMPTIONS:
+                raise UnreadError(f"{self._quote(node)} is not read")
             return self._symbols(name, node)
         if name in ("dict", "SimpleNamespace"):
             line = self.line(node)
@@ -816,7 +746,7 @@ class PythonProgram:
             return self._matrix(name, arguments, scope)
         if name == "broadcast_arrays" and not keywords:
             return Several(tuple(self.value(x, scope) for x in node.args))
-        if set(keywords) & {"out", "inplace"}:
+        if set(keywords) - KNOWN_KEYWORDS:
             raise UnreadError(f"{self._quote(node)} is not read")
         arguments = [self._operand_or_list(x, scope) for x in node.args]
         return called(scope, name, arguments, of_numpy)
@@ -828,7 +758,7 @@ class PythonProgram:
         return scope.scalar(value) if isinstance(value, Given | Part) else value
 
     def _matrix(self, name: str, arguments: Sequence[Value], scope: Scope) -> Value:
-        of_numpy = name in ARRAYS
+        of_numpy = name in (*ARRAYS, *CASADI)
         match arguments:
             case [Scalar() as m, Scalar() as n, Matrix() as entries] if m.text.isdecimal() and n.text.isdecimal():
                 row_count, columns = int(m.text[:6]), int(n.text[:6])
@@ -849,12 +779,12 @@ class PythonProgram:
             case [Given() as vector] if of_numpy:
                 return vector
         if name == "vertcat" and arguments:
-            return matrix_of([[scope.scalar(x)] for x in arguments])
+            return matrix_of([[scope.scalar(x)] for x in arguments], multiplies_entries=True)
         raise UnreadError("a matrix of something else than rows of numbers is not read")
 
     def _own_call(self, function: Function, node: ast.Call, scope: Scope) -> Value:
         """Return the value of a call of one of the program's functions."""
-        if function.changes:
+        if self.changes.of_function(function):
             raise UnreadError(f"{function.name}(...) is a function that may change other names, and is not read")
         values: dict[str, Value] = dict(function.defaults)
         if len(node.args) > len(function.parameters):
@@ -862,7 +792,7 @@ class PythonProgram:
         for name, argument in zip(function.parameters, node.args, strict=False):
             values[name] = self.value(argument, scope)
         for keyword in node.keywords:
-            values[_ascii(str(keyword.arg))] = self.value(keyword.value, scope)
+            values[ascii_name(str(keyword.arg))] = self.value(keyword.value, scope)
         missing = [name for name in function.parameters if name not in values]
         if missing:
             raise UnreadError(f"{function.name}(...) is called without {missing[0]}")
@@ -879,13 +809,20 @@ class PythonProgram:
                 return flat(value)
             case Library("Matrix") | Given("Matrix"), "zeros" | "eye":
                 return called(scope, method, [self.value(x, scope) for x in arguments], False)
-            case _, "applyfunc" if len(arguments) == 1 and _last(arguments[0]) in UNCHANGED_METHODS:
+            case _, "applyfunc" if len(arguments) == 1 and self._is_unchanging(arguments[0], scope):
                 return unchanged(value)
+            case Matrix(), "simplify":
+                raise UnreadError("the method simplify() of a matrix changes it and returns nothing")
             case _, name if name in UNCHANGED_METHODS and name != "applyfunc":
-                plain = all(_last(x) in UNCHANGED_METHODS for x in arguments)
-                if plain and not any(k.arg == "inplace" for k in node.keywords):
+                plain = all(self._is_unchanging(x, scope) for x in arguments)
+                if plain and not {k.arg for k in node.keywords} & NOT_UNCHANGING:
                     return unchanged(value)
         raise UnreadError(f"{self._quote(node)} is not read")
+
+    def _is_unchanging(self, node: ast.expr, scope: Scope) -> bool:
+        """Whether an argument is a library's function that writes an expression in another way."""
+        value = self._value_or_none(node, scope)
+        return isinstance(value, Library | Given) and value.name.removeprefix("numpy.") in UNCHANGED_METHODS
 
     # Symbols and time
 
@@ -904,7 +841,8 @@ class PythonProgram:
                 names = [rate_name(plain_name(name), marks) for name in names] if order else names
             case _:
                 raise UnreadError(f"{self._quote(node)} is not read")
-        symbols = tuple(Given(name, is_symbol=True) for name in names)
+        of_time = function == "dynamicsymbols" or any(k.arg == "cls" for k in node.keywords)
+        symbols = tuple(Given(name, is_symbol=True, is_constant=not of_time) for name in names)
         if len(symbols) == 1:
             return symbols[0]
         return Several(symbols, tuple(names))
@@ -946,6 +884,9 @@ class PythonProgram:
         if not order:
             raise UnreadError(f"{self._quote(node)} is not read")
         value = self.value(arguments[0], scope)
+        if isinstance(value, Given) and value.is_constant:
+            reason = f"{value.name} is a symbol and no function of t, so that its derivative is 0"
+            raise UnreadError(f"{self._quote(node)}: {reason}")
         name = (
             value.name
             if isinstance(value, Given)
@@ -969,6 +910,9 @@ class PythonProgram:
         except UnreadError:
             return None
 
+
+NOT_UNCHANGING = frozenset(("inplace", "evaluate", "func", "exact", "out"))
+"""Keywords with which these functions return something else: ``collect(V, g, evaluate=False)`` a dictionary."""
 
 UNCHANGED_METHODS = word_set(
     """
@@ -1009,7 +953,7 @@ def local_name(node: ast.expr) -> str:
     while True:
         match node:
             case ast.Name(name):
-                return _ascii(name)
+                return ascii_name(name)
             case ast.Subscript(inner, ast.Tuple([])):
                 node = inner
             case ast.Call(ast.Name(), [inner], []) | ast.Call(ast.Attribute(ast.Name()), [inner], []):
@@ -1047,6 +991,34 @@ def _symbol_names(text: str) -> list[str]:
     if not names or not all(re.fullmatch(r"[\w\\{}]+", name) for name in names):
         raise UnreadError(f"symbols of {text[:40]!r} are not read")
     return names
+
+
+def _ends(statement: ast.stmt) -> bool:
+    """Whether a statement ends a function by an exception whatever is computed."""
+    match statement:
+        case ast.Raise() | ast.Assert(ast.Constant(False | 0 | None)):
+            return True
+    return False
+
+
+def _executed(statement: ast.stmt) -> list[ast.AST]:
+    """Return the parts of a statement whose effects are not those of the assignments that are read."""
+    match statement:
+        case ast.FunctionDef(_, arguments):
+            return [*arguments.defaults, *(x for x in arguments.kw_defaults if x is not None)]
+        case ast.Assign(targets, value) if any(isinstance(x, ast.Subscript) for x in targets):
+            return [value, *(x.slice for x in targets if isinstance(x, ast.Subscript))]
+        case ast.AugAssign(ast.Subscript(_, index), _, value):
+            return [value, index]
+        case ast.Assign([ast.Name()], ast.Lambda(arguments)):
+            return [*arguments.defaults]
+    return [statement]
+
+
+def _is_plain_class(statement: ast.ClassDef) -> bool:
+    """Whether a class is made by nothing else than its body: by no base or decorator but a dataclass's."""
+    decorators = [x.func if isinstance(x, ast.Call) else x for x in statement.decorator_list]
+    return not statement.bases and not statement.keywords and all(_last(x) == "dataclass" for x in decorators)
 
 
 def _is_main(test: ast.expr) -> bool:
@@ -1098,12 +1070,9 @@ def _last(node: ast.expr) -> str:
     return ""
 
 
-def _ascii(name: str) -> str:
-    """Return an identifier in ASCII: Greek letters by their names, as the reader of formulas has them."""
-    if name.isascii():
-        return name
-    try:
-        plain, _ = to_ascii(name)
-    except AnswerError:
-        plain = ""
-    return plain if plain.isidentifier() and plain.isascii() else "u" + name.encode("unicode_escape").hex()
+def _entry_counted(matrix: Matrix, k: int) -> Scalar:
+    """Return an entry of a matrix whose entries are counted by rows."""
+    entries = [x for row in matrix.rows for x in row]
+    if k >= len(entries):
+        raise UnreadError("an index is read that the matrix does not have")
+    return entries[k]

@@ -86,6 +86,9 @@ class Record:
     notes: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
     scopes: int = 0
+    calls: int = 0
+    taken: dict[tuple[int, str, int], str] = field(default_factory=dict)
+    """Joint variables that entries of a state are, by the call, the vector and the place."""
     symbols: dict[Meaning, tuple[str, str]] = field(default_factory=dict)
     """Symbols that the program makes, with their lines, by meaning."""
     _texts: dict[str, str] = field(default_factory=dict)
@@ -94,6 +97,16 @@ class Record:
         """Add a note, once."""
         if text not in self.notes:
             self.notes.append(text)
+
+    def argument(self, name: str) -> Given:
+        """Return an argument of a function as itself, told from those of the same name of other functions."""
+        self.calls += 1
+        return Given(name, is_argument=True, number=self.calls)
+
+    def note_left_out(self, text: str) -> None:
+        """Note what is not read as an answer, once."""
+        if text not in self.left_out:
+            self.left_out.append(text)
 
     def define(self, key: str, base: str, line: str, scalar: Scalar) -> Scalar:
         """Return a name for a formula, which is defined beside the answers; a number stands for itself."""
@@ -173,8 +186,6 @@ class Scope:
         self.read: set[str] = set()
         """Names that were read before they were bound."""
         self.assigned_entries: dict[str, set[Index]] = {}
-        self.taken: dict[tuple[str, int], str] = {}
-        """Joint variables that entries of a state are, by vector and place."""
         self.aliases: dict[str, set[str]] = {}
 
     def key(self, name: str, index: Index | None = None) -> str:
@@ -251,8 +262,8 @@ class Scope:
         meaning = self.robot.find(value.name) if value.is_symbol else None
         if meaning is None:
             return
-        known, known_line = self.record.symbols.setdefault(meaning, (plain_name(value.name), line))
-        if known != plain_name(value.name):
+        known, known_line = self.record.symbols.setdefault(meaning, (value.name, line))
+        if known != value.name:
             raise UnreadError(f"{known} ({known_line}) and {value.name} would both be read as {''.join(meaning)}")
 
     def _named_entries(self, name: str, matrix: Matrix, line: str) -> Matrix:
@@ -292,8 +303,9 @@ class Scope:
             places = ", ".join(str(place + 1) for place in value.places)
             raise UnreadError(f"{name} is entry {places} of {value.vector}, of which is not known what it holds")
         for place, variable in zip(value.places, names, strict=True):
-            if not robot.is_same(self.taken.setdefault((value.vector, place), variable), variable):
-                raise UnreadError(f"{name} is an entry of {value.vector} that is {self.taken[value.vector, place]} too")
+            known = self.record.taken.setdefault((value.number, value.vector, place), variable)
+            if not robot.is_same(known, variable):
+                raise UnreadError(f"{name} is an entry of {value.vector} that is {known} too")
         return Given(name) if value.is_slice else Scalar(name)
 
     def bind_entry(self, name: str, index: Index, scalar: Scalar, line: str, is_added: bool = False) -> None:
@@ -308,7 +320,9 @@ class Scope:
         assigned = self.assigned_entries.setdefault(name, set())
         matrix = bound.value if bound is not None else None
         is_quantity = bool(self.robot.quantities.quantity(name))
-        if bound is not None and not isinstance(matrix, Matrix) and not (is_quantity and not assigned):
+        # The letter g, and then the gravity torques g.
+        is_letter = is_quantity and not assigned and isinstance(matrix, Scalar | Given)
+        if bound is not None and not isinstance(matrix, Matrix) and not is_letter:
             raise UnreadError(f"{name} is changed after it is assigned")
         if isinstance(matrix, Matrix) and not matrix.is_zeros and not assigned:
             raise UnreadError(f"{name} is changed after it is assigned")
@@ -336,7 +350,9 @@ class Scope:
         assigned.add(index)
         base = name + "".join(f"_{k + 1}" for k in index)
         known = frozenset((self.key(name),))
-        key = self.key(name, index) + ("+" * sum(k == index for k in assigned) if is_added else "")
+        key = self.key(name, index)
+        while is_added and key in self.record.definitions:
+            key += "+"
         named = self.record.define(key, base, line, scalar)
         entries[index] = scalar
         references[index] = replace(named, uses=named.uses | known)
@@ -368,6 +384,11 @@ class Scope:
         owner = self.owner(name)
         bound = owner.names.get(name) if owner is not None else None
         return bound is not None and _can_change(bound.value)
+
+    def stands_for(self, name: str, value: Value) -> bool:
+        """Whether a value is what a name stands for: returned is M, and not M.inv()."""
+        bound = self.names[name]
+        return self._is_same(bound.reference, value) or self._is_same(bound.value, value)
 
     def is_bare_zero(self, name: str) -> bool:
         """Whether a name is bound to a zero of the states' shape, which ``K[...] =`` replaces."""
@@ -442,7 +463,7 @@ class Scope:
             case Matrix():
                 raise UnreadError("a matrix in place of a number is not read")
             case Part(vector, places, False):
-                return self.entry_of_state(vector, places[0])
+                return self.entry_of_state(value.number, vector, places[0])
             case Function(name=name) | Library(name) | Module(name):
                 raise UnreadError(f"{name} is a function or a module")
         raise UnreadError("something in place of a number is not read")
@@ -477,11 +498,11 @@ class Scope:
     def _outermost(self) -> Scope:
         return self if self.outer is None else self.outer._outermost()
 
-    def entry_of_state(self, vector: str, place: int) -> Scalar:
+    def entry_of_state(self, number: int, vector: str, place: int) -> Scalar:
         """Return the joint variable that an entry of a state was said to be."""
-        if (vector, place) not in self.taken:
+        if (number, vector, place) not in self.record.taken:
             raise UnreadError(f"entry {place + 1} of {vector} is read, of which is not known what it holds")
-        return self.known(self.taken[vector, place])
+        return self.known(self.record.taken[number, vector, place])
 
     def entry(self, value: Value, index: Index) -> Value:
         """Return an entry of a matrix, of a vector of the robot's, or of a state."""
@@ -497,7 +518,7 @@ class Scope:
                     scalar = self.known(f"{plain_name(name)}{place + 1}")
                     return replace(scalar, uses=scalar.uses | value.uses | {key})
                 if is_argument or not self.robot.vocabulary.knows(name):
-                    return Part(name, (place,))
+                    return Part(name, (place,), number=value.number)
                 raise UnreadError(f"an entry of {name} is read, which is not a vector of the robot's")
         raise UnreadError("an entry of what is not a matrix is not read")
 

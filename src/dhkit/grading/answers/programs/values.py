@@ -143,6 +143,10 @@ class Given:
         Whether it is a function's argument, which may be a structure or a state.
     is_symbol
         Whether the program made a symbol of this name.
+    is_constant
+        Whether it is a symbol that is no function of time: its derivative by t is 0.
+    number
+        Which call of a function it is an argument of; 0 for none.
     uses
         Names of the program by which it goes.
     """
@@ -150,6 +154,8 @@ class Given:
     name: str
     is_argument: bool = False
     is_symbol: bool = False
+    is_constant: bool = False
+    number: int = field(default=0, compare=False)
     uses: frozenset[str] = field(default=frozenset(), compare=False)
 
 
@@ -165,11 +171,14 @@ class Part:
         Places of the entries, from 0.
     is_slice
         Whether it is a vector, and not a scalar.
+    number
+        That of the argument which the vector is.
     """
 
     vector: str
     places: tuple[int, ...]
     is_slice: bool = False
+    number: int = 0
 
 
 @dataclass(frozen=True)
@@ -211,8 +220,12 @@ class Function:
         Where it is defined.
     problem
         Why it cannot be read; empty where it can.
-    changes
-        Names outside, or arguments, that it may change; "?" for any that it is given.
+    default_names
+        Names in the defaults.
+    outer
+        The names among which it was defined; None for the program's.
+    captured
+        What other names stood for when it was made: a handle of MATLAB's.
     """
 
     name: str
@@ -221,7 +234,9 @@ class Function:
     line: str
     defaults: Mapping[str, Value] = field(default_factory=dict)
     problem: str = ""
-    changes: frozenset[str] = frozenset()
+    default_names: frozenset[str] = frozenset()
+    outer: Any = None
+    captured: Mapping[str, Value] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -431,6 +446,8 @@ def calculated(left: Value, sign: str, right: Value, power: str = "^") -> Value:
 
 def _of_two_matrices(left: Matrix, sign: str, right: Matrix, power: str) -> Value:
     multiplies_entries = left.multiplies_entries or right.multiplies_entries
+    if sign in ("*", "/") and left.multiplies_entries != right.multiplies_entries:
+        raise UnreadError(f"{sign!r} between matrices of two libraries is not read")
     if sign == "@" or (sign == "*" and not multiplies_entries):
         return product(left, right, power)
     plain = sign.removeprefix(".")
