@@ -39,6 +39,7 @@ from dhkit.kernels import Kernel
 from dhkit.kinematics.programs import kinematic_kernels
 from dhkit.lab.assignment import Goal, JointsAt, MotionBetween, OwnScore, Step, ToolAt
 from dhkit.planning.certificate import Check
+from dhkit.programs.isolation import Kind
 from dhkit.symbolic.exact.regressor import regressor
 from dhkit.symbolic.textbook_kinematics import TextbookKinematics
 from dhkit.trajectories.pieces import Pieces
@@ -400,6 +401,7 @@ VALUES = {
     # programs
     programs.CheckReport: check,
     programs.CheckRubric: programs.CheckRubric,
+    programs.Isolation: lambda: programs.Isolation(Kind.NONE, HOSTILE),
     programs.Limits: programs.Limits,
     programs.Part: lambda: check().functions["ik"][1],
     programs.Program: lambda: programs.Program(written("mine.py", "def fk(q):\n    return q\n")),

@@ -18,7 +18,7 @@ import pytest
 import dhkit.arm
 from acceptance import ACCEPTING
 from dhkit import Arm
-from dhkit.programs import check, isolation as isolation_module, program as program_module
+from dhkit.programs import check, isolation as isolation_module, other_user, program as program_module
 from dhkit.programs.caller import Caller
 from dhkit.programs.isolation import Isolation, IsolationError, Kind, find_isolation
 from dhkit.programs.process import Failure, Limits, ProgramError
@@ -268,7 +268,7 @@ SYSTEM_PYTHON = f"/usr/bin/python3.{sys.version_info.minor}"
 
 @pytest.mark.skipif(os.geteuid() != 0 or not Path(SYSTEM_PYTHON).exists(), reason="only root runs it as another user")
 def test_another_user_reads_nothing_of_ours_and_leaves_nothing(program, tmp_path, monkeypatch):
-    monkeypatch.setattr(isolation_module, "_base_python", lambda: SYSTEM_PYTHON)
+    monkeypatch.setattr(sys, "_base_executable", SYSTEM_PYTHON)
     tmp_path.chmod(0o755)
     for folder in list(tmp_path.parents)[:-2]:
         folder.chmod(0o755)
@@ -283,9 +283,9 @@ def test_another_user_reads_nothing_of_ours_and_leaves_nothing(program, tmp_path
     )
     one = program(text, isolation=Isolation(Kind.USER), limits=Limits(20.0))
     user = one.call("fk", q=[1.0])
-    assert user >= isolation_module.FIRST_USER and isolation_module.processes_of(int(user))
+    assert user >= other_user.FIRST_USER and other_user.processes_of(int(user))
     one.close()
-    assert not isolation_module.processes_of(int(user)) and not Path("/var/tmp/dhkit-left").exists()
+    assert not other_user.processes_of(int(user)) and not Path("/var/tmp/dhkit-left").exists()
     assert "can read" in isolation_module._problem_of_user([str(tmp_path)])
 
 

@@ -23,8 +23,10 @@ import psutil
 
 from dhkit.errors import DhkitError
 from dhkit.grading.isolation import WAITING_FACTOR
-from dhkit.programs.isolation import Isolation, Kind, end_processes_of, remove_files_of
+from dhkit.programs.isolated_commands import folder_inside, isolated_command
+from dhkit.programs.isolation import Isolation, Kind
 from dhkit.programs.launcher import MAX_PROCESSES
+from dhkit.programs.other_user import end_processes_of, next_user, remove_files_of
 
 HERE = Path(__file__).parent
 MAX_LINE_BYTES = 1 << 22
@@ -157,7 +159,7 @@ class Process:
     ) -> None:
         self.failure: Failure | None = None
         self._limits = limits
-        self._user = isolation.user()
+        self._user = next_user() if isolation.kind is Kind.USER else 0
         self._has_own_root = isolation.kind is Kind.BUBBLEWRAP
         self._folder = tempfile.TemporaryDirectory(prefix="dhkit-program-", ignore_cleanup_errors=True)
         try:
@@ -256,7 +258,7 @@ class Process:
 
     def _start(self, command: Callable[[Path], list[str]], isolation: Isolation, shown: Iterable[Path]) -> None:
         folder = Path(self._folder.name).resolve()
-        program = isolation.command(command(folder), folder, shown)
+        program = isolated_command(isolation, command(folder), folder, shown)
         if self._user:
             for path in (folder, *folder.rglob("*")):
                 os.chown(path, self._user, self._user, follow_symlinks=False)
@@ -275,7 +277,7 @@ class Process:
                 stderr=subprocess.STDOUT,
                 pass_fds=(requests, answers),
                 cwd=folder,
-                env=_environment(isolation.folder(folder)),
+                env=_environment(folder_inside(isolation, folder)),
                 start_new_session=True,
             )
         finally:

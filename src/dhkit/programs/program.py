@@ -16,6 +16,7 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.display import repr_line
+from dhkit.programs.isolated_commands import folder_inside, python_command, runner_inside
 from dhkit.programs.isolation import Isolation, find_isolation
 from dhkit.programs.process import HERE, CallTime, Failure, Limits, Process, ProgramError, printable
 
@@ -267,16 +268,16 @@ class Program:
             (folder / source.name).write_bytes(source.read_bytes())
         except OSError as error:
             raise ProgramError(f"{source}: {error.strerror}", Failure.UNREADABLE) from None
-        inside = str(self.isolation.folder(folder) / source.name)
+        inside = str(folder_inside(self.isolation, folder) / source.name)
         if source.suffix == ".py":
-            return [*self.isolation.python(HERE / "python_runner.py", folder), inside]
+            return [*python_command(self.isolation, HERE / "python_runner.py", folder), inside]
         if source.suffix == ".m":
             octave = shutil.which("octave-cli") or shutil.which("octave")
             if octave is None:
                 raise ProgramError(
                     f"{source.name}: GNU Octave, which runs .m files, is not installed", Failure.UNREADABLE
                 )
-            runner = self.isolation.runner(HERE / "octave_runner.m", folder)
+            runner = runner_inside(self.isolation, HERE / "octave_runner.m", folder)
             return [octave, "--no-gui", "--quiet", "--norc", "--no-history", str(runner), inside]
         raise ProgramError(f"{source}: expected a .py or .m file", Failure.UNREADABLE)
 

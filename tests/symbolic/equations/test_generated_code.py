@@ -40,7 +40,7 @@ gravity = [0, "-g1", 0]
 [parameters]
 g1 = 9.81
 c1 = 0.5
-q1 = 2.0
+qdd1 = 2.0
 qd2 = 1.5
 int = 0.4
 end = 0.3
@@ -55,7 +55,7 @@ a = "c1"
 alpha = 0
 d = "NAN"
 theta = "lambda"
-body = { mass = "q1", com = ["-p", "M", 0], inertia = { yy = "q1*c1^2/12", zz = "q1*c1^2/12" } }
+body = { mass = "qdd1", com = ["-p", "M", 0], inertia = { yy = "qdd1*c1^2/12", zz = "qdd1*c1^2/12" } }
 
 [[joint]]
 type = "prismatic"
@@ -63,7 +63,7 @@ a = "sqrt(int)"
 alpha = "end"
 d = 0
 theta = 0
-body = { mass = "qd2/(q1 + qd2)", com = ["-int/2", 0, "end"], inertia = { xx = 1, yy = 1, zz = "1 + abs(sin(p))/7" } }
+body = { mass = "qd2/(qdd1 + qd2)", com = ["-int/2", 0, "end"], inertia = { xx = 1, yy = 1, zz = "1 + abs(sin(p))/7" } }
 """
 
 

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from dhkit.grading.answers.programs.scope import Scope
 from dhkit.grading.answers.programs.values import (
+    ZERO,
     Given,
     Matrix,
     Scalar,
     Several,
+    Text,
     UnreadError,
     Value,
     applied,
     calculated,
     identity,
     matrix_of,
+    number,
     transposed,
     vector_of,
     zeros,
@@ -75,10 +79,19 @@ def called(scope: Scope, function: str, arguments: Sequence[Value], of_numpy: bo
             return transposed(matrix)
         case ("dot" | "matmul", [Matrix() as left, Matrix() as right]):
             return calculated(left, "@", right, scope.record.power)
-        case ("Rational", [_, *_]):
-            return _rational(arguments)
+        case ("sum", [Matrix() as terms]) if terms.is_flat:
+            total: Value = ZERO
+            for term in terms.entries.values():
+                total = term if total is ZERO else calculated(total, "+", term, scope.record.power)
+            return total
+        case ("Rational", [Text(text)]) if match := re.fullmatch(r"(-?\d{1,15})/(\d{1,15})", text, re.ASCII):
+            return calculated(number(match[1]), "/", number(match[2]))
+        case ("float" | "float64", [Scalar() as x]):
+            return x
         case ("Integer" | "int", [Scalar() as x]) if x.text.isdecimal():
             return x
+        case ("Rational", [_, *_]):
+            return _rational(arguments)
         case ("Float" | "S" | "float" | "float64", [Scalar() as x]) if x.number is not None:
             return x
         case ("S" | "sympify", [Scalar() as x]):

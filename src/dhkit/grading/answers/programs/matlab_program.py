@@ -374,7 +374,8 @@ class MatlabProgram:
                 scope.change(name, f"{name[:40]} is changed by {word!r} in {line}", only_matrices=False)
         elif word in ("clear", "clearvars"):
             named = [name for name in statement.command_names if name in scope.names]
-            for name in named if statement.command_names else list(scope.names):
+            bound = [name for name, one in scope.names.items() if not isinstance(one.value, Function)]
+            for name in named if statement.command_names else bound:
                 scope.change(name, f"{name[:40]} is cleared in {line}", only_matrices=False)
         elif word == "syms":
             self._syms(tokens[0].words, scope, line)
@@ -452,6 +453,8 @@ class MatlabProgram:
 
     def _assign_several(self, statement: MatlabStatement, left: Tokens, right: Tokens, scope: Scope, line: str) -> None:
         """Read ``[M, C] = dynamics(q, qd)`` and ``[a, b] = deal(1, 2)``."""
+        if not right:
+            raise self._refuse(statement, "found nothing behind '='")
         targets = [entry for row in split_rows(left[1:-1]) for entry in row]
         names = [entry[0].text if len(entry) == 1 else "" for entry in targets]
         values: Sequence[Value] = ()
@@ -571,7 +574,7 @@ class _Expression:
             entries = [self.scope.scalar(self.scope.entry(value, (k,))) for k in range(robot.n)]
             return matrix_of([[entry] for entry in entries])
         if isinstance(value, Matrix):
-            return _as_row(value)
+            return next(iter(value.entries.values())) if len(value.entries) == 1 else _as_row(value)
         return self.scope.scalar(value)
 
     def sum(self) -> Value:
@@ -769,6 +772,8 @@ class _Expression:
         for name in (match[1], "t"):
             self.scope.key_of(name)
         value = self.scope.value(match[1])
+        if isinstance(value, Given) and value.is_constant:
+            raise UnreadError(f"diff({text[:40]}): {match[1]} is a symbol and no function of t: its derivative is 0")
         name = value.name if isinstance(value, Given) else value.text if isinstance(value, Scalar) else ""
         vocabulary = self.program.record.robot.vocabulary
         plain = plain_name(name)

@@ -308,7 +308,7 @@ class _ProgramAnswers:
             bound = main.names.get(name)
             if bound is None or isinstance(bound.value, Function) or self.record.robot.is_reserved(name):
                 continue
-            if isinstance(bound.value, Matrix) or (name != one.name and isinstance(bound.value, Given)):
+            if isinstance(bound.value, Matrix | Structure) or (name != one.name and isinstance(bound.value, Given)):
                 continue
             if isinstance(bound.value, Scalar) and self.quantities.is_scalar(one.target.quantity):
                 continue

@@ -31,8 +31,8 @@ from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 
 UNBOUNDED = word_set(
     """
-    exec eval compile globals locals vars setattr delattr getattr execfile run_line_magic import_module
-    get_ipython run_cell_magic run_path run_module modules builtins inspect gc f_globals f_locals f_back user_ns
+    exec eval compile globals locals vars setattr delattr getattr execfile run_line_magic import_module get_ipython
+    run_cell_magic run_path run_module modules builtins inspect gc f_globals f_locals f_back user_ns
     """
 )
 """Names and attributes with which a program may change any name of its own."""
@@ -41,12 +41,12 @@ HARMLESS_DUNDER = frozenset(("__name__", "__file__", "__doc__", "__version__", "
 
 NEW = (frozenset(FUNCTION_NAMES) - {"max", "min"}) | word_set(
     """
-    Matrix ImmutableMatrix array matrix zeros eye ones full zeros_like ones_like identity arange linspace diag
-    symbols Symbol dynamicsymbols Function diff Derivative lambdify latex pycode ccode inv pinv solve lstsq det cross
-    dot matmul norm cond eig eigh eigvals eigvalsh trace rank concatenate vstack hstack stack column_stack block_diag
-    outer kron DM SX MX vertcat horzcat jacobian gradient hessian mtimes print len range str repr float int round abs
-    bool complex isinstance type allclose isclose deg2rad rad2deg N nsimplify Rational Integer Float S integrate
-    solve_ivp odeint time perf_counter random seed format ValueError Exception
+    Matrix ImmutableMatrix array matrix zeros eye ones full zeros_like ones_like identity arange linspace diag symbols
+    Symbol dynamicsymbols Function diff Derivative lambdify latex pycode ccode fcode octave_code srepr inv pinv solve
+    lstsq det cross dot matmul norm cond eig eigh eigvals eigvalsh trace rank concatenate vstack hstack stack
+    column_stack block_diag outer kron DM SX MX vertcat horzcat jacobian gradient hessian mtimes print len range str
+    repr float int round abs bool complex isinstance type allclose isclose deg2rad rad2deg N nsimplify Rational Integer
+    Float S integrate solve_ivp odeint time perf_counter random seed format ValueError Exception
     """
 )
 """Functions that only calculate, and whose result shares no entry with what they are given."""
@@ -69,7 +69,8 @@ QUIET_METHODS = QUIET | word_set(
     """
     subs evalf T tolist join xreplace rewrite coeff n row col is_symmetric conjugate mean astype values keys items get
     split strip lower upper has free_symbols equals multiply adjugate cofactor LUsolve LDLsolve minor charpoly
-    applyfunc sym as_expr args eigenvects nullspace copy set_xlabel set_ylabel set_title set_xlim set_ylim add_subplot
+    applyfunc sym as_expr args eigenvals eigenvects singular_values nullspace columnspace rref copy set_xlabel
+    set_ylabel set_title set_xlim set_ylim add_subplot
     """
 )
 """Methods of libraries' objects that change neither their object nor their arguments."""
@@ -117,15 +118,15 @@ def names_in(node: ast.AST) -> list[str]:
 def assigned_names(node: ast.AST) -> Iterator[str]:
     """Yield all names that a piece of a program binds or deletes, or whose parts it assigns, however deep."""
     yield from bound_names(node)
-    for inner in ast.walk(node):
+    for inner in without_functions(node):
         match inner:
             case ast.Subscript(_, _, ast.Store() | ast.Del()) | ast.Attribute(_, _, ast.Store() | ast.Del()):
                 yield from names_in(inner)[:1]
 
 
 def bound_names(node: ast.AST) -> Iterator[str]:
-    """Yield all names that a piece of a program binds or deletes, however deep."""
-    for inner in ast.walk(node):
+    """Yield all names that a piece of a program binds or deletes, however deep, but not inside functions."""
+    for inner in without_functions(node):
         match inner:
             case ast.Name(name, ast.Store() | ast.Del()):
                 yield name
@@ -187,7 +188,13 @@ class Changes:
         self.main = main
         self.classes: set[str] = set()
         """Names of the program's classes: what their methods do is not read."""
+        self.imported: dict[str, str] = {}
+        """Functions of libraries that are not read, by the names that they are imported under."""
+        self.compiled: set[str] = set()
+        """Names of functions that ``lambdify`` has made."""
         self._visited: set[int] = set()
+        self._known: dict[tuple[int, int], frozenset[str]] = {}
+        """What functions change, by function and by the number of names that the program has bound."""
 
     def of(self, nodes: Iterable[ast.AST], scope: Scope, local: Iterable[str] = ()) -> Effects:
         """Return the effects of pieces of a program.
@@ -203,33 +210,39 @@ class Changes:
         """
         piece = _Piece(self, scope, frozenset(local))
         for node in nodes:
-            for inner in _without_functions(node):
+            for inner in without_functions(node):
                 piece.note(inner)
         return piece.effects
 
     def of_function(self, function: Function) -> frozenset[str]:
         """Return the names outside a function, and its arguments, that it may change."""
+        key = id(function), len(self.main.names)
         if id(function) in self._visited:
             return frozenset()
-        self._visited.add(id(function))
-        try:
-            body = function.definition
-            nodes = [body] if isinstance(body, ast.expr) else body
-            local = {ascii_name(name) for node in nodes for name in bound_names(node)}
-            outer = {
-                name
-                for node in nodes
-                for inner in ast.walk(node)
-                if isinstance(inner, ast.Global | ast.Nonlocal)
-                for name in inner.names
-            }
-            effects = self.of(nodes, self.main, local | set(function.parameters))
-            for name, value in function.defaults.items():
-                effects.share(name, value.names if isinstance(value, Unread) else function.default_names)
-            kept = (local - set(function.parameters)) - outer
-            return frozenset(effects.reached() - kept) | frozenset(outer)
-        finally:
-            self._visited.discard(id(function))
+        if key not in self._known:
+            self._visited.add(id(function))
+            try:
+                self._known[key] = self._of_function(function)
+            finally:
+                self._visited.discard(id(function))
+        return self._known[key]
+
+    def _of_function(self, function: Function) -> frozenset[str]:
+        body = function.definition
+        nodes = [body] if isinstance(body, ast.expr) else body
+        local = {ascii_name(name) for node in nodes for name in bound_names(node)}
+        outer = {
+            name
+            for node in nodes
+            for inner in ast.walk(node)
+            if isinstance(inner, ast.Global | ast.Nonlocal)
+            for name in inner.names
+        }
+        effects = self.of(nodes, self.main, local | set(function.parameters))
+        for name, value in function.defaults.items():
+            effects.share(name, value.names if isinstance(value, Unread) else function.default_names)
+        kept = (local - set(function.parameters)) - outer
+        return frozenset(effects.reached() - kept) | frozenset(outer)
 
     def mentioned(self, names: Iterable[str], scope: Scope) -> set[str]:
         """Return names, with those in the bodies of functions and in what is not read that they stand for."""
@@ -267,7 +280,7 @@ def _names_of(value: Value) -> Iterator[str]:
             yield from inside
 
 
-def _without_functions(node: ast.AST) -> Iterator[ast.AST]:
+def without_functions(node: ast.AST) -> Iterator[ast.AST]:
     """Yield a node and all inside it, but of functions only themselves: their bodies are not executed with it."""
     waiting = [node]
     while waiting:
@@ -406,6 +419,8 @@ class _Piece:
             case ast.Name(name):
                 if name in self.local:
                     return ""
+                if name in self.changes.imported and isinstance(value_of(ascii_name(name), self.scope), Unread):
+                    return self.changes.imported[name]
                 match value_of(ascii_name(name), self.scope):
                     case None:
                         return "" if self.scope.owner(ascii_name(name)) is not None else name
@@ -443,6 +458,8 @@ class _Piece:
                 match value_of(ascii_name(name), self.scope):
                     case Function() as function:
                         return not self.changes.of_function(function)
+                    case Unread() if name in self.changes.compiled:
+                        return True
                     case Structure():  # a class of fields alone makes objects
                         return True
             case ast.Attribute(inner, method):

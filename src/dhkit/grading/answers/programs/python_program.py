@@ -19,13 +19,17 @@ from dhkit.grading.answers.programs.python_changes import (
     is_unbounded,
     names_in,
     value_of,
+    without_functions,
 )
 from dhkit.grading.answers.programs.scope import Record, Scope
 from dhkit.grading.answers.programs.values import (
     MAX_INDEX,
+    ONE,
+    ZERO,
     Function,
     Given,
     Index,
+    Level,
     Library,
     Matrix,
     Module,
@@ -55,6 +59,8 @@ MODULES = word_set(
     """
 )
 """Modules whose sin is the sine, and whose other functions mean what their names say."""
+KNOWN_PACKAGES = ("numpy", "scipy", "sympy", "casadi", "matplotlib", "IPython", "mpmath", "math", "time", "pprint")
+"""Packages whose functions are told by their names."""
 NUMPY = ("numpy", "jax.numpy", "autograd.numpy", "numpy.lib.scimath", "pylab", "np")
 """Modules whose matrices multiply entry by entry."""
 EXPORTED_LETTERS = frozenset("EINOQSe")
@@ -77,6 +83,7 @@ ARRAYS = word_set("array asarray asanyarray")
 CASADI = word_set("DM SX MX vertcat horzcat")
 """Matrices of casadi, which multiply entry by entry."""
 SYMBOLS = frozenset(("symbols", "Symbol", "dynamicsymbols", "var", "Dummy"))
+NUMBERS_OF_SYMPY = {"Half": Scalar("1/2", Level.PRODUCT, 0.5), "One": ONE, "Zero": ZERO, "Pi": Scalar("pi")}
 SIGNS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "^", ast.MatMult: "@"}
 PLAIN_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
@@ -266,6 +273,12 @@ class PythonProgram:
             case ast.Name(name) if isinstance(value, ast.Lambda):
                 self._define(name, value.args, value.body, scope, line)
             case ast.Name(name):
+                if (
+                    isinstance(value, ast.Call)
+                    and _last(value.func) == "lambdify"
+                    and self._is_library(value.func, scope)
+                ):
+                    self.changes.compiled.add(name)
                 scope.bind(ascii_name(name), self._right_side(value, scope, line), line)
             case ast.Tuple(targets) | ast.List(targets):
                 self._assign_several(targets, value, scope, line)
@@ -351,7 +364,7 @@ class PythonProgram:
     def _import(self, alias: ast.alias, scope: Scope, line: str) -> None:
         first = alias.name.split(".")[0]
         name, module = alias.asname or first, alias.name if alias.asname else first
-        harmless = module.split(".")[0] in ("matplotlib", "scipy", "time", "os", "sys", "IPython")
+        harmless = module.split(".")[0] in (*KNOWN_PACKAGES, "os", "sys")
         if module in MODULES or harmless:
             scope.bind(ascii_name(name), Module(module), line)
         else:
@@ -428,9 +441,8 @@ class PythonProgram:
         elif not isinstance(body, ast.expr) and any(map(_ends, body)):
             problem = f"{name} ends by an exception, in {line}"
         elif not isinstance(body, ast.expr):
-            returns = [
-                x for statement in body[:-1] for x in ast.walk(statement) if isinstance(x, ast.Return | ast.Yield)
-            ]
+            kinds = ast.Return | ast.Yield
+            returns = [x for statement in body[:-1] for x in without_functions(statement) if isinstance(x, kinds)]
             if returns or isinstance(body[-1], ast.If | ast.For | ast.While | ast.Try | ast.With):
                 problem = f"{name} has 'return' in a branch or several, in {line}" if _returns_inside(body) else ""
         defaults_of = [x for _, default in pairs if default is not None for x in names_in(default)]
@@ -630,6 +642,8 @@ class PythonProgram:
                 return Library(f"numpy.{name}" if module in NUMPY else name)
             case Matrix() if name == "T":
                 return transposed(value)
+            case Library("S") if name in NUMBERS_OF_SYMPY:
+                return NUMBERS_OF_SYMPY[name]
         return scope.field(value, name)
 
     def _subscript(self, inner: ast.expr, index: ast.expr, scope: Scope) -> Value:
@@ -640,7 +654,7 @@ class PythonProgram:
             return value
         numbers = constant_index(index)
         if numbers is None:
-            return self._slice(value, index, scope)
+            return self._slice(value, self._with_numbers(index, scope), scope)
         if isinstance(value, Several) and len(numbers) == 1 and numbers[0] < len(value.values):
             return value.values[numbers[0]]
         if isinstance(value, Matrix) and len(numbers) == 1 and not value.is_flat and 1 not in value.shape:
@@ -651,6 +665,17 @@ class PythonProgram:
                 raise UnreadError(f"{self._quote(index)} is an index that the matrix does not have")
             return vector_of(value.rows[k], is_list=value.is_list, multiplies_entries=value.multiplies_entries)
         return scope.entry(value, numbers)
+
+    def _with_numbers(self, index: ast.expr, scope: Scope) -> ast.expr:
+        """Return a slice with names of whole numbers as the numbers: ``:n`` as ``:2``."""
+        if not isinstance(index, ast.Slice):
+            return index
+        ends: list[ast.expr | None] = []
+        for end in (index.lower, index.upper):
+            known = self._value_or_none(end, scope) if isinstance(end, ast.Name) else None
+            is_whole = isinstance(known, Scalar) and known.number is not None and known.text.isdecimal()
+            ends.append(ast.Constant(int(known.text[:6])) if isinstance(known, Scalar) and is_whole else end)
+        return ast.copy_location(ast.Slice(ends[0], ends[1], index.step), index)
 
     def _slice(self, value: Value, index: ast.expr, scope: Scope) -> Value:
         """Return M[:3, 3] of a matrix, and x[:2] of a vector."""
@@ -679,7 +704,7 @@ class PythonProgram:
     # Calls
 
     def _call(self, node: ast.Call, scope: Scope) -> Value:
-        if any(isinstance(x, ast.Starred) for x in node.args) or any(k.arg is None for k in node.keywords):
+        if any(k.arg is None for k in node.keywords):
             raise UnreadError(f"{self._quote(node)} is not read")
         derivative = self._time_derivative(node, scope)
         if derivative is not None:
@@ -700,6 +725,8 @@ class PythonProgram:
                 line = self.line(node)
                 given = {str(k.arg): self._right_side(k.value, scope, line) for k in node.keywords}
                 return Structure({**fields, **given})
+            case Library() | Given() if any(isinstance(x, ast.Starred) for x in node.args):
+                raise UnreadError(f"{self._quote(node)} is not read")
             case Library(name):
                 return self._used(self._library_call(name, node, scope), node, scope)
             case Given(name) if isinstance(node.func, ast.Name):
@@ -776,6 +803,8 @@ class PythonProgram:
                     for row in ([list(x.entries.values())] if x.is_flat else x.rows)
                 ]
                 return matrix_of(rows, multiplies_entries=of_numpy)
+            case [Several(values)] if not of_numpy and values and all(isinstance(x, Given) for x in values):
+                return matrix_of([[scope.scalar(x)] for x in values])
             case [Given() as vector] if of_numpy:
                 return vector
         if name == "vertcat" and arguments:
@@ -787,22 +816,43 @@ class PythonProgram:
         if self.changes.of_function(function):
             raise UnreadError(f"{function.name}(...) is a function that may change other names, and is not read")
         values: dict[str, Value] = dict(function.defaults)
-        if len(node.args) > len(function.parameters):
+        arguments = [x for argument in node.args for x in self._arguments(argument, scope)]
+        if len(arguments) > len(function.parameters):
             raise UnreadError(f"{function.name}(...) is called with too many arguments")
-        for name, argument in zip(function.parameters, node.args, strict=False):
-            values[name] = self.value(argument, scope)
+        values |= dict(zip(function.parameters, arguments, strict=False))
         for keyword in node.keywords:
-            values[ascii_name(str(keyword.arg))] = self.value(keyword.value, scope)
+            name = ascii_name(str(keyword.arg))
+            if name not in function.parameters[len(arguments) :]:
+                raise UnreadError(f"{function.name}(...) is called with {name[:40]}, which it does not take")
+            values[name] = self.value(keyword.value, scope)
         missing = [name for name in function.parameters if name not in values]
         if missing:
             raise UnreadError(f"{function.name}(...) is called without {missing[0]}")
         return self._used(self.apply(function, values), node, scope)
+
+    def _arguments(self, node: ast.expr, scope: Scope) -> list[Value]:
+        """Return an argument, or several of ``*row``."""
+        if not isinstance(node, ast.Starred):
+            return [self.value(node, scope)]
+        match self.value(node.value, scope):
+            case Matrix() as row if row.is_flat:
+                return list(row.entries.values())
+            case Several(values):
+                return list(values)
+        raise UnreadError(f"{self._quote(node)} is not read")
 
     def _method(self, value: Value, method: str, node: ast.Call, scope: Scope) -> Value:
         arguments = node.args
         match value, method:
             case Matrix(), "transpose" if not arguments:
                 return transposed(value)
+            case Library("SX" | "MX" | "DM"), "sym":
+                return self._casadi_symbol(node, scope)
+            case Matrix(), "dot" if len(arguments) == 1 and not value.multiplies_entries and 1 in value.shape:
+                other = self._operand(arguments[0], scope)
+                if not isinstance(other, Matrix) or other.entries.keys() != value.entries.keys():
+                    raise UnreadError(f"{self._quote(node)} is not read")
+                return calculated(transposed(value), "@", other, self.record.power)
             case Matrix(), "dot" if len(arguments) == 1:
                 return calculated(value, "@", self._operand(arguments[0], scope), self.record.power)
             case _, "flatten" | "ravel" | "squeeze" if not arguments:
@@ -818,6 +868,20 @@ class PythonProgram:
                 if plain and not {k.arg for k in node.keywords} & NOT_UNCHANGING:
                     return unchanged(value)
         raise UnreadError(f"{self._quote(node)} is not read")
+
+    def _is_time(self, node: ast.expr, scope: Scope) -> bool:
+        """Whether an expression is the time: t, unless the program gives this name to something else."""
+        match node:
+            case ast.Name("t"):
+                bound = value_of("t", scope)
+                return bound is None or (isinstance(bound, Given) and bound.name == "t")
+            case ast.Attribute(ast.Name(), "_t"):
+                return True
+        return False
+
+    def _is_library(self, node: ast.expr, scope: Scope) -> bool:
+        """Whether an expression is a library's function."""
+        return isinstance(self._value_or_none(node, scope), Library | Given)
 
     def _is_unchanging(self, node: ast.expr, scope: Scope) -> bool:
         """Whether an argument is a library's function that writes an expression in another way."""
@@ -847,6 +911,17 @@ class PythonProgram:
             return symbols[0]
         return Several(symbols, tuple(names))
 
+    def _casadi_symbol(self, node: ast.Call, scope: Scope) -> Value:
+        """Return the symbol of SX.sym("q1"), and the robot's vector of SX.sym("q", 2)."""
+        match node.args:
+            case [ast.Constant(str(name))]:
+                return Given(name, is_symbol=True, is_constant=True)
+            case [ast.Constant(str(name)), ast.Constant(int(n))] if n == self.record.robot.n:
+                vector = Given(name, is_symbol=True)
+                rows = [[scope.scalar(scope.entry(vector, (k,)))] for k in range(n)]
+                return matrix_of(rows, multiplies_entries=True)
+        raise UnreadError(f"{self._quote(node)} is not read")
+
     def _of_time(self, node: ast.Call, scope: Scope) -> Value:
         """Return Function('q1')(t), and symbols('q1', cls=Function)(t)."""
         inner = node.func
@@ -875,11 +950,11 @@ class PythonProgram:
                 return None
         order = 0
         match arguments[1:]:
-            case [time] if _is_time(time):
+            case [time] if self._is_time(time, scope):
                 order = 1
-            case [time, ast.Constant(2)] | [ast.Tuple([time, ast.Constant(2)])] if _is_time(time):
+            case [time, ast.Constant(2)] | [ast.Tuple([time, ast.Constant(2)])] if self._is_time(time, scope):
                 order = 2
-            case [time, other] if _is_time(time) and _is_time(other):
+            case [time, other] if self._is_time(time, scope) and self._is_time(other, scope):
                 order = 2
         if not order:
             raise UnreadError(f"{self._quote(node)} is not read")
@@ -982,7 +1057,7 @@ def _chosen(index: ast.expr, length: int) -> range:
 
 def _symbol_names(text: str) -> list[str]:
     names: list[str] = []
-    for piece in re.split(r"[\s,]+", text.strip().strip(",")):
+    for piece in map(ascii_name, re.split(r"[\s,]+", text.strip().strip(","))):
         span = re.fullmatch(r"(\w*?)\(?(\d*):(\d+)\)?", piece)
         if span and int(span[3][:6]) <= MAX_SYMBOLS:
             names += [f"{span[1]}{k}" for k in range(int(span[2] or 0), int(span[3]))]
@@ -1047,18 +1122,10 @@ def _is_ellipsis(indices: Sequence[ast.expr]) -> bool:
     return False
 
 
-def _is_time(node: ast.expr) -> bool:
-    match node:
-        case ast.Name("t") | ast.Attribute(ast.Name(), "_t"):
-            return True
-    return False
-
-
 def _returns_inside(body: Sequence[ast.stmt]) -> bool:
     """Whether a function returns anywhere but at its end."""
-    inner = [
-        x for statement in body for x in ast.walk(statement) if isinstance(x, ast.Return | ast.Yield | ast.YieldFrom)
-    ]
+    kinds = ast.Return | ast.Yield | ast.YieldFrom
+    inner = [x for statement in body for x in without_functions(statement) if isinstance(x, kinds)]
     return len(inner) > (1 if isinstance(body[-1], ast.Return) else 0)
 
 

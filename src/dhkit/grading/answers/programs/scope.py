@@ -303,7 +303,12 @@ class Scope:
             places = ", ".join(str(place + 1) for place in value.places)
             raise UnreadError(f"{name} is entry {places} of {value.vector}, of which is not known what it holds")
         for place, variable in zip(value.places, names, strict=True):
-            known = self.record.taken.setdefault((value.number, value.vector, place), variable)
+            taken = self.record.taken
+            known = taken.setdefault((value.number, value.vector, place), variable)
+            for (number, vector, other), taken_by in taken.items():
+                is_elsewhere = (number, vector) == (value.number, value.vector) and other != place
+                if is_elsewhere and robot.is_same(taken_by, variable):
+                    raise UnreadError(f"{name} is entry {place + 1} of {value.vector}, and entry {other + 1} elsewhere")
             if not robot.is_same(known, variable):
                 raise UnreadError(f"{name} is an entry of {value.vector} that is {known} too")
         return Given(name) if value.is_slice else Scalar(name)
@@ -431,6 +436,8 @@ class Scope:
             if owner.key(name) in self.record.broken:
                 raise UnreadError(self.record.broken[owner.key(name)])
             bound = owner.names[name]
+            if isinstance(bound.reference, Matrix) and not bound.reference.entries:
+                raise UnreadError(f"{name} is read before it is filled")
             if isinstance(bound.reference, Unread):
                 raise UnreadError(bound.reference.reason)
             return bound.reference
