@@ -606,7 +606,7 @@ def test_functions_and_symbols_of_python(tmp_path, text):
         ("V = m1(l1)", r"m1\(\.\.\.\) is not read"),
         ("V = q[-1]*m1", "not read"),
         ("V = m1*'2'", "not read"),
-        ("V = max(m1, m2)", "max"),
+        ("V = argmax([m1, m2])", "not read"),
         ("V = x.m1*g", "unknown|not read|no parameter"),
         ("q1, q2 = q[1], q[0]\nV = m1*cos(q1)", "robot's own name"),
         ("q = [q2, q1]\nq1 = q[0]\nV = m1*cos(q1)", "own name|changed"),
