@@ -24,7 +24,7 @@ gravity = [0, "-g1", 0]
 [parameters]
 g1 = 9.81
 c1 = 0.5
-q1 = 2.0
+qd1 = 2.0
 s12 = 1.5
 l_c1 = 0.2
 lc1 = 0.3
@@ -37,7 +37,7 @@ a = "c1"
 alpha = 0
 d = 0
 theta = "lambda"
-body = { mass = "q1", com = ["-l_c1", "lc1", 0], inertia = { yy = "q1*c1^2/12", zz = "q1*c1^2/12" } }
+body = { mass = "qd1", com = ["-l_c1", "lc1", 0], inertia = { yy = "qd1*c1^2/12", zz = "qd1*c1^2/12" } }
 
 [[joint]]
 type = "revolute"
@@ -45,7 +45,7 @@ a = "int"
 alpha = 0
 d = 0
 theta = 0
-body = { mass = "s12/(q1 + s12)", com = ["-int/2", 0, 0], inertia = { yy = "s12*int^2/12", zz = "s12*int^2/12" } }
+body = { mass = "s12/(qd1 + s12)", com = ["-int/2", 0, 0], inertia = { yy = "s12*int^2/12", zz = "s12*int^2/12" } }
 """
 """Parameters that are called like a joint's value, a cosine, an entry, or words of C and Python."""
 
@@ -230,7 +230,7 @@ def test_numbers_are_exact():
 
 def test_clashing_names_are_written_otherwise(clashing):
     text = clashing.text(("M", "C", "g", "tau"))
-    assert "note: q1 is written q1_" in text
+    assert "note: qd1 is written qd1_" in text
     assert "note: c1 is written c1_" in text
     assert "note: g1 is written g1_" in text
     for element in [*clashing.M.flat, *clashing.g, *clashing.tau]:

@@ -973,11 +973,29 @@ def test_magics_that_assign_nothing_are_dropped(read, line):
 
 @pytest.mark.parametrize(
     "line",
-    ["%run a.py", "%load a.py", "%store -r V", "%%python2", "%pylab", "%time V = 3", "%reset", "%%bash2", "%macro x"],
+    ["%run a.py", "%load a.py", "%store -r V", "%%python2", "%pylab", "%reset", "%%bash2", "%macro x"],
 )
 def test_magics_that_may_assign_refuse_the_notebook(read, line):
     with pytest.raises(AnswerError, match="cell 1"):
         read(notebook(f"{line}\nV = m1"), ".ipynb")
+
+
+@pytest.mark.parametrize(
+    "cell",
+    [
+        *("%time V = 3", "%time V.fill(0)", "%timeit V.row_swap(0, 1)", "%%timeit\nV = 3", "%%capture V\nprint(1)"),
+        "    V = 2*V",
+    ],
+)
+def test_what_magics_and_cells_execute_counts(read, cell):
+    """IPython executes a timed statement, binds what is captured, and takes a cell's indentation away."""
+    answer = read(notebook("V = Matrix([m1*g])", cell), ".ipynb").answers["V"]
+    assert isinstance(answer, Refusal)
+
+
+def test_each_cell_is_python_by_itself(read):
+    with pytest.raises(AnswerError, match="cell 2, line 1: no Python"):
+        read(notebook("V = m1*g", 's = """', "V = 2*V", '"""'), ".ipynb")
 
 
 @pytest.mark.parametrize("cell", ["%%bash\nV=3", "%%latex\n$V = 3$", "%%html\n<b>V = 3</b>", "%%writefile a.py\nV = 3"])

@@ -84,7 +84,9 @@ def called(scope: Scope, function: str, arguments: Sequence[Value], of_numpy: bo
             for term in terms.entries.values():
                 total = term if total is ZERO else calculated(total, "+", term, scope.record.power)
             return total
-        case ("Rational", [Text(text)]) if match := re.fullmatch(r"(-?\d{1,15})/(\d{1,15})", text, re.ASCII):
+        case ("Rational" | "S" | "sympify" | "nsimplify", [Text(text)]) if match := re.fullmatch(
+            r"(-?\d{1,15})/(\d{1,15})", text, re.ASCII
+        ):
             return calculated(number(match[1]), "/", number(match[2]))
         case ("float" | "float64", [Scalar() as x]):
             return x

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
 
@@ -145,6 +145,7 @@ class MatlabProgram:
             statements.append(statement)
             if len(statements) > MAX_STATEMENTS:
                 raise AnswerError(f"{file}: more than {MAX_STATEMENTS} statements")
+        self.statements = statements
         for statement in statements:
             self.bound |= statement.assigned_names()
             if statement.keyword == "function":
@@ -362,6 +363,13 @@ class MatlabProgram:
         if len(statement.tokens) == 1 and word and word not in known:
             raise self._refuse(statement, f"found {word!r}, which may be a script that changes any name", "assignments")
 
+    def assigned_anywhere(self) -> Iterator[tuple[str, str]]:
+        """Yield what the program assigns: names and fields, those in what is not read too, with their lines."""
+        for statement in self.statements:
+            line = self.line_name(statement.line)
+            for name in sorted(statement.assigned_names() | statement.assigned_fields()):
+                yield name, line
+
     def _statement(self, statement: MatlabStatement, word: str, scope: Scope, line: str) -> None:
         tokens = statement.tokens
         equals = [k for k, token in enumerate(tokens) if token.is_sign("=")]
@@ -425,6 +433,11 @@ class MatlabProgram:
             self._assign_several(statement, left, right, scope, line)
             return
         name, index = _target(left)
+        if right and self._is_symbolic_function(left, scope):
+            name, index = left[0].text, None
+        if right and (place := _row_or_column(left)):
+            self._assign_line(left[0].text, place, right, scope, line)
+            return
         if not name or not right:
             self._change(statement, scope, "an assignment that is not read", line)
             return
@@ -472,6 +485,37 @@ class MatlabProgram:
         for name, value in zip(names, values, strict=False):
             if name != "~":
                 scope.bind(name, value, line)
+
+    @staticmethod
+    def _is_symbolic_function(left: Tokens, scope: Scope) -> bool:
+        """Whether a left-hand side is V(q1, q2) of symbols: in a formula it is what it is assigned."""
+        if not is_call(left, left[0].text) or left[0].text in scope.names:
+            return False
+        arguments = [entry[0].text if len(entry) == 1 else "" for entry in _arguments(left[2:-1])]
+        bound = [scope.names.get(name) for name in arguments]
+        return all(one is not None and isinstance(one.value, Given) and one.value.is_symbol for one in bound)
+
+    def _assign_line(
+        self, name: str, place: tuple[int | None, int | None], right: Tokens, scope: Scope, line: str
+    ) -> None:
+        """Read ``M(1, :) = [a b]``: an entry for each number of the vector."""
+        row, column = place
+        bound = scope.names.get(name)
+        try:
+            value = self.value(right, scope)
+            if not isinstance(value, Matrix) or (not value.is_flat and 1 not in value.shape):
+                raise UnreadError(f"{name} is changed by an assignment to a part of it")
+            entries = list(value.entries.values())
+            made = bound.value if bound is not None else None
+            is_matrix = isinstance(made, Matrix) and not made.is_flat
+            if isinstance(made, Matrix) and is_matrix and len(entries) != made.shape[0 if row is None else 1]:
+                raise UnreadError(f"{name} is assigned a row or column of another length")
+        except UnreadError as error:
+            scope.change(name, f"{line}: {error}", only_matrices=False)
+            return
+        for k, entry in enumerate(entries):
+            index = (k if row is None else row, k if column is None else column)
+            scope.bind_entry(name, index, entry, line)
 
     def _assign_entry(
         self, name: str, index: Index, right: Tokens, scope: Scope, line: str, is_added: bool = False
@@ -843,6 +887,16 @@ def _target(tokens: Tokens) -> tuple[str, Index | None]:
         return f"{name}.{tokens[2].text}", None
     index = constant_index(tokens[2:-1]) if is_call(tokens, name) else None
     return ("", None) if index is None else (name, index)
+
+
+def _row_or_column(left: Tokens) -> tuple[int | None, int | None] | None:
+    """Return the row or the column, from 0, of the left-hand side M(1, :) or M(:, 2); None of another one."""
+    match [token.text for token in left]:
+        case [_, "(", number, ",", ":", ")"] if number.isdecimal() and 0 < int(number[:5]) <= MAX_INDEX:
+            return int(number) - 1, None
+        case [_, "(", ":", ",", number, ")"] if number.isdecimal() and 0 < int(number[:5]) <= MAX_INDEX:
+            return None, int(number) - 1
+    return None
 
 
 def constant_index(inside: Tokens) -> Index | None:

@@ -127,6 +127,15 @@ class MatlabStatement:
                 names |= {after.text for after in tokens[k + 1 : k + 2] if after.kind == "name"}
         return names
 
+    def assigned_fields(self) -> set[str]:
+        """Return the last fields of structures that it assigns: V of ``out.V = ...``."""
+        tokens = self.tokens
+        fields: set[str] = set()
+        for before, token, after in zip(tokens, tokens[1:], tokens[2:], strict=False):
+            if before.text == "." and token.kind == "name" and after.is_sign(*ASSIGNING):
+                fields.add(token.text)
+        return fields
+
 
 def _names_assigned_before(tokens: Tokens, end: int) -> set[str]:
     """Return the names that the left-hand side in front of ``end`` assigns."""

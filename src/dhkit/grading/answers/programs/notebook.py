@@ -15,17 +15,14 @@ from dhkit.grading.answers.tokens import word_set
 
 HARMLESS_MAGICS = word_set(
     """
-    matplotlib config timeit pip conda ls pwd who whos precision load_ext autoreload time cd lsmagic autosave
-    pdb xmode colors history env display
+    matplotlib config pip conda ls pwd who whos precision load_ext autoreload cd lsmagic autosave pdb xmode colors
+    history env display
     """
 )
-"""Magics that assign nothing."""
+"""Magics of a line that execute nothing of the program and assign nothing."""
 
-WHOLE_CELL_MAGICS = word_set("latex markdown html HTML javascript js svg SVG bash sh writefile timeit")
-"""Magics of cells that hold no Python, or Python that assigns nothing."""
-
-CELL_PREFIXES = frozenset(("time", "capture", "matplotlib"))
-"""Magics in front of a cell that is otherwise ordinary."""
+CELLS_WITHOUT_PYTHON = word_set("latex markdown html HTML javascript js svg SVG bash sh writefile")
+"""Magics of cells that hold another language, or text."""
 
 
 @dataclass(frozen=True)
@@ -109,38 +106,98 @@ def _order_notes(counts: Sequence[object]) -> tuple[str, ...]:
 
 
 def _without_magics(cell: str, where: str) -> str:
-    """Return a cell without lines that begin with %, ! or ? and assign nothing."""
-    if _is_python(cell):
-        return cell
+    """Return a cell as Python executes it.
+
+    Lines that begin with %, ! or ? become what they execute, and ``pass`` where they execute nothing of the program. As
+    in IPython, the indentation of the first line is taken from all.
+
+    Raises
+    ------
+    AnswerError
+        A magic that may assign any name, or a cell that is no Python by itself.
+    """
+    cell = _without_indentation(cell)
+    if not _is_python(cell):
+        lines = cell.split("\n")
+        first = next((k for k, line in enumerate(lines) if line.strip()), 0)
+        if magic := re.match(r"%%\s*(\w+)(.*)", lines[first]):
+            if magic[1] in CELLS_WITHOUT_PYTHON:
+                return "\n".join("" for _ in lines)
+            lines = _timed_or_captured(lines, first, magic[1], magic[2].split(), where)
+        cell = "\n".join(_executed(line, f"{where}, line {k}") for k, line in enumerate(lines, start=1))
+    try:
+        _parse(cell)
+    except SyntaxError as error:
+        raise AnswerError(f"{where}, line {error.lineno or 1}: no Python: {str(error.msg)[:100]}") from None
+    except (ValueError, RecursionError, MemoryError):
+        raise AnswerError(f"{where}: no Python, or nested too deep to be read") from None
+    return cell
+
+
+def _without_indentation(cell: str) -> str:
     lines = cell.split("\n")
-    first = next((k for k, line in enumerate(lines) if line.strip()), 0)
-    if magic := re.match(r"%%\s*(\w+)", lines[first]):
-        if magic[1] in WHOLE_CELL_MAGICS:
-            return "\n".join("" for _ in lines)
-        if magic[1] not in CELL_PREFIXES:
-            raise AnswerError(f"{where}: found %%{magic[1][:20]}, which may assign any name")
-        lines[first] = ""
-    return "\n".join(_without_magic(line, f"{where}, line {k}") for k, line in enumerate(lines, start=1))
+    first = next((line for line in lines if line.strip()), "")
+    indentation = first[: len(first) - len(first.lstrip())]
+    return "\n".join(line.removeprefix(indentation) for line in lines)
 
 
-def _without_magic(line: str, where: str) -> str:
-    """Return a line of a cell; ``pass`` for one that only a notebook understands: inside brackets it is an error."""
+def _timed_or_captured(lines: list[str], first: int, magic: str, arguments: list[str], where: str) -> list[str]:
+    """Return a cell under a magic of the whole cell, whose code is executed, as the same number of lines."""
+    rest = lines[first + 1 :]
+    before = ["" for _ in lines[:first]]
+    match magic, [word for word in arguments if not word.startswith("-")]:
+        case "time" | "matplotlib", []:
+            return [*before, "", *rest]
+        case "capture", []:
+            return [*before, "", *rest]
+        case "capture", [name] if name.isidentifier():
+            return [*before, f"{name} = object()", *rest]
+        case "timeit", _:
+            # Its names are local to it, and it is executed many times: what it changes is that of a loop.
+            return [
+                *before,
+                "for _ in range(7):",
+                *(f" {line}" for line in rest),
+                *([" pass"] if not any(line.strip() for line in rest) else []),
+            ]
+    raise AnswerError(f"{where}: found %%{magic[:20]}, which may assign any name")
+
+
+def _executed(line: str, where: str) -> str:
+    """Return what a line of a cell executes; ``pass`` for one that only a notebook understands."""
     stripped = line.strip()
-    if stripped.startswith("%"):
-        name = re.match(r"%\s*(\w+)", stripped)
-        word = name[1] if name else ""
-        if word not in HARMLESS_MAGICS or (word in ("time", "env", "timeit") and "=" in stripped):
-            raise AnswerError(f"{where}: found %{word[:20]}, which may assign any name")
-    elif not stripped.startswith(("!", "?")) and not re.fullmatch(r"[\w.]+\?{1,2}", stripped):
-        return line
-    return f"{line[: len(line) - len(line.lstrip())]}pass"
+    indentation = line[: len(line) - len(line.lstrip())]
+    if not stripped.startswith("%"):
+        is_notebooks = stripped.startswith(("!", "?")) or re.fullmatch(r"[\w.]+\?{1,2}", stripped)
+        return f"{indentation}pass" if is_notebooks else line
+    match = re.match(r"%\s*(\w*)\s*(.*)", stripped)
+    word, rest = (match[1], match[2]) if match else ("", "")
+    if word in ("time", "timeit"):
+        statement = re.sub(r"^(?:-\w+\s*\d*\s+)*", "", rest)
+        if word == "time" or not statement or _is_expression(statement):
+            return f"{indentation}{statement or 'pass'}"
+    elif word in HARMLESS_MAGICS and not (word == "env" and "=" in stripped):
+        return f"{indentation}pass"
+    raise AnswerError(f"{where}: found %{word[:20]}, which may assign any name")
+
+
+def _is_expression(text: str) -> bool:
+    try:
+        ast.parse(text, filename="cell", mode="eval")
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return False
+    return True
+
+
+def _parse(cell: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        ast.parse(cell, filename="cell")
 
 
 def _is_python(cell: str) -> bool:
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            ast.parse(cell, filename="cell")
+        _parse(cell)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return False
     return True

@@ -53,6 +53,9 @@ class Program(Protocol):
     def applied(self, function: Function, arguments: dict[str, Value]) -> tuple[Value, Scope]:
         """Return what a function returns, and its local names."""
 
+    def assigned_anywhere(self) -> Iterable[tuple[str, str]]:
+        """Yield what the program assigns: names, keys and fields, those in what is not read too, with their lines."""
+
 
 @dataclass(frozen=True)
 class _Candidate:
@@ -117,7 +120,21 @@ class _ProgramAnswers:
             if answer is not None:
                 answers[quantity] = answer
         record = self.record
+        self._note_unjudged(answers)
         return source_sheet(file, self.quantities.n, answers, self.parameters, record.notes, record.left_out)
+
+    def _note_unjudged(self, answers: Iterable[str]) -> None:
+        """Name the quantities that the program assigns where nothing is read, such as a branch or a class."""
+        noted = set(answers)
+        for name, line in self.program.assigned_anywhere():
+            quantity = self.quantities.quantity(name)
+            if not quantity or quantity in noted or self.quantities.is_alias(name):
+                continue
+            if self.record.robot.is_reserved(name) or name in self.program.main.names:
+                continue
+            noted.add(quantity)
+            if not any(re.search(rf"\b{re.escape(name)}\b", text) for text in self.record.left_out):
+                self.record.left_out.append(f"{line}: {name} (assigned where the program is not read)")
 
     # What the program gives
 
@@ -129,6 +146,8 @@ class _ProgramAnswers:
             value = Unread(self.record.broken[scope.key(name)])
         if isinstance(value, Given):
             value = self._of_given(scope, value, bound.line)
+        if isinstance(value, Matrix) and not value.entries:
+            value = Unread(f"{name} is made of the states' shape and never filled, in {bound.line}")
         one = _Candidate(Target("M"), bound.line, Unread(""), name, scope.key(name), function=function)
         quantity = self.quantities.quantity(called)
         if quantity:
@@ -370,7 +389,11 @@ class _ProgramAnswers:
         own = self._called(function)
         match value:
             case Several(values, names):
-                return [(name, name, one) for name, one in zip(names or ("",) * len(values), values, strict=True)]
+                returned: list[tuple[str, str, Value]] = []
+                for name, one in zip(names or ("",) * len(values), values, strict=True):
+                    fields = one.fields if isinstance(one, Structure) else {name: one}
+                    returned += [(field, field, inner) for field, inner in fields.items()]
+                return returned
             case Structure(fields):
                 return [(name, name, one) for name, one in fields.items()]
         local = self._local_name(function)

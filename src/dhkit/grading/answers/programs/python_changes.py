@@ -454,7 +454,7 @@ class _Piece:
                 most = 100  # Python's own
             return library in QUIET and len(call.args) <= most
         match call.func:
-            case ast.Name(name) if name not in self.local:
+            case ast.Name(name) if name not in self.local or self._is_bound_here(name):
                 match value_of(ascii_name(name), self.scope):
                     case Function() as function:
                         return not self.changes.of_function(function)
@@ -470,6 +470,10 @@ class _Piece:
             case ast.Call(function):
                 return self._library_name(function) == "Function"
         return False
+
+    def _is_bound_here(self, name: str) -> bool:
+        """Whether a function's local name is bound already."""
+        return self.scope is not self.changes.main and ascii_name(name) in self.scope.names
 
     def _is_loud_function(self, node: ast.AST) -> bool:
         """Whether an argument is a function that may change something, and that the callee may call."""

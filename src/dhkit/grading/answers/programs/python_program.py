@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from dhkit.errors import AnswerError
@@ -120,10 +120,10 @@ class PythonProgram:
         self.statements = 0
         self.depth = 0
         self.star_modules: list[str] = []
-        tree = self._parsed()
+        self.tree = self._parsed()
         try:
-            self._refuse_unbounded(tree)
-            self._block(tree.body, self.main)
+            self._refuse_unbounded(self.tree)
+            self._block(self.tree.body, self.main)
         except RecursionError:
             raise AnswerError(f"{file}: nested too deep to be read; write long sums in parts") from None
 
@@ -164,6 +164,12 @@ class PythonProgram:
     def line(self, node: ast.stmt | ast.expr) -> str:
         """Return how messages name the line of a node."""
         return self.line_name(node.lineno)
+
+    def assigned_anywhere(self) -> Iterator[tuple[str, str]]:
+        """Yield names, keys and attributes that are assigned, also where nothing is read, with their lines."""
+        found = [(getattr(node, "lineno", 1), name) for node in ast.walk(self.tree) for name in _assigned_by(node)]
+        for line, name in sorted(found):
+            yield ascii_name(name), self.line_name(line)
 
     # Statements
 
@@ -386,6 +392,8 @@ class PythonProgram:
                 value = Library(f"numpy.{alias.name}")
         else:
             value = Unread(f"{name[:40]} comes from {module[:40]} in {line}")
+            if module.split(".")[0] in KNOWN_PACKAGES:
+                self.changes.imported[name] = alias.name
         scope.bind(name, value, line)
 
     def _import_everything(self, module: str, line: str) -> None:
@@ -642,7 +650,7 @@ class PythonProgram:
                 return Library(f"numpy.{name}" if module in NUMPY else name)
             case Matrix() if name == "T":
                 return transposed(value)
-            case Library("S") if name in NUMBERS_OF_SYMPY:
+            case Library("S") | Given("S") if name in NUMBERS_OF_SYMPY:
                 return NUMBERS_OF_SYMPY[name]
         return scope.field(value, name)
 
@@ -846,7 +854,7 @@ class PythonProgram:
         match value, method:
             case Matrix(), "transpose" if not arguments:
                 return transposed(value)
-            case Library("SX" | "MX" | "DM"), "sym":
+            case Library("SX" | "MX" | "DM") | Given("SX" | "MX" | "DM"), "sym":
                 return self._casadi_symbol(node, scope)
             case Matrix(), "dot" if len(arguments) == 1 and not value.multiplies_entries and 1 in value.shape:
                 other = self._operand(arguments[0], scope)
@@ -1066,6 +1074,17 @@ def _symbol_names(text: str) -> list[str]:
     if not names or not all(re.fullmatch(r"[\w\\{}]+", name) for name in names):
         raise UnreadError(f"symbols of {text[:40]!r} are not read")
     return names
+
+
+def _assigned_by(node: ast.AST) -> Iterator[str]:
+    """Yield the names, keys and attributes that one node assigns."""
+    match node:
+        case ast.Name(name, ast.Store()) | ast.Attribute(_, name, ast.Store()):
+            yield name
+        case ast.Subscript(_, ast.Constant(str(key)), ast.Store()):
+            yield key
+        case ast.Dict(keys):
+            yield from (key.value for key in keys if isinstance(key, ast.Constant) and isinstance(key.value, str))
 
 
 def _ends(statement: ast.stmt) -> bool:
