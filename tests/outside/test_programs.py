@@ -15,10 +15,8 @@ from dhkit.description import library_robot
 from dhkit.errors import AnswerError
 from dhkit.grading import grade
 
-PROGRAMS = [
-    json.loads(line)
-    for line in Path(__file__).with_name("data").joinpath("programs.jsonl").read_text("utf-8").splitlines()
-]
+DATA = Path(__file__).with_name("data") / "programs.jsonl"
+PROGRAMS = [json.loads(line) for line in DATA.read_text("utf-8").splitlines()]
 SHARE = 4
 """One program of so many is read unless all are."""
 MOST_UNREAD = 0.04
