@@ -21,6 +21,7 @@ PACKAGES = (
     "control",
     "model",
     "grading",
+    "execution",
     "programs",
     "viewer",
     "lab",

@@ -34,12 +34,12 @@ from dhkit import (
 from dhkit.control.batch_result import History
 from dhkit.display import LONGEST_LINE, MOST_ROWS, html_table, plain, repr_line
 from dhkit.dynamics import ParameterGrouping, dynamics_graph, parameter_grouping
+from dhkit.execution.isolation import Kind
 from dhkit.expressions import Atom, Budget, Expression, parse
 from dhkit.kernels import Kernel
 from dhkit.kinematics.programs import kinematic_kernels
 from dhkit.lab.assignment import Goal, JointsAt, MotionBetween, OwnScore, Step, ToolAt
 from dhkit.planning.certificate import Check
-from dhkit.programs.isolation import Kind
 from dhkit.symbolic.exact.regressor import regressor
 from dhkit.symbolic.textbook_kinematics import TextbookKinematics
 from dhkit.trajectories.pieces import Pieces
@@ -62,6 +62,7 @@ PACKAGES = (
     "lab",
     "model",
     "planning",
+    "execution",
     "programs",
     "symbolic",
     "trajectories",

@@ -3,7 +3,6 @@
 # ruff: noqa: E501 - programs in one line
 
 import os
-import shutil
 import socket
 import sys
 import tempfile
@@ -17,11 +16,13 @@ import pytest
 
 import dhkit.arm
 from acceptance import ACCEPTING
+from conftest import require
 from dhkit import Arm
-from dhkit.programs import check, isolation as isolation_module, other_user, program as program_module
+from dhkit.execution import child as child_module, isolation as isolation_module, other_user
+from dhkit.execution.isolation import Isolation, IsolationError, Kind, find_isolation
+from dhkit.execution.process import Failure, Limits, ProgramError
+from dhkit.programs import check
 from dhkit.programs.caller import Caller
-from dhkit.programs.isolation import Isolation, IsolationError, Kind, find_isolation
-from dhkit.programs.process import Failure, Limits, ProgramError
 from dhkit.programs.program import Program
 from waiting import HANGS, wait_for
 
@@ -164,15 +165,15 @@ def test_many_lines_are_read_and_their_end_is_kept(program):
 def test_a_program_that_is_closed_while_it_starts_is_not_waited_for(program, monkeypatch):
     """Its process may be made after another thread has closed it."""
     one = program("import time\ntime.sleep(1000)\n")
-    make = program_module.Process
+    make = child_module.Process
 
     def closed_meanwhile(*arguments):
         closing.start()
-        wait_for(lambda: one._closed)
+        wait_for(lambda: one._child._closed)
         return make(*arguments)
 
     closing = threading.Thread(target=one.close)
-    monkeypatch.setattr(program_module, "Process", closed_meanwhile)
+    monkeypatch.setattr(child_module, "Process", closed_meanwhile)
     with pytest.raises(ProgramError, match="was closed"):
         one.start()
     closing.join(HANGS)
@@ -370,8 +371,8 @@ def test_any_program_speaks_the_protocol(tmp_path):
         assert one.call("fk", q=[2.0]) == 2.0
 
 
-@pytest.mark.skipif(shutil.which("octave-cli") is None, reason="no octave: Debian's octave runs MATLAB's language")
 def test_octave_runs_files_of_matlab(program):
+    require("octave-cli", "Debian's octave runs MATLAB's language")
     text = "1;\nfunction T = fk(q)\n  if q(1) > 5\n    error('too far');\n  end\n  T = eye(4) * q(1);\nend\n"
     text += "function Q = ik(T)\n  if T(1, 1) > 3\n    Q = [];\n  else\n    Q = [T(1, :); NaN 1 2 3];\n  end\nend\n"
     text += "function u = controller(t, q, qd, setpoint)\n  u = 10 * (setpoint.q - q);\nend\n"

@@ -5,10 +5,10 @@ import pytest
 
 from dhkit import Arm
 from dhkit.description import robots
+from dhkit.execution.process import Failure, ProgramError
 from dhkit.kinematics import classify, singular_values
 from dhkit.programs.caller import MAX_FATAL_FAILURES, Caller
 from dhkit.programs.inverse import SOLUTION_ORDERS
-from dhkit.programs.process import Failure, ProgramError
 from dhkit.programs.random_poses import poses_out_of_reach, random_states, regular_states, singular_states
 
 

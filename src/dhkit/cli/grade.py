@@ -14,6 +14,7 @@ import typer
 from dhkit.arm import Arm
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.grade_output import FORMS, Graded, check_output, deliver
+from dhkit.cli.isolating import Isolated, isolation_for
 from dhkit.cli.options import Json, read_arm
 from dhkit.cli.output import say
 from dhkit.cli.streams import styled
@@ -46,6 +47,10 @@ def grade(
         Path | None, typer.Option(help="The instructor's file: robot, [task], [names], [rubric] (.toml).")
     ] = None,
     rubric: Annotated[Path | None, typer.Option(help="Rubric: points of the answers (.toml).")] = None,
+    execute: Annotated[
+        bool, typer.Option("--execute", help="Execute programs in processes of their own, in place of reading them.")
+    ] = False,
+    isolated: Isolated = False,
     read: Annotated[bool, typer.Option("--read", help="Show how each entry was read.")] = False,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of the random states, to repeat a report.")] = None,
     form: Annotated[str, typer.Option("--format", help="Format: text, json, gradescope, junit or html.")] = "text",
@@ -82,6 +87,7 @@ def grade(
     options: dict[str, Any] = {"form": form, "feedback": feedback, "output": output, "json": json}
     if remark:
         return mark_again(sheets, rubric_of(rubric), **options)
+    options |= {"execute": execute, "isolated": isolated}
     return grade_files(sheets, robot, rubric, task, seed, jobs=jobs, seconds=seconds, read=read, **options)
 
 
@@ -116,6 +122,9 @@ def grade_files(
     rubric: Path | None,
     task: Path | None = None,
     seed: int | None = None,
+    *,
+    execute: bool = False,
+    isolated: bool = False,
     **options: Any,
 ) -> ExitStatus:
     """Judge sheets about their own robots, or all about one robot; see :func:`run` for the options.
@@ -132,11 +141,17 @@ def grade_files(
         An instructor's file with the task and its robot.
     seed
         Seed of the random states, to repeat a report.
+    execute
+        Whether programs are executed: those of several sheets, which are other people's, only isolated.
+    isolated
+        Whether a single program too is executed only where it can be isolated.
 
     Raises
     ------
     AnswerError, DescriptionError
         As :func:`run`, or there is no such robot, rubric or task.
+    IsolationError
+        Programs are to be executed, and cannot be isolated.
     """
     read = None if task is None else read_task(task)
     about = read_arm(robot).description if robot is not None else None
@@ -149,12 +164,20 @@ def grade_files(
         chosen = _own_rubric(sheets[0])
     else:
         chosen = rubric_of(rubric)
-    if len(sheets) > 1 or any(path.is_dir() for path in sheets):
+    are_several = len(sheets) > 1 or any(path.is_dir() for path in sheets)
+    if are_several:
         prepare(about)
     own_files = [path for path in (rubric, task, Path(robot) if robot else None) if path is not None]
+    isolation = None
+    if execute:
+        packages = read.task.packages if read is not None else ()
+        name = sheets[0].name if not are_several else "the sheets' programs"
+        isolation = isolation_for(name, isolated or are_several, [*own_files, *sheets], packages)
     return run(
         sheets,
-        judge=lambda path: judge_sheet(path, about, chosen, task=read, seed=seed),
+        judge=lambda path: judge_sheet(
+            path, about, chosen, task=read, seed=seed, execute=isolation is not None, isolation=isolation
+        ),
         rubric=chosen,
         exclude=own_files,
         prepare=lambda report: prepare(about, report),

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from dhkit.programs import Isolation, find_isolation
+from dhkit.execution import Isolation, find_isolation
+from dhkit.execution.isolation import PACKAGES
 
 Isolated = Annotated[
     bool,
@@ -17,7 +18,7 @@ Isolated = Annotated[
 ]
 
 
-def isolation_for(program: str, required: bool, hidden: Iterable[Path] = ()) -> Isolation:
+def isolation_for(program: str, required: bool, hidden: Iterable[Path] = (), packages: Sequence[str] = ()) -> Isolation:
     """Return how a program is run; where it is not isolated, say so on stderr.
 
     Parameters
@@ -28,13 +29,15 @@ def isolation_for(program: str, required: bool, hidden: Iterable[Path] = ()) -> 
         Whether it may be run only isolated.
     hidden
         Files that it must not read, beside dhkit itself.
+    packages
+        Packages that it may import; the usual ones where there are none.
 
     Raises
     ------
     IsolationError
         It must be isolated, and cannot be.
     """
-    found = find_isolation(hidden, required=required)
+    found = find_isolation(hidden, packages or PACKAGES, required=required)
     if not found:
         sys.stderr.write(
             f"dhkit: {program} is {found}: it can do everything that you can; run only programs that you trust\n"

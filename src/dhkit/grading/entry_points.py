@@ -9,10 +9,12 @@ from pathlib import Path
 from dhkit.description import Description, Robot, library_robot, read_robot, robots
 from dhkit.description.robot import description_of, takes_robot
 from dhkit.errors import AnswerError, DescriptionError
+from dhkit.execution import Isolation, find_isolation
+from dhkit.execution.isolation import PACKAGES
 from dhkit.grading.answers.objects import entries_of
 from dhkit.grading.answers.sheet import quantity_names, read_sheet, sheet_of
 from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Names
-from dhkit.grading.answers.sources import SHEET_SUFFIXES, read_source
+from dhkit.grading.answers.sources import SHEET_SUFFIXES, executed_source, read_source
 from dhkit.grading.judging.truth import truth_of
 from dhkit.grading.mistakes.diagnosis import variants_of
 from dhkit.grading.report import GradeReport
@@ -34,8 +36,12 @@ def grade(
     task: AnswerSheet | None = None,
     seed: int | None = None,
     explain: bool = True,
+    execute: bool = False,
+    isolation: Isolation | None = None,
 ) -> GradeReport:
-    """Judge an answer sheet, or the answers that a program or a paper assigns; nothing in it is executed.
+    """Judge an answer sheet, or the answers that a program or a paper assigns.
+
+    Nothing in it is executed unless ``execute`` is set.
 
     Work and size are bounded; for limits of time and memory see :func:`dhkit.grading.batch.grade_all`.
 
@@ -55,6 +61,12 @@ def grade(
         entropy.
     explain
         Whether to look for mistakes; verdicts do not depend on it.
+    execute
+        Whether a program (.py, .m, .ipynb) is executed in a process of its own in place of being read. Its answers are
+        then the formulas that its names stand for. Functions that cannot be called with symbols are called with
+        numbers, and agree at sampled states at best.
+    isolation
+        What an executed program can see and reach; by default the best that works on this system, or none.
 
     Raises
     ------
@@ -63,7 +75,8 @@ def grade(
     DescriptionError
         The robot file describes no robot.
     """
-    path, digits = Path(path), (rubric or Rubric()).digits
+    path = Path(path)
+    digits = (rubric or Rubric()).digits
     given = None if robot is None else description_of(robot)
     suffix = path.suffix.lower()
     if suffix not in SHEET_SUFFIXES:
@@ -73,19 +86,45 @@ def grade(
     else:
         if given is None:
             raise AnswerError(f"{path}: a program does not say which robot it is about; give one (--robot)")
-        sheet = read_source(path, given, NO_NAMES if task is None else task.names)
+        names = NO_NAMES if task is None else task.names
+        if execute and suffix != ".tex":
+            _require_permission(path, task)
+            found = find_isolation(packages=_packages(task)) if isolation is None else isolation
+            with executed_source(path, given, names, isolation=found) as sheet:
+                return _judged(sheet, given, task, digits, seed, explain)
+        sheet = read_source(path, given, names)
     description = given or robot_of(sheet, path.parent)
+    report = _judged(sheet, description, task, digits, seed, explain)
+    return replace(report, own_robot=given is None)
+
+
+def _judged(
+    sheet: AnswerSheet, description: Description, task: AnswerSheet | None, digits: int, seed: int | None, explain: bool
+) -> GradeReport:
     if task is not None:
         sheet = replace(sheet, task=task.task, names=_merge_names(sheet.names, task.names))
-    report = judge_sheet(description, sheet, digits, seed=seed, explain=explain)
-    return replace(report, own_robot=given is None)
+    return judge_sheet(description, sheet, digits, seed=seed, explain=explain)
+
+
+def _require_permission(path: Path, task: AnswerSheet | None) -> None:
+    """Refuse to execute a program for a task that does not permit it."""
+    if task is not None and not task.task.may_execute:
+        raise AnswerError(f"{path}: the task does not permit executing programs (execute = true in [task])")
+
+
+def _packages(task: AnswerSheet | None) -> tuple[str, ...]:
+    """Return the packages that a task's programs may import."""
+    return (task.task.packages if task is not None else ()) or PACKAGES
 
 
 def _merge_names(own: Names, given: Names) -> Names:
     """Return a sheet's names, completed by those of the task."""
     parameters = {**given.parameters, **own.parameters}
     q, qd, qdd = own.q or given.q, own.qd or given.qd, own.qdd or given.qdd
-    return replace(own, q=q, qd=qd, qdd=qdd, absolute=own.absolute or given.absolute, parameters=parameters)
+    is_absolute = own.absolute or given.absolute
+    return replace(
+        own, q=q, qd=qd, qdd=qdd, absolute=is_absolute, parameters=parameters, state=own.state or given.state
+    )
 
 
 @takes_robot

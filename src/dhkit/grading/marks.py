@@ -112,6 +112,7 @@ def _share(entry: Entry, report: GradeReport, credit: Credit) -> tuple[Fraction,
     simple = {
         Verdict.CORRECT: 1.0,
         Verdict.ROUNDED: credit.rounding,
+        Verdict.SAMPLED: 0.0 if report.proof_required else credit.sampled,
         Verdict.UNDECIDED: 0.0 if report.proof_required else credit.undecided,
         Verdict.INCOMPLETE: 0.0,
         Verdict.UNREADABLE: 0.0,

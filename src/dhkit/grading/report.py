@@ -25,6 +25,7 @@ class Verdict(Enum):
 
     CORRECT = "correct"
     ROUNDED = "correct within rounding"
+    SAMPLED = "agrees at sampled states"
     UNDECIDED = "undecided"
     INCOMPLETE = "incomplete"
     WRONG = "wrong"
@@ -36,8 +37,13 @@ class Verdict(Enum):
         return list(Verdict).index(self)
 
     @property
+    def is_proved(self) -> bool:
+        """Whether a verdict that passes was proved: correct, or correct within rounding."""
+        return self not in (Verdict.SAMPLED, Verdict.UNDECIDED)
+
+    @property
     def passes(self) -> bool:
-        """Whether the entry is correct or undecided: no error was found."""
+        """Whether the entry is correct, sampled or undecided: no error was found."""
         return self.severity <= Verdict.UNDECIDED.severity
 
 
@@ -240,7 +246,7 @@ class GradeReport:
     seed
         Seed of the random states at which answers outside the exact ring were tried; None if the sheet was not judged.
     proof_required
-        Whether the task asks for proof: undecided entries then do not pass.
+        Whether the task asks for proof: sampled and undecided entries then do not pass.
     own_robot
         Whether the sheet itself names the robot that it was judged by.
 
@@ -279,7 +285,7 @@ class GradeReport:
 
     @property
     def _lacks_proof(self) -> bool:
-        return self.proof_required and self.verdict is Verdict.UNDECIDED
+        return self.proof_required and not self.verdict.is_proved
 
     @property
     def conclusion(self) -> str:

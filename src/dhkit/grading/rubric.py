@@ -41,6 +41,8 @@ class Credit:
 
     rounding: Share = 1.0
     """Correct within rounding."""
+    sampled: Share = 1.0
+    """A function of numbers that agrees at the states where it was called."""
     undecided: Share = 1.0
     """Neither proved nor refuted."""
     follow_on: Share = 0.5

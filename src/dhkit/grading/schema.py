@@ -92,6 +92,10 @@ def _properties() -> Schema:
         },
         "q": names | {"description": "Names of the joint variables (rad, m), one a joint; q1 ... qn unless given."},
         "qd": names | {"description": "Names of their rates (rad/s, m/s)."},
+        "state": {
+            "type": "string",
+            "description": "Order of a state vector x of an executed program, such as 'q, qd'.",
+        },
         "qdd": names | {"description": "Names of their accelerations (rad/s^2, m/s^2)."},
         "angles": _choice("angles", "Whether angles count from the link before, or from a fixed direction."),
         "parameters": {
@@ -101,6 +105,9 @@ def _properties() -> Schema:
             "maxProperties": MAX_NAMES,
         },
         "friction": _switch("Whether tau includes viscous friction."),
+        "execute": _switch("Whether programs may be executed where `dhkit grade --execute` asks for it."),
+        "packages": names
+        | {"description": "Packages that executed programs may import; numpy, scipy, sympy and casadi unless given."},
         "total_derivative": _switch("Whether L is right up to the time derivative of a function of q."),
         "asked": {
             "type": "array",

@@ -25,13 +25,14 @@ from dhkit.grading.answers.given import (
     with_entries_gathered,
 )
 from dhkit.grading.answers.quantity_names import QuantityNames
+from dhkit.grading.answers.sampled import SampledAnswer
 from dhkit.grading.answers.sheet import ALIASES, quantity_names, shape_of
 from dhkit.grading.answers.sheet_matrices import SheetMatrices
 from dhkit.grading.answers.sheet_values import AnswerSheet, Requirements
 from dhkit.grading.answers.typeset import typeset, typeset_equations
 from dhkit.grading.answers.vocabulary import Vocabulary
 from dhkit.grading.judging.consistency import Consistency
-from dhkit.grading.judging.functions import judge_function
+from dhkit.grading.judging.functions import judge_function, judge_sampled
 from dhkit.grading.judging.numeric import names_of
 from dhkit.grading.judging.quantities import JudgedQuantity, judge_quantity
 from dhkit.grading.judging.quotients import RingReader
@@ -153,7 +154,9 @@ class _SheetJudge:
                 continue
             try:
                 self._require_known(name, names)
-                if callable(value):
+                if isinstance(value, SampledAnswer):
+                    judged[name] = judge_sampled(name, value, self.truth, self.seed)
+                elif callable(value):
                     judged[name] = judge_function(name, value, self.truth, self.seed)
                 elif name == "J":
                     read[name] = self._jacobian(value, names, matrix_of)

@@ -1,8 +1,8 @@
 """Programs of other people, run in processes of their own and compared with an arm."""
 
+from dhkit.execution.isolation import Isolation, IsolationError, find_isolation
+from dhkit.execution.process import Limits, ProgramError
 from dhkit.programs.checks import check
-from dhkit.programs.isolation import Isolation, IsolationError, find_isolation
-from dhkit.programs.process import Limits, ProgramError
 from dhkit.programs.program import FUNCTIONS, Program, protect_from_children
 from dhkit.programs.random_poses import random_states
 from dhkit.programs.report import CheckReport, Part

@@ -7,8 +7,7 @@ from collections import Counter
 from typing import Any
 
 from dhkit.description import Array
-from dhkit.grading.isolation import WAITING_FACTOR
-from dhkit.programs.process import Failure, ProgramError
+from dhkit.execution.process import WAITING_FACTOR, Failure, ProgramError
 from dhkit.programs.program import Program
 
 LENGTH_UNITS = {"mm": 1e3, "cm": 1e2, "inches": 1 / 0.0254}

@@ -11,9 +11,9 @@ from dhkit.arm import Arm
 from dhkit.description import Array, Robot, description_of
 from dhkit.display import listed
 from dhkit.errors import AnswerError, DhkitError
+from dhkit.execution.process import ProgramError
 from dhkit.programs.caller import LENGTH_UNITS, MAX_DETAILS, POSE_TOLERANCE, Caller
 from dhkit.programs.inverse import score_inverse
-from dhkit.programs.process import ProgramError
 from dhkit.programs.program import Program
 from dhkit.programs.random_poses import random_states
 from dhkit.programs.report import CheckReport, Part, share_within

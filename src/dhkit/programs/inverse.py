@@ -11,9 +11,9 @@ import numpy as np
 from dhkit.arm import Arm
 from dhkit.description import Array
 from dhkit.display import listed
+from dhkit.execution.process import ProgramError
 from dhkit.kinematics import classify
 from dhkit.programs.caller import LENGTH_UNITS, MAX_DETAILS, POSE_TOLERANCE, Caller
-from dhkit.programs.process import ProgramError
 from dhkit.programs.random_poses import poses_out_of_reach, random_states, regular_states, singular_states
 from dhkit.programs.report import Part, share_within
 from dhkit.programs.rubric import CheckRubric

@@ -232,7 +232,7 @@ def with_entries_gathered(answers: Mapping[str, Answer], names: QuantityNames) -
 
 
 def _refused(refusal: Refusal) -> str:
-    return f"{refusal.reason}; files are read, not run: state it in one formula"
+    return f"{refusal.reason}{f'; {refusal.advice}' if refusal.advice else ''}"
 
 
 # Statements

@@ -45,8 +45,19 @@ MAX_LEFT_OUT = 20
 KEYS = {
     "sheet": ("format", "robot", "student", "names", "task", "answer", "rubric"),
     "task file": ("format", "robot", "names", "task", "rubric"),
-    "names": ("q", "qd", "qdd", "angles", "parameters"),
-    "task": ("friction", "total_derivative", "asked", "proof", "frames", "zero", "values", "J_rows"),
+    "names": ("q", "qd", "qdd", "angles", "parameters", "state"),
+    "task": (
+        "friction",
+        "total_derivative",
+        "asked",
+        "proof",
+        "frames",
+        "zero",
+        "values",
+        "J_rows",
+        "execute",
+        "packages",
+    ),
     "dh": ("convention", "rows"),
     "ik": ("branches", "steps"),
     "step": ("joint", "equation", "solution"),
@@ -70,6 +81,9 @@ JACOBIAN_ROWS = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 QUANTITY = re.compile(r"M|C|h|g|tau|K|V|L|T|J|dh|ik|A[1-9][0-9]?")
 """Names of quantities."""
+
+PACKAGE = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,60}", re.ASCII)
+"""Name of a package."""
 
 ALIASES = dict(D="M", G="g", KE="K", PE="V", U="V", P="V", Tau="tau", N="g", Jac="J", Lagrangian="L")
 """Other names of quantities."""
@@ -283,7 +297,11 @@ def _names(checker: _Checker, data: Mapping[str, object]) -> Names:
         checker.texts(data.get(key, []), f"names.{key}", "a list of names, one a joint") for key in ("q", "qd", "qdd")
     )
     absolute = checker.choice(data, "angles", "names.") == "absolute"
-    return Names(q, qd, qdd, absolute, parameters={name: str(value) for name, value in parameters.items()})
+    state = tuple(part.strip() for part in checker.text(data, "state", "names.").split(",") if part.strip())
+    if not all(map(str.isidentifier, state)):
+        raise checker.error("names.state", data["state"], 'names in the order of a state vector, such as "q, qd"')
+    further = {name: str(value) for name, value in parameters.items()}
+    return Names(q, qd, qdd, absolute, further, state)
 
 
 def _requirements(checker: _Checker, data: Mapping[str, object]) -> Requirements:
@@ -305,7 +323,17 @@ def _requirements(checker: _Checker, data: Mapping[str, object]) -> Requirements
         checker.choice(data, "zero", "task.") == "given",
         "values" in data and not checker.switch(data, "values", "task."),
         tuple(map(JACOBIAN_ROWS.index, rows)),
+        checker.switch(data, "execute", "task."),
+        _packages(checker, data),
     )
+
+
+def _packages(checker: _Checker, data: Mapping[str, object]) -> tuple[str, ...]:
+    packages = checker.texts(data.get("packages", []), "task.packages", 'a list of packages such as ["numpy", "sympy"]')
+    for name in packages:
+        if not PACKAGE.fullmatch(name):
+            raise checker.error("task.packages", name, "the name of an installed package")
+    return packages
 
 
 def _table(checker: _Checker, data: Mapping[str, object]) -> tuple[str, tuple[tuple[str, ...], ...]]:

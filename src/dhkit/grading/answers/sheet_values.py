@@ -14,9 +14,12 @@ class Refusal:
     ----------
     reason
         Why it is not judged, with the line.
+    advice
+        What the student may do; empty if the reason says it.
     """
 
     reason: str
+    advice: str = "files are read, not run: state it in one formula, or on a sheet, or have it executed (--execute)"
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,8 @@ class Names:
         Whether angles count from a fixed direction rather than from the link before.
     parameters
         The student's further names, each as text in the robot's parameters and in the names before it.
+    state
+        Joint variables and rates in the order of a state vector x, such as q and qd.
     lenient
         Whether a further name may be unreadable, and replaces any other meaning: names that a program defines.
     """
@@ -66,6 +71,7 @@ class Names:
     qdd: tuple[str, ...] = ()
     absolute: bool = False
     parameters: Mapping[str, str | Refusal] = field(default_factory=dict)
+    state: tuple[str, ...] = ()
     lenient: bool = False
 
 
@@ -92,6 +98,10 @@ class Requirements:
         Whether a table's joint variables must be zero in the file's own zero pose (``zero = "given"``).
     in_letters
         Whether answers in numbers do not pass, though they are right at the file's values (``values = false``).
+    may_execute
+        Whether programs may be executed where a person asks for it (``execute = true``); without a task they may.
+    packages
+        Packages that programs may import when they are executed (``packages``); empty for the usual ones.
     jacobian_rows
         Rows of the Jacobian that are asked for, from 0, in their order (``J_rows``); empty if the answer decides.
     """
@@ -104,6 +114,8 @@ class Requirements:
     zero_given: bool = False
     in_letters: bool = False
     jacobian_rows: tuple[int, ...] = ()
+    may_execute: bool = False
+    packages: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

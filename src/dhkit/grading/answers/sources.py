@@ -1,16 +1,20 @@
-"""Answers out of .py, .m and .tex files and notebooks: they are read as text, and nothing in them is ever run."""
+"""Answers out of .py, .m and .tex files and notebooks: read as text, or executed where a person asks for it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from dhkit.description import Description
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.sheet import read_text
 from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Names
+
+if TYPE_CHECKING:
+    from dhkit.execution import Isolation
 
 MAX_CHARACTERS = 1_000_000
 """Largest length of code or LaTeX, in characters; a notebook may be longer, since its figures do not count."""
@@ -46,19 +50,77 @@ def read_source(path: Path, description: Description, names: Names = NO_NAMES) -
     AnswerError
         A file that cannot be read, one in which a statement may change any name, or one that assigns no quantity.
     """
-    text = read_text(path, "a program or a paper")
-    suffix = path.suffix.lower()
-    line_name: LineName = "line {}".format
+    code = source_code(path)
+    sheet = LANGUAGES[code.suffix](code.text, str(path), code.line_name, description, names)
+    return replace(sheet, notes=(*code.notes, *sheet.notes))
+
+
+@contextmanager
+def executed_source(
+    path: Path, description: Description, names: Names = NO_NAMES, *, isolation: Isolation
+) -> Iterator[AnswerSheet]:
+    """Execute a program in a process of its own, and yield the answers that its names and functions are.
+
+    Parameters
+    ----------
+    path
+        A file that ends in .py, .m or .ipynb.
+    description, names
+        As for :func:`read_source`; the names may give the order of a state.
+    isolation
+        What the program can see and reach.
+
+    Raises
+    ------
+    AnswerError
+        A file that cannot be read or executed, or gives no answer.
+    """
+    from dhkit.grading.answers.programs.executed_program import executed_answers
+
+    code = source_code(path)
+    with executed_answers(path, code, description, names, isolation=isolation) as sheet:
+        yield replace(sheet, notes=(*code.notes, *sheet.notes))
+
+
+@dataclass(frozen=True)
+class SourceCode:
+    """The text of a program or a paper.
+
+    Attributes
+    ----------
+    text
+        The text; of a notebook its cells of code.
+    suffix
+        ``.py``, ``.m`` or ``.tex``.
+    line_name
+        How messages name a line, which counts from 1.
+    notes
+        What a reader should know.
+    """
+
+    text: str
+    suffix: str
+    line_name: LineName
     notes: tuple[str, ...] = ()
-    if suffix == ".ipynb":
+
+
+def source_code(path: Path) -> SourceCode:
+    """Return the text of a program, a paper or a notebook.
+
+    Raises
+    ------
+    AnswerError
+        A file that cannot be read, is no notebook, or is too long.
+    """
+    code = SourceCode(read_text(path, "a program or a paper"), path.suffix.lower(), "line {}".format)
+    if code.suffix == ".ipynb":
         from dhkit.grading.answers.programs.notebook import notebook_code
 
-        notebook = notebook_code(text, str(path))
-        text, suffix, line_name, notes = notebook.code, notebook.suffix, notebook.line_name, notebook.notes
-    if len(text) > MAX_CHARACTERS:
+        notebook = notebook_code(code.text, str(path))
+        code = SourceCode(notebook.code, notebook.suffix, notebook.line_name, notebook.notes)
+    if len(code.text) > MAX_CHARACTERS:
         raise AnswerError(f"{path}: more than {MAX_CHARACTERS} characters of code or LaTeX")
-    sheet = LANGUAGES[suffix](text, str(path), line_name, description, names)
-    return replace(sheet, notes=(*notes, *sheet.notes))
+    return code
 
 
 # The readers are imported when they are used: most sheets are TOML, and `dhkit grade` must answer at once.

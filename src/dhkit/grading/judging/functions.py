@@ -1,9 +1,9 @@
-"""Answers that are Python functions of the state: compared with the truth at random states, never proved."""
+"""Answers that are functions of numbers: compared with the truth at random states, never proved."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,15 +11,20 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.given import Given
+from dhkit.grading.answers.sampled import SampledAnswer
 from dhkit.grading.answers.sheet import shape_of
 from dhkit.grading.isolation import Limits, result_of
 from dhkit.grading.judging.findings import Finding
 from dhkit.grading.judging.quantities import JudgedQuantity, parameters_in, place_of
+from dhkit.grading.judging.sampling import samples
 from dhkit.grading.judging.truth import Truth
 from dhkit.grading.report import Verdict, Witness
+from dhkit.symbolic.ring import Elements
 
 SAMPLES = 1_000
 """Number of random states."""
+GROUP = 10
+"""Number of random states in a row with the same parameters."""
 TOLERANCE = 1e-9
 """Tolerance relative to a quantity's largest entry at a state: doubles, with room for a long formula's rounding."""
 STATES = ("q", "qd", "qdd")
@@ -47,20 +52,89 @@ def judge_function(name: str, function: Callable[..., object], truth: Truth, see
     values = _call_at_states(name, function, y[:count], shape)
     right = truth.of("h" if name == "C" else name)
     expected = truth.arm(name).evaluate(right, *states)
-    values = np.einsum("...ij,...j->...i", values, y[1]) if name == "C" else values
+    states_by_name = dict(zip(STATES, y, strict=True))
+    return _compared(
+        name,
+        getattr(function, "__name__", "function") + "(...)",
+        values,
+        expected,
+        y[1],
+        right,
+        truth,
+        lambda k: {f"{kind}{i + 1}": float(x) for kind, rows in states_by_name.items() for i, x in enumerate(rows[k])},
+        Verdict.UNDECIDED,
+        group=SAMPLES,
+    )
+
+
+def judge_sampled(name: str, answer: SampledAnswer, truth: Truth, seed: int = 0) -> JudgedQuantity:
+    """Judge a quantity that an executed program calculates from numbers.
+
+    Parameters that the program takes have random values, the same at :data:`GROUP` states in a row.
+
+    Raises
+    ------
+    AnswerError
+        It fails, or returns another shape.
+    """
+    arm, n = truth.arm(name), truth.description.n
+    shape = shape_of(name, n)
+    right = truth.of("h" if name == "C" else name)
+    varied = answer.parameters & arm.parameters.keys()
+    if answer.parameters - varied:  # one that others define would not follow them
+        varied = frozenset()
+    fixed = frozenset(truth.description.numbers.values) - varied
+    listed = list(samples(arm, fixed, seed, every=GROUP, count=SAMPLES))
+    # The student's joint variables y, where q = B y.
+    inverse = np.linalg.inv(truth.coordinates.B.astype(float))
+    states = [_own_state(sample.names, inverse, n) for sample in listed]
+    values = answer.at(states, shape)
+    generators = np.array([[float(x) for x in sample.generators] for sample in listed]).T
+    flat = [np.broadcast_to(element.value(generators), SAMPLES) for element in right.reshape(-1)]
+    expected = np.stack(flat, axis=-1).reshape(SAMPLES, *right.shape)
+    rates = np.array([[state[f"qd{i + 1}"] for i in range(n)] for state in states])
+    return _compared(
+        name, answer.name, values, expected, rates, right, truth, states.__getitem__, Verdict.SAMPLED, group=GROUP
+    )
+
+
+def _own_state(names: Mapping[str, Any], inverse: Array, n: int) -> dict[str, float]:
+    """Return a state with the student's joint variables in place of the robot's."""
+    state = {name: float(value) for name, value in names.items()}
+    for kind in STATES:
+        own = inverse @ np.array([state[f"{kind}{i + 1}"] for i in range(n)])
+        state |= {f"{kind}{i + 1}": float(x) for i, x in enumerate(own)}
+    return state
+
+
+def _compared(
+    name: str,
+    called: str,
+    values: Array,
+    expected: Array,
+    rates: Array,
+    right: Elements,
+    truth: Truth,
+    state_of: Callable[[int], Mapping[str, float]],
+    verdict: Verdict,
+    group: int,
+) -> JudgedQuantity:
+    """Judge values at all states; potentials may differ by a constant, which is that of the first state of a group."""
+    shape = values.shape[1:]
+    values = np.einsum("...ij,...j->...i", values, rates) if name == "C" else values
     if name in ("V", "L"):
-        values = values - values[0] + expected[0]
+        first = np.arange(SAMPLES) // group * group
+        values = values - values[first] + expected[first]
     size = np.max(np.abs(expected).reshape(SAMPLES, -1), axis=1, initial=0.0)
     if name in ("V", "L", "J", "T") or name[:1] == "A":
         size = np.maximum(size, np.median(size))
     size = np.maximum(size, 1e-3 * np.median(size) + 1e-12).reshape(SAMPLES, *(1,) * (expected.ndim - 1))
     differs = ~(np.abs(values - expected) <= TOLERANCE * size)
-    states_by_name = dict(zip(STATES, y, strict=True))
     findings = {}
     for index in np.ndindex(shape):
         place = place_of(name, index)
-        findings[index] = _finding(differs[(slice(None), *place)], values, expected, place, states_by_name)
-    given = tuple(Given(index, f"{getattr(function, '__name__', 'function')}(...)") for index in np.ndindex(shape))
+        findings[index] = _finding(differs[(slice(None), *place)], values, expected, place, state_of, verdict)
+    given = tuple(Given(index, called) for index in np.ndindex(shape))
     return JudgedQuantity(name, given, findings, right, parameters_in(right, truth))
 
 
@@ -119,14 +193,21 @@ def _call(name: str, function: Callable[..., object], arguments: list[Array], sh
     return result.reshape(shape)
 
 
-def _finding(differs: Any, values: Array, expected: Array, place: tuple[int, ...], states: dict[str, Array]) -> Finding:
+def _finding(
+    differs: Any,
+    values: Array,
+    expected: Array,
+    place: tuple[int, ...],
+    state_of: Callable[[int], Mapping[str, float]],
+    verdict: Verdict,
+) -> Finding:
     if not differs.any():
-        statement = f"not proved, since it is a function: equal to the truth at {SAMPLES} random states, in doubles"
-        return Finding(Verdict.UNDECIDED, statement)
+        found = "agrees" if verdict is Verdict.SAMPLED else "equal to the truth"
+        statement = f"not proved, since it is a function: {found} at {SAMPLES} random states, in doubles"
+        return Finding(verdict, statement)
     gap = np.moveaxis(np.abs(values - expected), 0, -1)[place]
     worst = int(np.argmax(np.where(np.isfinite(gap), gap, np.inf)))
-    state = {f"{kind}{i + 1}": float(x) for kind, rows in states.items() for i, x in enumerate(rows[worst])}
     answer, right = float(values[(worst, *place)]), float(expected[(worst, *place)])
-    witness = Witness(state, answer if np.isfinite(answer) else None, right)
+    witness = Witness(dict(state_of(worst)), answer if np.isfinite(answer) else None, right)
     share = f"{int(differs.sum())} of {SAMPLES} random states show it"
     return Finding(Verdict.WRONG, share, witness=witness)

@@ -14,6 +14,7 @@ from dhkit.grading.reports.sentences import plain, points, points_of
 BADGES = {
     Verdict.CORRECT: ("right", "✓"),
     Verdict.ROUNDED: ("right", "≈"),
+    Verdict.SAMPLED: ("open", "∼"),
     Verdict.UNDECIDED: ("open", "?"),
     Verdict.INCOMPLETE: ("open", "…"),
     Verdict.WRONG: ("wrong", "✗"),

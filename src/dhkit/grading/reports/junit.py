@@ -13,13 +13,14 @@ OUTCOMES = {
     Verdict.WRONG: "failure",
     Verdict.INCOMPLETE: "failure",
     Verdict.UNREADABLE: "error",
+    Verdict.SAMPLED: "skipped",
     Verdict.UNDECIDED: "skipped",
 }
 """Element inside the case of an entry that does not simply pass."""
 
 
 def junit(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
-    """Return XML in which wrong entries are failures, unreadable ones errors, undecided ones skipped."""
+    """Return XML in which wrong entries are failures, unreadable ones errors, those without proof skipped."""
     root = Element("testsuites", name="dhkit grade")
     for report, mark in zip(reports, marks, strict=True):
         _add_suite(root, report, mark)
@@ -61,7 +62,7 @@ def _add_suite(root: Element, report: GradeReport, marks: Marks) -> None:
 def _add_case(suite: Element, report: GradeReport, entry: Entry, mark: Mark) -> None:
     case = SubElement(suite, "testcase", classname=plain(entry.quantity), name=plain(entry.name), time="0")
     outcome = OUTCOMES.get(entry.verdict)
-    if entry.verdict is Verdict.UNDECIDED and report.proof_required:
+    if outcome == "skipped" and report.proof_required:
         outcome = "failure"
     if outcome is None:
         return

@@ -17,6 +17,7 @@ from dhkit.grading.reports.sentences import plain, points_of
 STYLES = {
     Verdict.CORRECT: "green",
     Verdict.ROUNDED: "green",
+    Verdict.SAMPLED: "yellow",
     Verdict.UNDECIDED: "yellow",
     Verdict.INCOMPLETE: "yellow",
     Verdict.WRONG: "red",

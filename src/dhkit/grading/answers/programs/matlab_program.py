@@ -167,7 +167,8 @@ class MatlabProgram:
             is_field = k > 0 and statement.tokens[k - 1].text == "."
             if token.kind == "name" and token.text in UNBOUNDED and not is_field and token.text not in self.bound:
                 raise self._refuse(
-                    statement, f"found {token.text!r}, which may change any name; a program is read, not run"
+                    statement,
+                    f"found {token.text!r}, which may change any name; a program is read, not run (--execute)",
                 )
         if statement.keyword in UNBOUNDED:
             raise self._refuse(statement, f"found {statement.keyword!r}, which may change any name")

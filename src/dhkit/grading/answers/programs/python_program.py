@@ -158,7 +158,7 @@ class PythonProgram:
                 name = getattr(node, "id", "") or getattr(node, "attr", "") or getattr(node, "name", "")
                 raise AnswerError(
                     f"{self.file}: {self.line_name(getattr(node, 'lineno', 1))}: found {name[:40]!r}, which may change "
-                    "any name; a program is read, not run"
+                    "any name; a program is read, not run (--execute)"
                 )
 
     def line(self, node: ast.stmt | ast.expr) -> str:

@@ -22,13 +22,17 @@ from pathlib import Path
 import psutil
 
 from dhkit.errors import DhkitError
-from dhkit.grading.isolation import WAITING_FACTOR
-from dhkit.programs.isolated_commands import folder_inside, isolated_command
-from dhkit.programs.isolation import Isolation, Kind
-from dhkit.programs.launcher import MAX_PROCESSES
-from dhkit.programs.other_user import end_processes_of, next_user, remove_files_of
+from dhkit.execution.isolated_commands import folder_inside, isolated_command
+from dhkit.execution.isolation import Isolation, Kind
+from dhkit.execution.launcher import MAX_PROCESSES
+from dhkit.execution.other_user import end_processes_of, next_user, remove_files_of
 
 HERE = Path(__file__).parent
+WAITING_FACTOR = 4.0
+"""Longest time on the clock, as a multiple of the limit of processor time.
+
+On a busy machine a process waits for its turns, which must not change what is found; one that sleeps ends all the same.
+"""
 MAX_LINE_BYTES = 1 << 22
 """Largest answer, bytes."""
 MAX_UNREAD_ANSWERS = 1_000

@@ -6,8 +6,8 @@ import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from dhkit.programs.bubblewrap import HOME, PACKAGE_FOLDER, RUNNERS, base_python, bubblewrap, package_paths, read_only
-from dhkit.programs.isolation import Isolation, Kind
+from dhkit.execution.bubblewrap import HOME, PACKAGE_FOLDER, RUNNERS, base_python, bubblewrap, package_paths, read_only
+from dhkit.execution.isolation import Isolation, Kind
 
 HERE = Path(__file__).parent
 

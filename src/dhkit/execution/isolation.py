@@ -24,8 +24,8 @@ from pathlib import Path
 
 from dhkit.display import repr_line
 from dhkit.errors import DhkitError
-from dhkit.programs.bubblewrap import base_python, bubblewrap
-from dhkit.programs.other_user import FIRST_USER
+from dhkit.execution.bubblewrap import base_python, bubblewrap
+from dhkit.execution.other_user import FIRST_USER
 
 PACKAGES = ("numpy", "scipy", "sympy", "casadi")
 """Packages that programs may import, unless a task names others."""

@@ -1,0 +1,502 @@
+"""Programs that are executed in a process of their own: what their names are, and what their functions return."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dhkit.description import Array, Description
+from dhkit.errors import AnswerError
+from dhkit.execution.child import Child
+from dhkit.execution.isolation import Isolation
+from dhkit.execution.process import Limits, ProgramError
+from dhkit.grading.answers.programs.program_answers import answers_of
+from dhkit.grading.answers.programs.robot_names import RobotNames, is_same_number
+from dhkit.grading.answers.programs.scope import Bound, Record, Scope
+from dhkit.grading.answers.programs.values import (
+    Function,
+    Index,
+    Level,
+    Matrix,
+    Scalar,
+    Several,
+    Structure,
+    Unread,
+    UnreadError,
+    Value,
+    number,
+)
+from dhkit.grading.answers.sampled import SampledAnswer
+from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Entries, Names, Refusal
+from dhkit.grading.answers.sources import SourceCode
+from dhkit.grading.answers.vocabulary import plain_name
+
+RUNNERS = {".py": "answers_runner.py", ".m": "answers_runner.m"}
+LIMITS = Limits(seconds=20.0, memory=2 << 30)
+"""Limits of one request: derivations by Lagrange in sympy take seconds."""
+SAMPLING_TIME = 60.0
+"""Processor time for calling a function at all states, s."""
+MAX_NAMES = 2_000
+KINDS = ("numpy", "sympy", "casadi")
+"""How symbols are made, in the order in which they are tried."""
+PARAMETER_SETS = frozenset(("p", "par", "params", "param", "parameters", "robot", "P", "prm", "constants"))
+"""Names of an argument with the robot's parameters as fields."""
+STATES = frozenset(("x", "y", "s", "state", "z", "X", "Y"))
+"""Names of an argument with the joint variables and their rates, in the order that the task gives."""
+TORQUES = frozenset(("tau", "u", "U", "torque", "torques", "F", "Q"))
+"""Names of an argument with the motors' torques, on which no quantity depends."""
+NUMBER = re.compile(r"-?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?", re.ASCII)
+
+
+@contextmanager
+def executed_answers(
+    path: Path,
+    code: SourceCode,
+    description: Description,
+    names: Names = NO_NAMES,
+    *,
+    isolation: Isolation,
+) -> Iterator[AnswerSheet]:
+    """Execute a program, and yield its answers; its process ends with the context.
+
+    Parameters
+    ----------
+    path
+        The file, as messages name it.
+    code
+        The program.
+    description
+        The robot.
+    names
+        The task's names of the joint variables and of a state.
+    isolation
+        What the program can see and reach.
+
+    Yields
+    ------
+    AnswerSheet
+        Answers as text, and as :class:`SampledAnswer` where a function cannot be called with symbols.
+
+    Raises
+    ------
+    AnswerError
+        The program cannot be executed, or gives no answer.
+    """
+    with tempfile.TemporaryDirectory(prefix="dhkit-answers-") as folder:
+        if code.suffix not in RUNNERS:
+            raise AnswerError(f"{path}: {code.suffix} files are not executed; expected {', '.join(RUNNERS)} or .ipynb")
+        source = Path(folder) / (re.sub(r"\W", "_", path.stem, flags=re.ASCII)[:60] + code.suffix)
+        if code.suffix == ".m":
+            code = functions_first(code)
+        source.write_text(code.text, "utf-8")
+        child = Child(source, RUNNERS, LIMITS, isolation)
+        try:
+            program = ExecutedProgram(
+                child, Record(RobotNames(description, names), "**"), str(path), code.line_name, names
+            )
+            yield program.sheet()
+        finally:
+            child.close()
+
+
+def functions_first(code: SourceCode) -> SourceCode:
+    """Return a MATLAB file as a script with its functions in front: Octave knows them only after their definitions."""
+    lines = code.text.split("\n")
+    starts = [k for k, line in enumerate(lines) if re.match(r"\s*function\b", line)]
+    if not starts:
+        return code
+    order = [*range(starts[0], len(lines)), *range(starts[0])]
+
+    def line_name(line: int) -> str:
+        """Return the name of a line that has moved; one more stands in front."""
+        return code.line_name(order[min(max(line - 2, 0), len(order) - 1)] + 1)
+
+    return replace(code, text="\n".join(["1;", *(lines[k] for k in order)]), line_name=line_name)
+
+
+class ExecutedProgram:
+    """An executed program, with its names and functions as the readers of programs have them.
+
+    Parameters
+    ----------
+    child
+        Its process.
+    record
+        What is known of the program.
+    file
+        What messages begin with.
+    line_name
+        How messages name a line, which counts from 1.
+    names
+        The task's names.
+
+    Raises
+    ------
+    AnswerError
+        It cannot be executed.
+    """
+
+    def __init__(self, child: Child, record: Record, file: str, line_name: Callable[[int], str], names: Names) -> None:
+        self.child = child
+        self.record = record
+        self.file = file
+        self.line_name = line_name
+        self.state = names.state
+        self.main = Scope(record)
+        self.definitions: dict[str, str] = {}
+        self.problems: list[str] = []
+        """Why functions are not called."""
+        self.numeric: list[tuple[Function, str]] = []
+        """Functions that fail with symbols, and why."""
+        try:
+            first = child.start()
+        except ProgramError as error:
+            hint = "; Octave needs its symbolic package (octave-symbolic)" if "'syms' undefined" in str(error) else ""
+            raise AnswerError(f"{file}: executed: {self._error(error)}{hint}") from None
+        record.note(f"executed, {child.isolation}")
+        self._lines = {name: _whole(line) for name, line in _fields(first.get("names"))}
+        self.functions = [_function(one, self._line) for one in _listed(first.get("functions"))]
+        self._bind_names()
+        for function in self.functions:
+            self.main.set_argument(function.name, function, function.line)
+
+    def _error(self, error: ProgramError) -> str:
+        """Return an error with the line as messages name it."""
+        if error.line is None:
+            return str(error)
+        return f"{self.line_name(error.line)}: {str(error).removeprefix(f'line {error.line}: ')}"
+
+    def _line(self, number: int) -> str:
+        return self.line_name(number) if number else "the program"
+
+    # Names
+
+    def _bind_names(self) -> None:
+        """Bind the names that may be answers, and refuse all where a joint variable is a number."""
+        robot, problem = self.record.robot, ""
+        for name, line_number in self._lines.items():
+            line = self._line(line_number)
+            is_quantity = bool(robot.quantities.quantity(name) or robot.quantities.entries(name))
+            if not is_quantity and not robot.is_reserved(name):
+                continue
+            value = self._value_of(name)
+            if robot.is_reserved(name) and isinstance(value, Scalar) and value.number is not None:
+                problem = problem or self._problem_of_number(name, value, line)
+            if is_quantity:
+                self.main.set_argument(name, value, line)
+        if problem:
+            for name, bound in list(self.main.names.items()):
+                if not isinstance(bound.value, Unread):
+                    self.main.names[name] = Bound(Unread(problem), Unread(problem), bound.line)
+
+    def _problem_of_number(self, name: str, value: Scalar, line: str) -> str:
+        """Return why answers that are made with a number are not judged; empty for the file's own number."""
+        robot = self.record.robot
+        if not robot.quantities.is_parameter(name):
+            return f"{line}: {name} = {value.text}: the answers are at one state alone; leave {name} a symbol"
+        if is_same_number(robot.parameter_value(name), value.number):
+            return ""
+        return f"{line}: {name} = {value.text}; the robot's file has {robot.parameter_value(name)}"
+
+    def _value_of(self, name: str) -> Value:
+        try:
+            answer = self.child.ask({"value": name})
+        except ProgramError as error:
+            return Unread(f"{name}: {error}")
+        return self._value(answer.get("tree"), answer)
+
+    def _value(self, tree: object, answer: Mapping[str, object]) -> Value:
+        """Return a tree of text as a value; what CasADi's formulas have in common becomes definitions."""
+        renamed = {}
+        for name, text in _fields(answer.get("definitions")):
+            renamed[name] = f"casadi{len(self.definitions) + 1}"
+            self.definitions[renamed[name]] = _renamed(str(text), renamed)
+        return _value_of_tree(tree, renamed)
+
+    # Functions
+
+    def arguments_as_given(self, function: Function) -> dict[str, Value]:
+        """Return nothing: a function is called with symbols by its process."""
+        return {}
+
+    def applied(self, function: Function, arguments: dict[str, Value]) -> tuple[Value, Scope]:
+        """Return what a function returns when it is called with symbols, and its local names.
+
+        Raises
+        ------
+        UnreadError
+            An argument is not known, or it fails with all kinds of symbols.
+        """
+        meaning = {name: self.symbols(name, function) for name in function.parameters}
+        problem = ""
+        for kind in KINDS if self.child.name.endswith(".py") else ():
+            try:
+                answer = self.child.ask(
+                    {"call": function.name, "arguments": meaning, "as": kind, "locals": self._local_names(function)}
+                )
+            except ProgramError as error:
+                problem = problem or str(error)
+                continue
+            value = self._value(answer.get("tree"), answer)
+            if isinstance(value, Unread):
+                problem = problem or value.reason
+                continue
+            scope = Scope(self.record, self.main, frozenset(function.definition))
+            for name, tree in _fields(answer.get("locals")):
+                scope.set_argument(name, self._value(tree, answer), function.line)
+            return self._with_names(value, scope), scope
+        self.numeric.append((function, problem))
+        raise UnreadError(f"{function.name}(...) is not computed with symbols: {problem}")
+
+    def _local_names(self, function: Function) -> list[str]:
+        """Return the local names of a function that may be quantities."""
+        quantities = self.record.robot.quantities
+        return [name for name in function.definition if quantities.quantity(name) or quantities.entries(name)]
+
+    @staticmethod
+    def _with_names(value: Value, scope: Scope) -> Value:
+        """Return several values with the local names that they are."""
+        if not isinstance(value, Several):
+            return value
+        names = [next((n for n, b in scope.names.items() if b.value == one), "") for one in value.values]
+        return replace(value, names=tuple(names))
+
+    def returned_names(self, function: Function) -> list[str]:
+        """Return the names in what a function returns, which are not known of an executed one."""
+        return []
+
+    def assigned_anywhere(self) -> Iterator[tuple[str, str]]:
+        """Yield the names that the program assigns, with their lines."""
+        yield from ((name, self._line(line)) for name, line in self._lines.items())
+
+    def symbols(self, name: str, function: Function) -> object:
+        """Return an argument as names of symbols."""
+        robot, plain = self.record.robot, plain_name(name)
+        if robot.vocabulary.is_state(plain) or robot.quantities.is_parameter(name):
+            return name
+        if robot.is_vector(plain):
+            return [f"{plain}{k + 1}" for k in range(robot.n)]
+        if name in PARAMETER_SETS:
+            return {}
+        if name in ("t", "time"):
+            return "t"
+        if name in STATES and self.state:
+            return list(self._state_names())
+        if name in TORQUES:
+            return [f"torque{k + 1}" for k in range(robot.n)]
+        more = ', or a state whose order the task gives ([names] state = "q, qd")' if name in STATES else ""
+        found = f"the argument {name[:40]} of {function.name}"
+        self.problems.append(f"{found} is not known; expected joint variables, parameters{more}")
+        raise UnreadError(self.problems[-1])
+
+    def _state_names(self) -> Iterator[str]:
+        """Yield the joint variables and rates in the order of the task's state."""
+        robot = self.record.robot
+        for part in self.state:
+            plain = plain_name(part)
+            if robot.vocabulary.is_state(plain):
+                yield plain
+            else:
+                yield from (f"{plain}{k + 1}" for k in range(robot.n))
+
+    # The answers
+
+    def sheet(self) -> AnswerSheet:
+        """Return the answers.
+
+        Raises
+        ------
+        AnswerError
+            There is none.
+        """
+        try:
+            sheet = answers_of(self, self.file)
+        except AnswerError:
+            sheet = AnswerSheet(names=Names(lenient=True), file=self.file, notes=tuple(self.record.notes))
+            sampled = self._sampled({})
+            if not sampled and self.problems:
+                raise AnswerError(f"{self.file}: {self.problems[0]}") from None
+            if not sampled:
+                raise
+        else:
+            sampled = self._sampled(sheet.answers)
+        parameters = {**self.definitions, **sheet.names.parameters}
+        answers = {name: _without_advice(answer) for name, answer in sheet.answers.items()}
+        return replace(
+            sheet,
+            answers={**answers, **sampled},
+            names=replace(sheet.names, parameters=parameters),
+            notes=(*sheet.notes, *self._notes_of_imports()),
+        )
+
+    def _notes_of_imports(self) -> tuple[str, ...]:
+        return ("it imports dhkit",) if self.child.imported else ()
+
+    def _sampled(self, answers: Mapping[str, object]) -> dict[str, SampledAnswer]:
+        """Return the quantities that are given by functions of numbers alone."""
+        quantities = self.record.robot.quantities
+        found: dict[str, SampledAnswer] = {}
+        for function, _ in self.numeric:
+            for local in ("", *function.definition):
+                name = local or function.name
+                quantity = quantities.quantity(name)
+                is_given = quantity in answers and not isinstance(answers[quantity], Refusal)
+                if not quantity or is_given or quantity in found or quantities.is_parameter(name):
+                    continue
+                if local and local in function.parameters:
+                    continue
+                found[quantity] = _SampledFunction(self, function, local)
+        return found
+
+
+@dataclass(frozen=True)
+class _SampledFunction(SampledAnswer):
+    """A function that is called with numbers; ``local`` is the local name that is the answer, empty for its value."""
+
+    program: ExecutedProgram
+    function: Function
+    local: str
+
+    @property
+    def name(self) -> str:
+        """How reports call it."""
+        return f"{self.function.name}(...)" + (f": {self.local}" if self.local else "")
+
+    @property
+    def parameters(self) -> frozenset[str]:
+        """The robot's parameters that are arguments."""
+        robot = self.program.record.robot
+        names = self.function.parameters
+        if any(name in PARAMETER_SETS for name in names):
+            return frozenset(robot.quantities.parameters.values())
+        plain = map(plain_name, names)
+        return frozenset(robot.quantities.parameters[x] for x in plain if x in robot.quantities.parameters)
+
+    def at(self, states: Sequence[Mapping[str, float]], shape: tuple[int, ...]) -> Array:
+        """Return its values at states, shape (states, *shape); see :class:`SampledAnswer`."""
+        samples = [{name: self._argument(name, state) for name in self.function.parameters} for state in states]
+        try:
+            answer = self.program.child.ask(
+                {"call": self.function.name, "samples": samples, "local": self.local}, SAMPLING_TIME
+            )
+        except ProgramError as error:
+            raise AnswerError(f"{self.name}: {error}") from None
+        values = answer.get("values")
+        try:
+            array = np.array(values, dtype=float)
+        except (TypeError, ValueError, OverflowError):
+            raise AnswerError(f"{self.name}: returns no array of numbers of one shape") from None
+        if array.size != len(states) * int(np.prod(shape, dtype=int)):
+            raise AnswerError(f"{self.name}: returns shape {array.shape[1:]}; expected {shape}")
+        return array.reshape(len(states), *shape)
+
+    def _argument(self, name: str, state: Mapping[str, float]) -> object:
+        symbols = self.program.symbols(name, self.function)
+        if isinstance(symbols, dict):
+            return {known: state[known] for known in self.program.record.robot.quantities.parameters.values()}
+        if isinstance(symbols, list):
+            return [self._number(one, state) for one in symbols]
+        return self._number(str(symbols), state)
+
+    def _number(self, symbol: str, state: Mapping[str, float]) -> float:
+        if symbol == "t" or symbol.startswith("torque"):
+            return 0.0
+        robot = self.program.record.robot
+        parameter = robot.quantities.parameters.get(plain_name(symbol))
+        if parameter is not None:
+            return state[parameter]
+        meaning = robot.find(symbol)
+        if meaning is None or len(meaning) != 1 or meaning[0] not in state:
+            raise AnswerError(f"{self.name}: the argument {symbol[:40]} is no single joint variable")
+        return state[meaning[0]]
+
+
+# What a process says, which is not trusted
+
+
+def _fields(value: object) -> list[tuple[str, Any]]:
+    """Return the fields of an object; none of anything else."""
+    if not isinstance(value, dict):
+        return []
+    return [
+        (name, one) for name, one in list(value.items())[:MAX_NAMES] if isinstance(name, str) and name.isidentifier()
+    ]
+
+
+def _listed(value: object) -> list[dict[str, Any]]:
+    return [one for one in value[:MAX_NAMES] if isinstance(one, dict)] if isinstance(value, list) else []
+
+
+def _texts(value: object) -> tuple[str, ...]:
+    return tuple(one for one in value if isinstance(one, str) and one.isidentifier()) if isinstance(value, list) else ()
+
+
+def _whole(value: object) -> int:
+    return value if isinstance(value, int) and not isinstance(value, bool) and 0 < value < 10**7 else 0
+
+
+def _function(one: Mapping[str, Any], line: Callable[[int], str]) -> Function:
+    """Return a function of the program; its definition is its local names."""
+    name = one.get("name")
+    return Function(
+        name if isinstance(name, str) and name.isidentifier() else "function",
+        _texts(one.get("parameters")),
+        _texts(one.get("locals")),
+        line(_whole(one.get("line"))),
+    )
+
+
+def _without_advice(answer: object) -> object:
+    """Return an answer; a refusal without the advice to execute the program."""
+    if isinstance(answer, Refusal):
+        return replace(answer, advice="")
+    if isinstance(answer, Entries):
+        return Entries({index: _without_advice(entry) for index, entry in answer.texts.items()})  # type: ignore[misc]
+    return answer
+
+
+def _renamed(text: str, names: Mapping[str, str]) -> str:
+    if not names:
+        return text
+    return re.sub(r"\bcasadi\d+\b", lambda match: names.get(match[0], match[0]), text, flags=re.ASCII)
+
+
+def _value_of_tree(tree: object, names: Mapping[str, str]) -> Value:
+    match tree:
+        case str(text):
+            text = _renamed(text, names)
+            if NUMBER.fullmatch(text) and not text.startswith("-"):
+                return number(text)
+            with suppress(ValueError):
+                return Scalar(text, Level.SUM, float(text) if NUMBER.fullmatch(text) else None)
+        case list(rows):
+            return _value_of_list([_value_of_tree(row, names) for row in rows])
+        case {"fields": dict(fields)}:
+            return Structure({name: _value_of_tree(one, names) for name, one in _fields(fields)})
+        case {"error": error}:
+            return Unread(" ".join(str(error).split())[:300])
+    return Unread("no formula and no numbers")
+
+
+def _value_of_list(values: Sequence[Value]) -> Value:
+    """Return a matrix of rows, a vector of scalars, or several values."""
+    entries: dict[Index, Scalar] = {}
+    for i, one in enumerate(values):
+        if isinstance(one, Unread):
+            return one
+        if isinstance(one, Scalar):
+            entries[(i,)] = one
+        elif isinstance(one, Matrix) and one.is_flat:
+            entries |= {(i, j): entry for (j,), entry in one.entries.items()}
+        else:
+            return Several(tuple(values))
+    lengths = {sum(1 for index in entries if index[0] == i) for i in range(len(values))}
+    is_even = len({len(index) for index in entries}) == 1 and len(lengths) == 1
+    return Matrix(entries) if entries and is_even else Several(tuple(values))
