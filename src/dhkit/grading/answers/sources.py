@@ -4,23 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from dhkit.description import Description
-from dhkit.errors import AnswerError
-from dhkit.grading.answers.sheet import read_text
 from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Names
+from dhkit.grading.answers.source_code import LineName, source_code
 
 if TYPE_CHECKING:
     from dhkit.execution import Isolation
-
-MAX_CHARACTERS = 1_000_000
-"""Largest length of code or LaTeX, in characters; a notebook may be longer, since its figures do not count."""
-
-LineName: TypeAlias = Callable[[int], str]
-"""Function from a line, from 1, to its name in messages."""
 
 Reader: TypeAlias = Callable[[str, str, LineName, Description, Names], AnswerSheet]
 """Function from a text, the file's name, the names of lines, the robot and the task's names to the answers."""
@@ -80,47 +73,6 @@ def executed_source(
     code = source_code(path)
     with executed_answers(path, code, description, names, isolation=isolation) as sheet:
         yield replace(sheet, notes=(*code.notes, *sheet.notes))
-
-
-@dataclass(frozen=True)
-class SourceCode:
-    """The text of a program or a paper.
-
-    Attributes
-    ----------
-    text
-        The text; of a notebook its cells of code.
-    suffix
-        ``.py``, ``.m`` or ``.tex``.
-    line_name
-        How messages name a line, which counts from 1.
-    notes
-        What a reader should know.
-    """
-
-    text: str
-    suffix: str
-    line_name: LineName
-    notes: tuple[str, ...] = ()
-
-
-def source_code(path: Path) -> SourceCode:
-    """Return the text of a program, a paper or a notebook.
-
-    Raises
-    ------
-    AnswerError
-        A file that cannot be read, is no notebook, or is too long.
-    """
-    code = SourceCode(read_text(path, "a program or a paper"), path.suffix.lower(), "line {}".format)
-    if code.suffix == ".ipynb":
-        from dhkit.grading.answers.programs.notebook import notebook_code
-
-        notebook = notebook_code(code.text, str(path))
-        code = SourceCode(notebook.code, notebook.suffix, notebook.line_name, notebook.notes)
-    if len(code.text) > MAX_CHARACTERS:
-        raise AnswerError(f"{path}: more than {MAX_CHARACTERS} characters of code or LaTeX")
-    return code
 
 
 # The readers are imported when they are used: most sheets are TOML, and `dhkit grade` must answer at once.

@@ -32,6 +32,9 @@ NUMBER_WITH_UNIT = re.compile(
 
 ENERGIES = ("K", "V", "L")
 
+ADVICE = "write it out in one formula, or on a sheet"
+"""What the author of a document may do that is not read."""
+
 
 def latex_answers(
     text: str, file: str, line_name: Callable[[int], str], description: Description, names: Names = NO_NAMES
@@ -114,7 +117,7 @@ class _DocumentAnswers:
                 answers[quantity] = entries
             elif not all(name in self._used for name, _ in self._entry_statements(quantity)):
                 _, line = next(self._entry_statements(quantity))
-                answers[quantity] = Refusal(f"{quantity} is given as a whole and entry by entry, in {line}")
+                answers[quantity] = _refused(f"{quantity} is given as a whole and entry by entry, in {line}")
         for name in self.by_name:
             if self.names.vocabulary.is_state(name):
                 self._defining(name)
@@ -143,9 +146,9 @@ class _DocumentAnswers:
     def _whole(self, name: str, quantity: str, statements: Sequence[Statement]) -> str | Chain | Entries | Refusal:
         first = statements[0]
         if broken := next((s for s in statements if s.problem), None):
-            return Refusal(f"{self._line(broken)}: {broken.problem}")
+            return _refused(f"{self._line(broken)}: {broken.problem}")
         if other := next((s for s in statements if s.formulas != first.formulas), None):
-            return Refusal(f"{name} is assigned twice, in {self._line(first)} and in {self._line(other)}")
+            return _refused(f"{name} is assigned twice, in {self._line(first)} and in {self._line(other)}")
         self._note_relations(first)
         formulas = first.formulas
         if quantity not in ENERGIES:
@@ -158,7 +161,7 @@ class _DocumentAnswers:
     def _with_definitions(self, formulas: tuple[str, ...], outer: set[str]) -> str | Chain | Refusal:
         """Return formulas whose names are all defined, or why they cannot be."""
         if problem := next((why for formula in formulas if (why := self._define_names_in(formula, outer))), ""):
-            return Refusal(problem)
+            return _refused(problem)
         return formulas[0] if len(formulas) == 1 else Chain(formulas)
 
     def _note_relations(self, statement: Statement) -> None:
@@ -238,12 +241,12 @@ class _DocumentAnswers:
             line = self._line(statements[0])
             if len(targets) > 1:
                 problem = f"{name} in {line} may be {' or '.join(map(str, targets))}; write a comma"
-                refused |= {target.quantity: Refusal(problem) for target in targets}
+                refused |= {target.quantity: _refused(problem) for target in targets}
                 continue
             (target,) = targets
             text = self._entry(name)
             if texts.setdefault(target.quantity, {}).setdefault(target.index or (), text) != text:
-                refused[target.quantity] = Refusal(f"{target} is assigned twice, in {line}")
+                refused[target.quantity] = _refused(f"{target} is assigned twice, in {line}")
         return {quantity: Entries(dict(sorted(own.items()))) for quantity, own in texts.items()} | refused
 
     def _is_part_of_energy(self, name: str, target: Target) -> bool:
@@ -260,13 +263,13 @@ class _DocumentAnswers:
         self._used.add(name)
         statements = self.by_name[name]
         if broken := next((s for s in statements if s.problem), None):
-            return Refusal(f"{self._line(broken)}: {broken.problem}")
+            return _refused(f"{self._line(broken)}: {broken.problem}")
         formulas: tuple[str, ...] = ()
         for statement in statements:
             self._note_relations(statement)
             is_only_name = len(statement.formulas) == 1 and self._entry_name(statement.formulas[0])
             if formulas and formulas != statement.formulas and not is_only_name:
-                return Refusal(f"{name} is assigned twice, in {self._line(statement)}")
+                return _refused(f"{name} is assigned twice, in {self._line(statement)}")
             formulas = formulas or statement.formulas
         names = [s.formulas[0] for s in statements if s.formulas != formulas]
         return self._with_definitions((*names, *formulas), {name})
@@ -372,3 +375,7 @@ class _DocumentAnswers:
         if len(first.formulas) > 1:
             return f"{name} is given by several formulas in {line}; write the one that is meant"
         return ""
+
+
+def _refused(reason: str) -> Refusal:
+    return Refusal(reason, ADVICE)

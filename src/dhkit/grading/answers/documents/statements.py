@@ -104,6 +104,7 @@ def left_hand_name(side: str) -> str:
         styled = text
         text = STYLES.sub("", text).strip()
         text = re.sub(r"^\{\s*([^{}]*?)\s*\}", r"\1", text)
+        text = re.sub(r"\{\s*\{([^{}]*)\}\s*\}", r"{\1}", text)  # \dot{\mathbf{q}}
     text = re.sub(r"\s+", "", re.sub(r"\{\s*(\\?[A-Za-z]+)\s*\}", r"{\1}", text))
     match = NAME.match(text)
     if match is None or (text.startswith("[") != text[: match.end()].count("]")):

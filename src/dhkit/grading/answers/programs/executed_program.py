@@ -35,7 +35,7 @@ from dhkit.grading.answers.programs.values import (
 )
 from dhkit.grading.answers.sampled import SampledAnswer
 from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Entries, Names, Refusal
-from dhkit.grading.answers.sources import SourceCode
+from dhkit.grading.answers.source_code import SourceCode
 from dhkit.grading.answers.vocabulary import plain_name
 
 RUNNERS = {".py": "answers_runner.py", ".m": "answers_runner.m"}

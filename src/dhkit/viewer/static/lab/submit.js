@@ -3,7 +3,7 @@
 import { h } from "./dom.js";
 import { formula } from "./formula.js";
 
-const KINDS = [["lines", "Equations, one a line: M11 = …"], ["latex", "LaTeX"], ["python", "Python (read, not run)"], ["matlab", "MATLAB (read, not run)"], ["sheet", "Answer sheet (TOML)"]];
+const KINDS = [["lines", "Equations, one a line: M11 = …"], ["latex", "LaTeX"], ["python", "Python (as text)"], ["matlab", "MATLAB (as text)"], ["sheet", "Answer sheet (TOML)"]];
 const EXAMPLE = "M11 = ...\ng2 = ...";
 
 export class SubmitPanel {
