@@ -42,6 +42,9 @@ def test_a_command_works(command, tmp_path, monkeypatch, capsys):
         (tmp_path / path).write_text(SHEET)
     (tmp_path / "task.toml").write_text(TASK)
     (tmp_path / "homework.m").write_text("V = m1*g*l1*sin(q(1))/2 + m2*g*(l1*sin(q(1)) + l2*sin(q(1) + q(2))/2);\n")
+    (tmp_path / "homework.py").write_text(
+        "V = sum(m*g*y for m, y in [(m1, l1*sin(q1)/2), (m2, l1*sin(q1) + l2*sin(q1 + q2)/2)])\n"
+    )
     with pytest.raises(SystemExit) as exit:
         main(shlex.split(command))
     assert exit.value.code == 0, capsys.readouterr()

@@ -46,6 +46,8 @@ DIGITS = 15
 ELEMENTARY = "sin cos tan sinh cosh tanh sqrt exp log"
 INVERSES = {"arcsin": "asin", "arccos": "acos", "arctan": "atan", "arctan2": "atan2"}
 """numpy's names of sympy's functions."""
+KNOWN = frozenset((*ELEMENTARY.split(), *INVERSES.values(), "pi"))
+"""Names that are sympy's where a file does not define them."""
 
 
 def main(packages: str, path: str) -> None:
@@ -213,7 +215,7 @@ def number_symbols_from_one() -> None:
 
 
 class Namespace(dict[str, Any]):
-    """The names of a file; one that neither it nor Python defines is a symbol."""
+    """The names of a file; one that neither it nor Python defines is a symbol, or sympy's sine."""
 
     def __init__(self, symbolic: Symbolic) -> None:
         super().__init__()
@@ -222,6 +224,8 @@ class Namespace(dict[str, Any]):
     def __missing__(self, name: str) -> Any:
         if hasattr(builtins, name) or name.startswith("__") or self._symbolic.sympy is None:
             raise KeyError(name)
+        if name in KNOWN:
+            return getattr(self._symbolic.sympy, name)
         return self._symbolic.sympy.Symbol(name)
 
 

@@ -165,7 +165,7 @@ def test_a_tilt_that_is_written_stays_though_another_angle_is_rounded(tmp_path):
 def test_random_arms_with_parallel_axes_and_rounded_angles_have_short_tables(law, tmp_path):
     rng = np.random.default_rng(4)
     file = tmp_path / "arm.urdf"
-    for _ in range(law.samples(300, quick=20)):
+    for _ in range(law.samples(300, quick=8)):
         digits = int(rng.integers(3, 7))
         joints = []
         for _ in range(int(rng.integers(2, 8))):

@@ -163,7 +163,7 @@ def test_sampled_parameters_vary(judged):
     ],
 )
 def test_what_is_no_answer_is_refused(judged, text, reason, monkeypatch):
-    monkeypatch.setattr("dhkit.execution.child.MAX_START_TIME", 3.0)
+    monkeypatch.setattr("dhkit.execution.child.MAX_START_TIME", 1.5)
     try:
         report = judged(text)
     except AnswerError as error:
