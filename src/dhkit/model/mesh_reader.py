@@ -1,9 +1,9 @@
 """The reader of all mesh files: a file is checked first and then read as triangles, which are checked too.
 
 STL, OBJ and COLLADA are read by dhkit itself, PLY by trimesh. Libraries were tried on 131 files of example-robot-data
-and on damaged ones. trimesh 5.2 does not say where a text STL is wrong, drops vertices that are not numbers, and ignores
+and on damaged ones. trimesh 5.2 does not say where a text STL is wrong, drops vertices that are not numbers, ignores
 COLLADA's unit and up axis. pycollada 0.9.3 leaves a geometry out where the texture of its material is missing
-(anymal_foot.dae), where an accessor names no parameters, and where an index has no vertex; it needs twice the time.
+(anymal_foot.dae), an accessor names no parameters or an index has no vertex; it needs twice the time.
 """
 
 from __future__ import annotations
