@@ -14,7 +14,7 @@ from dhkit.symbolic.equations import equations_c, equations_matlab, equations_py
 from dhkit.symbolic.equations.programs import INPUTS, harmless, identifier
 from dhkit.symbolic.equations.python_code import FUNCTION_NAMES
 from dhkit.symbolic.exact.lagrangian import lagrangian
-from dhkit.symbolic.syntax import PYTHON
+from dhkit.symbolic.languages.printing import NUMPY
 
 TOLERANCE = 1e-12
 """Of the largest entry: code rounds in another order than the exact terms' sum."""
@@ -170,7 +170,7 @@ def test_parameters_can_be_changed(equations):
 
 @given(st.floats())
 def test_a_number_in_python_is_read_as_the_same_double(value):
-    assert np.array_equal(eval(PYTHON.number(value)), value, equal_nan=True)
+    assert np.array_equal(eval(NUMPY.number(value)), value, equal_nan=True)
 
 
 def test_names_cannot_break_out():

@@ -15,47 +15,14 @@ from dhkit.symbolic.inverse.chain import POSE
 from dhkit.symbolic.inverse.derivation import IN_PLANE, InverseDerivation, in_branch_order
 from dhkit.symbolic.inverse.forms import ROUNDING, Form, Remainder
 from dhkit.symbolic.inverse.steps import Choice, Step
+from dhkit.symbolic.languages.statements import Comment, Digit, Guard, Let, Statement
+from dhkit.symbolic.languages.syntax import Syntax
 from dhkit.symbolic.ring import Element, Generator
 from dhkit.symbolic.ring.notation import constants_of, generators_of, symbols_of
-from dhkit.symbolic.syntax import Syntax
 
 LETTER = re.compile(r"\b[A-Zk]\b")
 LOCAL = frozenset(["T", "q", "b", "k", "status", "wrap", "root", "branches", "found", "nargin", "true", "false"])
 """Names that the code around the statements uses."""
-
-
-@dataclass(frozen=True)
-class Comment:
-    """A comment, which begins a step."""
-
-    text: str
-
-
-@dataclass(frozen=True)
-class Assignment:
-    """A variable and its expression."""
-
-    name: str
-    expression: str
-
-
-@dataclass(frozen=True)
-class Guard:
-    """There is no solution unless an expression is at least another one."""
-
-    expression: str
-    least: str
-
-
-@dataclass(frozen=True)
-class Digit:
-    """The next binary digit of the branch's index: whether an odd number of expressions is negative, or an even one."""
-
-    expressions: tuple[str, ...]
-    is_inverted: bool
-
-
-Statement = Comment | Assignment | Guard | Digit
 
 
 @dataclass(frozen=True)
@@ -95,6 +62,23 @@ class InverseProgram:
     joints: tuple[str, ...]
     turning: tuple[bool, ...]
     words: tuple[str, ...]
+
+    @property
+    def has_roots(self) -> bool:
+        """Whether the statements call ``root``."""
+        return any(isinstance(each, Let) and "root(" in each.expression for each in self.statements)
+
+    def joint(self, i: int) -> str:
+        """Return the expression of a joint's value; angles are turned into (-pi, pi]."""
+        return f"wrap({self.joints[i]})" if self.turning[i] else self.joints[i]
+
+
+ABOUT = (
+    "The joint values that bring the tool to a pose T, branch by branch: SI units and radians in (-pi, pi].",
+    "Branches that do not reach the pose have status 0, the others 1; all have 0 where T is no pose.",
+    "At singular poses, where solutions coincide or are not unique, one of them is returned.",
+)
+"""What the generated functions' comments say."""
 
 
 class CodeWriter:
@@ -195,7 +179,7 @@ class _Statements:
         head = step.unknown.name if step.unknown else step.title
         yield Comment(f"{head}: {step.look}")
         for definition in step.definitions:
-            yield Assignment(self.names[definition.name], self._text(definition.element))
+            yield Let(self.names[definition.name], self._text(definition.element))
         if step.form is None:
             return
         yield from self._solution(step.form)
@@ -206,13 +190,13 @@ class _Statements:
                 (generator,) = generators_of([symbol])
                 if generator.text in self.used:
                     own = self.names.get(generator.text, generator.text)
-                    yield Assignment(own, self.syntax.call(function, [unknown.name]))
+                    yield Let(own, self.syntax.call(function, [unknown.name]))
 
     def _solution(self, form: Form) -> Iterator[Statement]:
         name = form.unknown.name
         if isinstance(form, Remainder):
             signed = "".join(f" {'+' if sign > 0 else '-'} {angle}" for angle, sign in form.terms)
-            yield Assignment(name, signed[3:] if signed.startswith(" + ") else f"-{signed[3:]}")
+            yield Let(name, signed[3:] if signed.startswith(" + ") else f"-{signed[3:]}")
             return
         words = self._words(form)
         guard, least = (self._filled(text, words) for text in form.guard)
@@ -223,13 +207,13 @@ class _Statements:
                 letters[letter] = text
             else:
                 letters[letter] = f"{letter}_{name}"
-                yield Assignment(letters[letter], text)
+                yield Let(letters[letter], text)
 
         def in_letters(text: str) -> str:
             return LETTER.sub(lambda match: letters[match[0]], text)
 
         if "D" in words:
-            yield Assignment(f"D_{name}", in_letters(words["D"]))
+            yield Let(f"D_{name}", in_letters(words["D"]))
             guard = words["D"] = f"D_{name}"
         if guard:
             yield Guard(in_letters(guard), f"-{ROUNDING!r}*({in_letters(least)})")
@@ -240,7 +224,7 @@ class _Statements:
         expression = self._filled(form.code.replace("<s>", "SIGN"), words)
         # A derived sum is a factor or an argument alone, so that it needs no brackets.
         expression = in_letters(expression).replace("SIGN", sign)
-        yield Assignment(name, self._calls(expression))
+        yield Let(name, self._calls(expression))
 
     def _calls(self, expression: str) -> str:
         return re.sub(r"\batan2\(", f"{self.syntax.functions.get('atan2', 'atan2')}(", expression)
@@ -268,7 +252,7 @@ class _Statements:
         reach = self.derivation.description.reach or 1.0
         for condition in self.derivation.conditions:
             yield Comment(condition.look)
-            yield Assignment("off", f"{self._text(condition.left)} - ({self._text(condition.right)})")
+            yield Let("off", f"{self._text(condition.left)} - ({self._text(condition.right)})")
             yield Guard(repr(IN_PLANE * reach), self.syntax.call("abs", ["off"]))
 
     def _digit(self, choice: Choice) -> Digit:

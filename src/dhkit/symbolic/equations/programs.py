@@ -19,9 +19,10 @@ from dhkit.symbolic.equations.quantities import Quantity
 from dhkit.symbolic.equations.writing import Printer, is_name
 from dhkit.symbolic.exact.lagrangian import Lagrangian
 from dhkit.symbolic.kinematics import SymbolicKinematics
+from dhkit.symbolic.languages.statements import Let, Store
+from dhkit.symbolic.languages.syntax import Syntax
 from dhkit.symbolic.ring import Element, Generator
 from dhkit.symbolic.ring.notation import angles_of, constants_of, generators_of, symbols_of
-from dhkit.symbolic.syntax import Syntax
 
 INPUTS = {"M": "q", "C": "q qd", "h": "q qd", "g": "q", "tau": "q qd qdd", "K": "q qd", "V": "q"}
 """Arguments of each quantity; quantities of kinematics depend on q alone."""
@@ -40,7 +41,6 @@ MAX_IDENTIFIER_LENGTH = 48
 """Longest identifier: MATLAB reads 63 letters, of which the quantity's name takes some."""
 MAX_TERMS = 40
 """Largest number of terms of one statement: compilers recurse once for each term of a sum."""
-WIDTH = 112
 
 
 @dataclass(frozen=True)
@@ -50,14 +50,6 @@ class Parameter:
     identifier: str
     name: str
     value: float
-
-
-@dataclass(frozen=True)
-class Entry:
-    """An entry as parts to be added up, and its indices from 0; two for mirrored entries of the mass matrix."""
-
-    places: tuple[tuple[int, ...], ...]
-    parts: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -73,16 +65,16 @@ class Function:
     used
         The arguments that its expressions contain.
     locals
-        Local variables: name, expression and a remark, which may be empty.
+        Local variables.
     entries
-        The entries that are not zero.
+        The entries that are not zero; mirrored entries of the mass matrix are stored together.
     """
 
     quantity: Quantity
     inputs: tuple[str, ...]
     used: frozenset[str]
-    locals: tuple[tuple[str, str, str], ...]
-    entries: tuple[Entry, ...]
+    locals: tuple[Let, ...]
+    entries: tuple[Store, ...]
 
     @property
     def title(self) -> str:
@@ -152,30 +144,6 @@ def identifier(name: str) -> str:
     return cleaned if re.match(r"[A-Za-z]", cleaned) else f"x{cleaned}"
 
 
-def wrapped(text: str, first: str, following: str, ending: str = "") -> str:
-    """Break a long expression in front of plus and minus signs.
-
-    Parameters
-    ----------
-    text
-        The expression.
-    first
-        Text in front of the expression.
-    following
-        Beginning of the following lines.
-    ending
-        Ending of all lines but the last.
-    """
-    lines, line = [], first
-    for piece in re.split(r"(?= [+-] )", text):
-        if len(line) + len(piece) > WIDTH and line != first:
-            lines.append(line + ending)
-            line = following + piece.lstrip()
-        else:
-            line += piece
-    return "\n".join([*lines, line])
-
-
 class _Code:
     """Writes expressions in a language's syntax; see :class:`dhkit.symbolic.equations.writing.Writer`."""
 
@@ -217,16 +185,18 @@ class _Code:
         generators = generators_of(quantity.elements.flat)
         derived = [g for g in constants_of(generators) if not is_name(g) and not is_reciprocal(g)]
         short = {g.text: f"k{k}" for k, g in enumerate(derived, start=1)}
-        listed = [(short[g.text], self._meaning(g), harmless(g.text)) for g in derived]
+        listed = [Let(short[g.text], self._meaning(g), harmless(g.text)) for g in derived]
         states = sorted(
             (g for g in generators if g.kind in STATES), key=lambda g: (list(STATES).index(g.kind), g.joint)
         )
-        listed += [(g.text, self.language.entry(STATES[g.kind], g.joint), "") for g in states]
+        listed += [Let(g.text, self.language.entry(STATES[g.kind], g.joint)) for g in states]
         for angle in angles_of(generators):
             total = " + ".join(self.language.entry("q", joint) for joint in angle.joints)
-            listed.append((angle.name, f"{angle.function}({total})", ""))
+            listed.append(Let(angle.name, f"{angle.function}({total})"))
         entries = tuple(
-            Entry(places, tuple(self._parts(element, short))) for places, element in _upper(quantity) if element
+            Store(quantity.name, places, tuple(self._parts(element, short)))
+            for places, element in _upper(quantity)
+            if element
         )
         used = {STATES[g.kind] for g in states} | ({"q"} if angles_of(generators) else set())
         return Function(

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dhkit.description import write_atomically
+from dhkit.symbolic.languages.printing import C, c_lines
+from dhkit.symbolic.languages.statements import Let, Store
 from dhkit.symbolic.programs.graph import Graph, Node
-from dhkit.symbolic.syntax import C
 
 OPERATORS = {
     "add": "{} + {}",
@@ -37,9 +38,10 @@ def c_source(graph: Graph) -> str:
     lines = [f"{_c_signature(graph)}\n{{"]
     lines += [f"    (void){x.name};" for k, x in enumerate(graph.inputs) if x.size and k not in used]
     for k, node in enumerate(graph.nodes):
-        lines.append(f"    const double v{k} = {_c_expression(graph, node)};")
+        lines += c_lines(Let(f"v{k}", _c_expression(graph, node)), "    ")
     for variable, entries in zip(graph.outputs, graph.results, strict=True):
-        lines += [f"    {variable.name}[{entry}] = v{k};" for entry, k in enumerate(entries)]
+        for entry, k in enumerate(entries):
+            lines += c_lines(Store(variable.name, ((entry,),), (f"v{k}",)), "    ", (len(entries),))
     return "\n".join([*lines, "}"]) + "\n"
 
 

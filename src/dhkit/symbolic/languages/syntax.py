@@ -45,23 +45,3 @@ class Syntax:
         if math.isfinite(value):
             return repr(value)
         return self.nan if math.isnan(value) else self.infinity if value > 0 else f"-{self.infinity}"
-
-
-C = Syntax(
-    item="{array}[{k}]",
-    first_index=0,
-    pi=repr(math.pi),
-    functions={"abs": "fabs", "absolute": "fabs", "minimum": "fmin", "maximum": "fmax"},
-    nan="NAN",
-    infinity="INFINITY",
-)
-MATLAB = Syntax(item="{array}({k})", first_index=1, pi="pi", functions={}, nan="NaN", infinity="Inf")
-NUMPY_NAMES = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2"}
-PYTHON = Syntax(
-    item="{array}[..., {k}]",
-    first_index=0,
-    pi="np.pi",
-    functions={name: f"np.{NUMPY_NAMES.get(name, name)}" for name in (*NUMPY_NAMES, "tan", "sqrt", "abs")},
-    nan="1e999 - 1e999",  # so that generated modules import nothing for it
-    infinity="1e999",
-)

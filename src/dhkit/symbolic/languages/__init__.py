@@ -1,0 +1,1 @@
+"""Languages of generated code: one intermediate form, and a printer of its statements for each language."""
