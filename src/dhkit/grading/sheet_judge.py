@@ -16,6 +16,7 @@ import numpy as np
 from dhkit.description import Description
 from dhkit.errors import AnswerError, DescriptionError, DhkitError
 from dhkit.expressions.syntax import Name, Tree
+from dhkit.expressions.trees import names_of
 from dhkit.grading.answers.given import (
     Given,
     given_branches,
@@ -33,7 +34,6 @@ from dhkit.grading.answers.typeset import typeset, typeset_equations
 from dhkit.grading.answers.vocabulary import Vocabulary
 from dhkit.grading.judging.consistency import Consistency
 from dhkit.grading.judging.functions import judge_function, judge_sampled
-from dhkit.grading.judging.numeric import names_of
 from dhkit.grading.judging.quantities import JudgedQuantity, judge_quantity
 from dhkit.grading.judging.quotients import RingReader
 from dhkit.grading.judging.truth import Truth, truth_of

@@ -9,8 +9,9 @@ from dhkit import Arm
 from dhkit.errors import AnswerError
 from dhkit.expressions import read
 from dhkit.expressions.syntax import Token
+from dhkit.expressions.trees import node_count
 from dhkit.grading.answers.computer_algebra import from_mathematica, is_mathematica
-from dhkit.grading.answers.derivatives import node_count, time_derivative
+from dhkit.grading.answers.derivatives import time_derivative
 from dhkit.grading.answers.documents.latex_rows import matrix_rows, rows_of
 from dhkit.grading.answers.documents.latex_source import document_statements
 from dhkit.grading.answers.given import given_quantity, vocabulary_of, with_entries_gathered

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
+from dhkit.expressions.trees import node_count
 
 VARIABLE = re.compile(r"(q|qd|qdd)(\d+)")
 
@@ -27,22 +28,6 @@ def product(*factors: Tree) -> Product:
 def quotient(numerator: Tree, *denominators: Tree) -> Product:
     """Return a quotient as a tree, divided by one denominator after the other."""
     return Product(((True, numerator), *((False, denominator) for denominator in denominators)))
-
-
-def node_count(tree: Tree, limit: int) -> int:
-    """Return how many nodes a tree has, those that are shared each time; counting ends beyond a limit."""
-    count, waiting = 0, [tree]
-    while waiting and count <= limit:
-        part = waiting.pop()
-        count += 1
-        match part:
-            case Sum(parts) | Product(parts):
-                waiting += [inner for _, inner in parts]
-            case Power(base, exponent):
-                waiting += [base, exponent]
-            case Call(_, arguments):
-                waiting += arguments
-    return count
 
 
 def time_derivative(tree: Tree) -> Tree:

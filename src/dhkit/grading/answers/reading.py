@@ -7,7 +7,8 @@ import unicodedata
 from collections.abc import Sequence
 
 from dhkit.errors import AnswerError, ExpressionError
-from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Token, Tree, read_tokens
+from dhkit.expressions.syntax import Call, Name, Power, Product, Sum, Token, Tree, read_tokens
+from dhkit.expressions.trees import operands, with_operands
 from dhkit.grading.answers.computer_algebra import from_mathematica, from_maxima, is_mathematica
 from dhkit.grading.answers.derivatives import number, quotient, time_derivative
 from dhkit.grading.answers.latex import is_latex, latex_tokens
@@ -139,17 +140,8 @@ def without_comments(text: str) -> str:
 
 def _in_plain_functions(tree: Tree) -> Tree:
     """Return a tree without secants, degrees and the like."""
-    match tree:
-        case Number() | Name():
-            return tree
-        case Power(base, exponent, at):
-            return Power(_in_plain_functions(base), _in_plain_functions(exponent), at)
-        case Sum(terms):
-            return Sum(tuple((added, _in_plain_functions(term)) for added, term in terms))
-        case Product(factors):
-            return Product(tuple((multiplied, _in_plain_functions(factor)) for multiplied, factor in factors))
-        case Call(function, arguments, at):
-            return _plain_call(function, tuple(map(_in_plain_functions, arguments)), at)
+    plain = with_operands(tree, [_in_plain_functions(part) for part in operands(tree)])
+    return _plain_call(plain.function, plain.arguments, plain.at) if isinstance(plain, Call) else plain
 
 
 def _plain_call(function: str, arguments: tuple[Tree, ...], at: int) -> Tree:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
-from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
-from dhkit.grading.answers.derivatives import node_count
-from dhkit.grading.judging.numeric import parts_of
+from dhkit.expressions.syntax import Call, Name, Number, Power, Tree
+from dhkit.expressions.trees import Algebra, node_count, parts_of
 from dhkit.symbolic.equations.latex_names import latex_names
 
 MAX_NODES = 600
@@ -19,7 +18,7 @@ LATEX_FUNCTIONS = {"asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan"}
 LATEX_NAMES = ("sin", "cos", "tan", "exp", "min", "max")
 LATEX_MARKS = {"qdd": r"\ddot{q}", "qd": r"\dot{q}", "q": "q"}
 SUM, PRODUCT, POWER = 0, 1, 2
-"""What surrounds a part of a formula, which decides whether the part stands in brackets."""
+"""How tightly an operation binds, which decides whether it stands in brackets inside another one."""
 
 
 def typeset(tree: Tree) -> tuple[str, str]:
@@ -37,7 +36,7 @@ def typeset(tree: Tree) -> tuple[str, str]:
     symbols = latex_names([name for name in names if not VARIABLE.fullmatch(name)])
     text = _Writer(str, _plain_call, _plain_product, lambda base, exponent: f"{base}^{exponent}")
     latex = _Writer(lambda name: _latex_name(name, symbols), _latex_call, _latex_product, _latex_power)
-    return text.write(tree), latex.write(tree)
+    return text.of(tree).text, latex.of(tree).text
 
 
 def typeset_equations(equations: Sequence[tuple[Tree, Tree]]) -> tuple[str, str]:
@@ -57,34 +56,52 @@ def typeset_equations(equations: Sequence[tuple[Tree, Tree]]) -> tuple[str, str]
     return plain, latex
 
 
-@dataclass(frozen=True)
-class _Writer:
-    """One notation."""
+class _Text(NamedTuple):
+    """A part of a formula as text, and how tightly its operation binds: SUM, PRODUCT or POWER."""
 
-    name: Callable[[str], str]
-    call: Callable[[str, Sequence[str]], str]
-    product: Callable[[Sequence[tuple[bool, str]]], str]
-    power: Callable[[str, str], str]
+    text: str
+    level: int
 
-    def write(self, tree: Tree, around: int = SUM) -> str:
-        match tree:
-            case Number(text=text):
-                return text
-            case Name(text):
-                return self.name(text)
-            case Call(function, arguments):
-                return self.call(function, [self.write(argument) for argument in arguments])
-            case Power(base, exponent):
-                return self.power(self.write(base, POWER), self.write(exponent, POWER))
-            case Product(factors):
-                text = self.product([(multiplied, self.write(factor, PRODUCT)) for multiplied, factor in factors])
-                return f"({text})" if around == POWER else text
-            case Sum(terms):
-                signed = "".join(
-                    f" + {self.write(term)}" if added else f" - {self.write(term, PRODUCT)}" for added, term in terms
-                )
-                text = signed[3:] if signed.startswith(" + ") else f"-{signed[3:]}"
-                return f"({text})" if around != SUM else text
+    def inside(self, around: int) -> str:
+        """Return the text inside another operation, in brackets where it binds less tightly."""
+        return self.text if self.level >= around else f"({self.text})"
+
+
+class _Writer(Algebra[_Text]):
+    """One notation, made of how it writes names, calls, products and powers."""
+
+    def __init__(
+        self,
+        write_name: Callable[[str], str],
+        write_call: Callable[[str, Sequence[str]], str],
+        write_product: Callable[[Sequence[tuple[bool, str]]], str],
+        write_power: Callable[[str, str], str],
+    ) -> None:
+        super().__init__()
+        self._write_name = write_name
+        self._write_call = write_call
+        self._write_product = write_product
+        self._write_power = write_power
+
+    def number(self, tree: Number) -> _Text:
+        return _Text(tree.text, POWER)
+
+    def name(self, tree: Name) -> _Text:
+        return _Text(self._write_name(tree.text), POWER)
+
+    def call(self, tree: Call) -> _Text:
+        return _Text(self._write_call(tree.function, [self.of(one).text for one in tree.arguments]), POWER)
+
+    def power(self, tree: Power) -> _Text:
+        base, exponent = self.of(tree.base), self.of(tree.exponent)
+        return _Text(self._write_power(base.inside(POWER), exponent.inside(POWER)), POWER)
+
+    def product(self, factors: Sequence[tuple[bool, _Text]]) -> _Text:
+        return _Text(self._write_product([(is_factor, one.inside(PRODUCT)) for is_factor, one in factors]), PRODUCT)
+
+    def sum(self, terms: Sequence[tuple[bool, _Text]]) -> _Text:
+        signed = "".join(f" + {one.text}" if added else f" - {one.inside(PRODUCT)}" for added, one in terms)
+        return _Text(signed[3:] if signed.startswith(" + ") else f"-{signed[3:]}", SUM)
 
 
 def _plain_call(function: str, arguments: Sequence[str]) -> str:

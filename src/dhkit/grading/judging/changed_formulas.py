@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
+from dhkit.expressions.trees import Algebra, names_of, operands, parts_of, with_operands
 from dhkit.grading.answers.given import POSE_NAMES
-from dhkit.grading.judging.numeric import names_of, parts_of
 
 MIN_LAW_TERMS = 3
 """Smallest number of terms of the numerator in a law of cosines: two squared links, and a squared distance."""
@@ -37,9 +37,10 @@ def is_joint(name: str) -> bool:
 def equal_parts(trees: Sequence[Tree]) -> dict[int, frozenset[int]]:
     """Return, by the id of each part of some formulas, the ids of all parts equal to it."""
     places: dict[str, list[int]] = defaultdict(list)
+    texts = _Texts()
     for tree in trees:
-        for part, text in _texts(tree):
-            places[text].append(id(part))
+        for part in parts_of(tree):
+            places[texts.of(part)].append(id(part))
     return {place: frozenset(same) for same in places.values() for place in same}
 
 
@@ -64,34 +65,6 @@ def with_calls_changed(tree: Tree, functions: Sequence[str], change: Callable[[C
 def minus(tree: Tree) -> Tree:
     """Return a formula with a minus in front."""
     return Sum(((False, tree),))
-
-
-def operands(tree: Tree) -> tuple[Tree, ...]:
-    """Return the operands of a formula's outermost operation; none for a name or a number."""
-    match tree:
-        case Call(_, arguments):
-            return arguments
-        case Power(base, exponent):
-            return base, exponent
-        case Product(parts) | Sum(parts):
-            return tuple(part for _, part in parts)
-    return ()
-
-
-def with_operands(tree: Tree, children: Sequence[Tree]) -> Tree:
-    """Return a formula's outermost operation with other operands; the formula itself if they are the same."""
-    if all(new is old for new, old in zip(children, operands(tree), strict=True)):
-        return tree
-    match tree:
-        case Call():
-            return replace(tree, arguments=tuple(children))
-        case Power():
-            return replace(tree, base=children[0], exponent=children[1])
-        case Product(parts):
-            return Product(tuple((is_factor, child) for (is_factor, _), child in zip(parts, children, strict=True)))
-        case Sum(parts):
-            return Sum(tuple((added, child) for (added, _), child in zip(parts, children, strict=True)))
-    return tree
 
 
 def exchange_arguments(call: Call) -> Tree:
@@ -153,25 +126,23 @@ def _is_square(tree: Tree) -> bool:
     return isinstance(tree, Power) and isinstance(tree.exponent, Number) and tree.exponent.value == 2
 
 
-def _texts(tree: Tree) -> Iterator[tuple[Tree, str]]:
-    """Yield a formula's parts, the whole last, with texts that are equal for equal parts."""
-    inner = []
-    for child in operands(tree):
-        parts_of_child = list(_texts(child))
-        yield from parts_of_child
-        inner.append(parts_of_child[-1][1])
-    match tree:
-        case Number(value=value):
-            yield tree, str(value)
-        case Name(text):
-            yield tree, text
-        case Call(function):
-            yield tree, f"{function}({', '.join(inner)})"
-        case Power():
-            yield tree, f"({inner[0]})^({inner[1]})"
-        case Product(parts):
-            factors = (("*" if is_factor else "/") + text for (is_factor, _), text in zip(parts, inner, strict=True))
-            yield tree, f"[{''.join(factors)}]"
-        case Sum(parts):
-            terms = (("+" if added else "-") + text for (added, _), text in zip(parts, inner, strict=True))
-            yield tree, f"({''.join(terms)})"
+class _Texts(Algebra[str]):
+    """Texts that are equal for equal parts."""
+
+    def number(self, tree: Number) -> str:
+        return str(tree.value)
+
+    def name(self, tree: Name) -> str:
+        return tree.text
+
+    def call(self, tree: Call) -> str:
+        return f"{tree.function}({', '.join(map(self.of, tree.arguments))})"
+
+    def power(self, tree: Power) -> str:
+        return f"({self.of(tree.base)})^({self.of(tree.exponent)})"
+
+    def product(self, factors: Sequence[tuple[bool, str]]) -> str:
+        return f"[{''.join(('*' if is_factor else '/') + text for is_factor, text in factors)}]"
+
+    def sum(self, terms: Sequence[tuple[bool, str]]) -> str:
+        return f"({''.join(('+' if added else '-') + text for added, text in terms)})"

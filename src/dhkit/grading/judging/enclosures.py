@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
 from dhkit.expressions.syntax import Tree
-from dhkit.grading.judging.numeric import Evaluation, names_of
+from dhkit.expressions.trees import names_of
+from dhkit.grading.judging.numeric import Evaluation
 
 if TYPE_CHECKING:
     from mpmath import mpf

@@ -12,9 +12,10 @@ import numpy as np
 from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
 from dhkit.expressions.syntax import Number, Sum, Tree
+from dhkit.expressions.trees import names_of, parts_of
 from dhkit.grading.judging import sampling
 from dhkit.grading.judging.enclosures import LostDigitsError, TooLargeError, enclosed
-from dhkit.grading.judging.numeric import doubles, names_of, parts_of, state_arrays
+from dhkit.grading.judging.numeric import doubles, state_arrays
 from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient, RingReader
 from dhkit.grading.judging.rounding import Residuals, rounding_share
 from dhkit.grading.report import Verdict, Witness

@@ -16,12 +16,12 @@ from dhkit.description import Description
 from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
 from dhkit.expressions.syntax import Tree
+from dhkit.expressions.trees import names_of, parts_of
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.judging.inverse_branch import Branch, joint_order
 from dhkit.grading.judging.inverse_edits import with_signs_changed
 from dhkit.grading.judging.inverse_mistakes import Explanation, Search
 from dhkit.grading.judging.inverse_poses import CLOSES, Poses
-from dhkit.grading.judging.numeric import names_of, parts_of
 from dhkit.grading.mistakes.library import hint_of, sentence_of
 from dhkit.grading.remarks import Note, NoteKind
 from dhkit.grading.report import Diagnosis, Entry, KinematicJudgement, Verdict, Witness, entry_name

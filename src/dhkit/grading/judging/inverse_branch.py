@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from dhkit.description import Array
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Tree
+from dhkit.expressions.trees import names_of
 from dhkit.grading.judging.inverse_poses import MATCHES, Mask, Poses
-from dhkit.grading.judging.numeric import EditedDoubles, doubles, names_of
+from dhkit.grading.judging.numeric import EditedDoubles, doubles
 
 CHANCE_SHARE = 0.01
 """Share of poses up to which a branch agrees with a solution by chance."""

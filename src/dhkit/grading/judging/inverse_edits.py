@@ -13,10 +13,10 @@ from functools import partial
 from itertools import chain, combinations, islice, permutations
 
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
+from dhkit.expressions.trees import names_of, operands, parts_of, with_operands
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.judging import changed_formulas as formulas
 from dhkit.grading.judging.changed_formulas import applied, leaf_text, minus, square_of, times
-from dhkit.grading.judging.numeric import names_of, parts_of
 
 ORDER = (
     "atan2_arguments",
@@ -330,11 +330,11 @@ def _of_parts(
     for mistake, new in _changes(tree, lengths, in_law):
         if mistake in mistakes:
             yield Edit(mistake, rebuild(new), tree, new)
-    children = formulas.operands(tree)
+    children = operands(tree)
     for k, child in enumerate(children):
 
         def around(part: Tree, k: int = k) -> Tree:
-            return rebuild(formulas.with_operands(tree, [*children[:k], part, *children[k + 1 :]]))
+            return rebuild(with_operands(tree, [*children[:k], part, *children[k + 1 :]]))
 
         # A sum that is squared is a component of the point, no law of cosines of its own.
         is_inside = in_law and not (isinstance(tree, Power) and isinstance(child, Sum))

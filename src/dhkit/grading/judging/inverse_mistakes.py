@@ -18,6 +18,7 @@ import numpy as np
 from dhkit.description import Array, Description
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Call, Name, Number, Sum, Tree
+from dhkit.expressions.trees import names_of, parts_of
 from dhkit.grading.judging.changed_formulas import (
     equal_parts,
     has_call,
@@ -30,7 +31,6 @@ from dhkit.grading.judging.changed_formulas import (
 from dhkit.grading.judging.inverse_branch import Branch
 from dhkit.grading.judging.inverse_edits import ORDER, Edit, Lengths, edits, renamings
 from dhkit.grading.judging.inverse_poses import Mask
-from dhkit.grading.judging.numeric import names_of, parts_of
 
 MAX_POSES = 100
 """Largest number of poses that fail, and of poses that are reached, at which mistakes are looked for."""

@@ -17,10 +17,10 @@ from dhkit.description import Description
 from dhkit.errors import AnswerError
 from dhkit.expressions import ZERO, read
 from dhkit.expressions.syntax import Name, Sum, Tree
+from dhkit.expressions.trees import names_of
 from dhkit.grading.answers.inverse_steps import GivenStep
 from dhkit.grading.judging.changed_formulas import renamed
 from dhkit.grading.judging.inverse_poses import Poses
-from dhkit.grading.judging.numeric import names_of
 from dhkit.grading.judging.step_context import Part, StepContext
 from dhkit.grading.judging.step_equations import Equations
 from dhkit.grading.judging.step_solutions import Solutions

@@ -16,8 +16,8 @@ from fractions import Fraction
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
+from dhkit.expressions.trees import names_of, parts_of
 from dhkit.grading.judging.findings import names_in
-from dhkit.grading.judging.numeric import names_of, parts_of
 from dhkit.grading.judging.quotients import OutsideTheRingError, RingReader
 from dhkit.grading.judging.truth import Truth, exact_number, substituted
 from dhkit.symbolic.ring import Element, RingError, element_array

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from fractions import Fraction
 from typing import Any
 
@@ -13,7 +13,8 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
-from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
+from dhkit.expressions.syntax import Call, Name, Number, Power, Tree
+from dhkit.expressions.trees import Algebra
 
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "sin": np.sin,
@@ -35,13 +36,10 @@ UNITS = {name: float(constant) for name, constant in CONSTANTS.items()}
 """Values of pi, deg, mm, cm and inch, in rad and m."""
 
 
-@dataclass(frozen=True, eq=False)
-class Evaluation:
-    """One walk over trees in some arithmetic: doubles, arrays of them, or intervals.
+class Evaluation(Algebra[Any]):
+    """Values of trees in some arithmetic: doubles, arrays of them, or intervals.
 
-    A part that occurs more than once is worked out once: CasADi's graphs share parts.
-
-    Attributes
+    Parameters
     ----------
     values
         Values of names.
@@ -51,54 +49,68 @@ class Evaluation:
         Functions that trees may call.
     power, divide
         Operations of the arithmetic; sums, differences and products are Python's.
-    shared
-        Values of the parts met so far, by their ids.
     """
 
-    values: Mapping[str, Any]
-    number: Callable[[Fraction], Any] = lambda value: np.float64(float(value))
-    functions: Mapping[str, Callable[..., Any]] = field(default_factory=lambda: FUNCTIONS)
-    power: Callable[[Any, Any], Any] = operator.pow
-    divide: Callable[[Any, Any], Any] = operator.truediv
-    shared: dict[int, Any] = field(default_factory=dict)
+    def __init__(
+        self,
+        values: Mapping[str, Any],
+        number: Callable[[Fraction], Any] = lambda value: np.float64(float(value)),
+        functions: Mapping[str, Callable[..., Any]] | None = None,
+        power: Callable[[Any, Any], Any] = operator.pow,
+        divide: Callable[[Any, Any], Any] = operator.truediv,
+    ) -> None:
+        super().__init__()
+        self.values = values
+        self.functions = FUNCTIONS if functions is None else functions
+        self._number = number
+        self._power = power
+        self._divide = divide
 
-    def of(self, tree: Tree) -> Any:
-        """Return the value of a tree.
+    def number(self, tree: Number) -> Any:
+        """Return a number in the arithmetic."""
+        return self._number(tree.value)
+
+    def name(self, tree: Name) -> Any:
+        """Return the value of a name.
 
         Raises
         ------
         AnswerError
-            A name without value, or an unknown function.
+            It has none.
         """
-        if id(tree) not in self.shared:
-            self.shared[id(tree)] = self._value(tree)
-        return self.shared[id(tree)]
+        if tree.text not in self.values:
+            raise AnswerError(f"{tree.text} has no value")
+        return self.values[tree.text]
 
-    def _value(self, tree: Tree) -> Any:
-        match tree:
-            case Number(value=value):
-                return self.number(value)
-            case Name(text):
-                if text not in self.values:
-                    raise AnswerError(f"{text} has no value")
-                return self.values[text]
-            case Call(function, arguments):
-                if function not in self.functions:
-                    raise AnswerError(f"unknown function {function!r}; known are {', '.join(self.functions)}")
-                return self.functions[function](*map(self.of, arguments))
-            case Power(base, exponent):
-                return self.power(self.of(base), self.of(exponent))
-            case Sum(terms):
-                total = self.number(Fraction(0))
-                for added, term in terms:
-                    total = total + self.of(term) if added else total - self.of(term)
-                return total
-            case Product(factors):
-                product = self.number(Fraction(1))
-                for is_factor, factor in factors:
-                    value = self.of(factor)
-                    product = product * value if is_factor else self.divide(product, value)
-                return product
+    def call(self, tree: Call) -> Any:
+        """Return the value of a call.
+
+        Raises
+        ------
+        AnswerError
+            An unknown function.
+        """
+        if tree.function not in self.functions:
+            raise AnswerError(f"unknown function {tree.function!r}; known are {', '.join(self.functions)}")
+        return self.functions[tree.function](*map(self.of, tree.arguments))
+
+    def power(self, tree: Power) -> Any:
+        """Return the value of a power."""
+        return self._power(self.of(tree.base), self.of(tree.exponent))
+
+    def product(self, factors: Sequence[tuple[bool, Any]]) -> Any:
+        """Return a product, from left to right."""
+        product = self._number(Fraction(1))
+        for is_factor, value in factors:
+            product = product * value if is_factor else self._divide(product, value)
+        return product
+
+    def sum(self, terms: Sequence[tuple[bool, Any]]) -> Any:
+        """Return a sum, from left to right."""
+        total = self._number(Fraction(0))
+        for added, value in terms:
+            total = total + value if added else total - value
+        return total
 
 
 def doubles(tree: Tree, values: Mapping[str, Any]) -> Any:
@@ -140,7 +152,8 @@ class EditedDoubles:
 
     def of(self, edited: Tree) -> Any:
         """Return the value, a double or an array (...), of a tree that shares parts with the first one."""
-        evaluation = replace(self._evaluation, shared=dict(self._evaluation.shared))
+        evaluation = copy(self._evaluation)
+        evaluation.shared = dict(self._evaluation.shared)
         with np.errstate(all="ignore"):
             return evaluation.of(edited)
 
@@ -155,35 +168,3 @@ def state_arrays(state: Mapping[str, float], n: int) -> tuple[Array, Array, Arra
     """Return q, qd and qdd, shape (n,) each, of a state given by name, SI units and rad."""
     q, qd, qdd = (np.array([state[f"{kind}{i + 1}"] for i in range(n)]) for kind in ("q", "qd", "qdd"))
     return q, qd, qdd
-
-
-def names_of(tree: Tree) -> set[str]:
-    """Return the names that occur in a tree."""
-    return {part.text for part in parts_of(tree) if isinstance(part, Name)}
-
-
-def parts_of(tree: Tree, coefficients: bool = False) -> Iterator[Tree]:
-    """Yield every node of a tree once, also those that CasADi's graphs share.
-
-    Parameters
-    ----------
-    tree
-        Any tree.
-    coefficients
-        Whether to leave out arguments of functions and exponents.
-    """
-    seen: set[int] = set()
-    left = [tree]
-    while left:
-        part = left.pop()
-        if id(part) in seen:
-            continue
-        seen.add(id(part))
-        yield part
-        match part:
-            case Sum(terms) | Product(terms):
-                left += [term for _, term in terms]
-            case Power(base, exponent):
-                left += [base] if coefficients else [base, exponent]
-            case Call(_, arguments):
-                left += () if coefficients else arguments

@@ -18,8 +18,8 @@ from dhkit.description import Description
 from dhkit.description.changes import with_parameters
 from dhkit.errors import DescriptionError
 from dhkit.expressions.syntax import Name, Number, Tree
+from dhkit.expressions.trees import names_of, parts_of
 from dhkit.grading.judging.changed_formulas import leaf_text, renamed, square_of, times
-from dhkit.grading.judging.numeric import names_of, parts_of
 from dhkit.symbolic import table_lengths
 from dhkit.symbolic.inverse.chain import with_table_lengths
 

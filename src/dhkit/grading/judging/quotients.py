@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -10,7 +10,8 @@ from dhkit.errors import AnswerError, ExpressionError
 from dhkit.expressions import CONSTANTS, Budget, Expression, exact_angle
 from dhkit.expressions.exact import Atom
 from dhkit.expressions.parser import value_of
-from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
+from dhkit.expressions.syntax import Call, Name, Number, Power, Tree
+from dhkit.expressions.trees import Algebra
 from dhkit.symbolic.ring import Direction, Element, Ring, RingError
 
 MAX_EXPONENT = 64
@@ -67,7 +68,7 @@ class Quotient:
         return None if polynomial is None else Element(ring, polynomial).reduced()
 
 
-class RingReader:
+class RingReader(Algebra[Quotient]):
     """Reads syntax trees into a ring.
 
     Parameters
@@ -84,13 +85,13 @@ class RingReader:
     def __init__(
         self, ring: Ring, angle_factor: Fraction | None = None, numbers: Mapping[str, Fraction] | None = None
     ) -> None:
+        super().__init__()
         self.ring = ring
         self.numbers = numbers or {}
         self.angle_factor = angle_factor
         self.divisors: list[Element] = []
         """Divisors of the last entry, numbers left out: the entry is undefined at states where one is zero."""
         self._work = 0
-        self._shared: dict[int, Quotient] = {}
         self._angles: dict[Expression, Direction] = {}
         self._names = [f"q{i + 1}" for i in range(ring.n)]
         self._constants = set(ring.constants)
@@ -106,10 +107,10 @@ class RingReader:
             A division by zero.
         """
         self._work = 0
-        self._shared = {}
+        self.shared = {}
         self.divisors = []
         try:
-            return self._quotient(tree)
+            return self.of(tree)
         except RingError:
             raise OutsideTheRingError(TOO_MANY_TERMS) from None
 
@@ -120,28 +121,22 @@ class RingReader:
         except (OutsideTheRingError, AnswerError):
             return None
 
-    def _quotient(self, tree: Tree) -> Quotient:
-        # CasADi's graphs share what is used twice.
-        quotient = self._shared.get(id(tree))
-        if quotient is None:
-            quotient = self._shared[id(tree)] = self._read(tree)
-        return quotient
+    def number(self, tree: Number) -> Quotient:
+        """Return a number."""
+        bits = tree.value.numerator.bit_length() + tree.value.denominator.bit_length()
+        return self._polynomial(self.ring.number(tree.value), bits)
 
-    def _read(self, tree: Tree) -> Quotient:
-        match tree:
-            case Number(value=value):
-                bits = value.numerator.bit_length() + value.denominator.bit_length()
-                return self._polynomial(self.ring.number(value), bits)
-            case Name(text):
-                return self._polynomial(self._name(text))
-            case Sum(terms):
-                return self._sum(terms)
-            case Product(factors):
-                return self._product(factors)
-            case Power(base, exponent):
-                return self._power(base, self.exponent(exponent))
-            case Call(function, arguments):
-                return self._call(function, arguments)
+    def name(self, tree: Name) -> Quotient:
+        """Return a name of the robot's."""
+        return self._polynomial(self._name(tree.text))
+
+    def call(self, tree: Call) -> Quotient:
+        """Return a call: sines and cosines of angles, and roots that the ring has."""
+        return self._call(tree.function, tree.arguments)
+
+    def power(self, tree: Power) -> Quotient:
+        """Return a power, multiplied out."""
+        return self._power(tree.base, self.exponent(tree.exponent))
 
     def _name(self, text: str) -> Element:
         ring = self.ring
@@ -166,14 +161,13 @@ class RingReader:
     def _polynomial(self, element: Element, bits: int = 1) -> Quotient:
         return Quotient(element, self.ring.one, bits)
 
-    def _sum(self, terms: tuple[tuple[bool, Tree], ...]) -> Quotient:
+    def sum(self, terms: Sequence[tuple[bool, Quotient]]) -> Quotient:
         """Add terms; those with denominator 1 are collected and added in groups."""
         one = self.ring.one
         pending: list[Element] = []
         polynomials = Quotient(self.ring.zero, one)
         fractions: Quotient | None = None
-        for k, (added, term) in enumerate(terms, start=1):
-            quotient = self._quotient(term)
+        for k, (added, quotient) in enumerate(terms, start=1):
             signed = Quotient(quotient.numerator if added else -quotient.numerator, quotient.denominator, quotient.bits)
             if quotient.denominator is one:
                 pending.append(signed.numerator)
@@ -198,10 +192,10 @@ class RingReader:
         denominator = self._multiply(a.denominator, b.denominator)
         return self._bound_coefficients(Quotient(numerator, denominator, bits))
 
-    def _product(self, factors: tuple[tuple[bool, Tree], ...]) -> Quotient:
+    def product(self, factors: Sequence[tuple[bool, Quotient]]) -> Quotient:
+        """Multiply and divide, from left to right."""
         product = self._polynomial(self.ring.one)
-        for is_factor, factor in factors:
-            quotient = self._quotient(factor)
+        for is_factor, quotient in factors:
             parts = (quotient.numerator, quotient.denominator)
             if not is_factor:
                 self._note_divisor(quotient.numerator)
@@ -232,7 +226,7 @@ class RingReader:
             self.divisors.append(element)
 
     def _power(self, base: Tree, exponent: int) -> Quotient:
-        quotient, power = self._quotient(base), abs(exponent)
+        quotient, power = self.of(base), abs(exponent)
         if quotient.bits * power > MAX_COEFFICIENT_BITS:
             quotient = self._bound_coefficients(
                 Quotient(quotient.numerator, quotient.denominator, MAX_COEFFICIENT_BITS + 1)

@@ -10,15 +10,15 @@ own coefficients, so that sines and cosines that cancel by an identity grant non
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
-from dhkit.grading.judging.numeric import parts_of
+from dhkit.expressions.syntax import Call, Name, Number, Power, Tree
+from dhkit.expressions.trees import Algebra, parts_of
 from dhkit.grading.judging.quotients import Quotient, RingReader, varying
 from dhkit.symbolic.ring import Element, RingError
 from dhkit.symbolic.ring.elements import PolynomialRing
@@ -103,43 +103,52 @@ class _Coefficient:
 Polynomial = dict[Monomial, _Coefficient]
 
 
-class _Expansion:
+class _Expansion(Algebra[tuple[Polynomial, Polynomial]]):
     """Multiplies trees out into pairs of numerator and denominator, polynomials in atoms."""
 
     def __init__(self, reader: RingReader, digits: int) -> None:
+        super().__init__()
         self.reader = reader
         self.digits = digits
         self.work = 0
         self.atoms: list[Element] = []
         self.one: Polynomial = {(): _Coefficient.of(Fraction(1), Fraction(0))}
         self._numbers: dict[Any, int] = {}
-        self._shared: dict[int, tuple[Polynomial, Polynomial]] = {}
         self._images: dict[Monomial, Element] = {(): reader.ring.one}
 
-    def of(self, tree: Tree) -> tuple[Polynomial, Polynomial]:
-        # CasADi's graphs share what is used twice.
-        if id(tree) not in self._shared:
-            self._shared[id(tree)] = self._read(tree)
-        return self._shared[id(tree)]
+    def number(self, tree: Number) -> tuple[Polynomial, Polynomial]:
+        """Return a number with what its decimals allow."""
+        share = _allowance(tree.value, tree.text, self.digits)
+        return self._number(tree.value, share, share == DOUBLE_ALLOWANCE), self.one
 
-    def _read(self, tree: Tree) -> tuple[Polynomial, Polynomial]:
-        match tree:
-            case Number(value=value, text=text):
-                share = _allowance(value, text, self.digits)
-                return self._number(value, share, share == DOUBLE_ALLOWANCE), self.one
-            case Name() | Call():
-                quotient = self.reader.read(tree)
-                return self._atom(quotient.numerator), self._atom(quotient.denominator)
-            case Power(base, exponent):
-                return self._power(self.of(base), self.reader.exponent(exponent))
-            case Sum(terms):
-                return self._sum(terms)
-            case Product(factors):
-                top, bottom = self.one, self.one
-                for is_factor, factor in factors:
-                    numerator, denominator = self.of(factor) if is_factor else self.of(factor)[::-1]
-                    top, bottom = self._normalize(self._multiply(top, numerator), self._multiply(bottom, denominator))
-                return top, bottom
+    def name(self, tree: Name) -> tuple[Polynomial, Polynomial]:
+        """Return a name as an atom."""
+        return self._atoms(tree)
+
+    def call(self, tree: Call) -> tuple[Polynomial, Polynomial]:
+        """Return a call as an atom: decimals in it are not rounded."""
+        return self._atoms(tree)
+
+    def _atoms(self, tree: Tree) -> tuple[Polynomial, Polynomial]:
+        quotient = self.reader.read(tree)
+        return self._atom(quotient.numerator), self._atom(quotient.denominator)
+
+    def power(self, tree: Power) -> tuple[Polynomial, Polynomial]:
+        """Return a power, multiplied out."""
+        base, exponent = self.of(tree.base), self.reader.exponent(tree.exponent)
+        numerator, denominator = base if exponent >= 0 else base[::-1]
+        top, bottom = self.one, self.one
+        for _ in range(abs(exponent)):
+            top, bottom = self._multiply(top, numerator), self._multiply(bottom, denominator)
+        return self._normalize(top, bottom)
+
+    def product(self, factors: Sequence[tuple[bool, tuple[Polynomial, Polynomial]]]) -> tuple[Polynomial, Polynomial]:
+        """Return a product, multiplied out."""
+        top, bottom = self.one, self.one
+        for is_factor, quotient in factors:
+            numerator, denominator = quotient if is_factor else quotient[::-1]
+            top, bottom = self._normalize(self._multiply(top, numerator), self._multiply(bottom, denominator))
+        return top, bottom
 
     def image(self, monomial: Monomial) -> Element:
         """Return a monomial as an element of the ring."""
@@ -161,11 +170,11 @@ class _Expansion:
             self.atoms.append(element)
         return {((self._numbers[key], 1),): _Coefficient.of(Fraction(1), Fraction(0))}
 
-    def _sum(self, terms: Iterable[tuple[bool, Tree]]) -> tuple[Polynomial, Polynomial]:
+    def sum(self, terms: Sequence[tuple[bool, tuple[Polynomial, Polynomial]]]) -> tuple[Polynomial, Polynomial]:
+        """Return a sum over one denominator."""
         top: Polynomial = {}
         bottom = self.one
-        for added, term in terms:
-            numerator, denominator = self.of(term)
+        for added, (numerator, denominator) in terms:
             if not added:
                 numerator = {m: -c for m, c in numerator.items()}
             if bottom != denominator:
@@ -200,13 +209,6 @@ class _Expansion:
             return top, bottom
         divisor = bottom[()]
         return self._multiply(top, self._number(1 / divisor.value, divisor.share, divisor.is_printed)), self.one
-
-    def _power(self, base: tuple[Polynomial, Polynomial], exponent: int) -> tuple[Polynomial, Polynomial]:
-        numerator, denominator = base if exponent >= 0 else base[::-1]
-        top, bottom = self.one, self.one
-        for _ in range(abs(exponent)):
-            top, bottom = self._multiply(top, numerator), self._multiply(bottom, denominator)
-        return self._normalize(top, bottom)
 
 
 def _product(a: Monomial, b: Monomial) -> Monomial:

@@ -11,10 +11,10 @@ import numpy as np
 from dhkit.description import Array, Description
 from dhkit.errors import DescriptionError
 from dhkit.expressions.syntax import Name, Tree
+from dhkit.expressions.trees import names_of
 from dhkit.grading.judging.inverse_edits import Lengths
 from dhkit.grading.judging.inverse_mistakes import lengths_of
 from dhkit.grading.judging.inverse_poses import Mask, Poses
-from dhkit.grading.judging.numeric import names_of
 from dhkit.grading.report import Verdict, Witness
 from dhkit.symbolic import InverseDerivation, inverse_derivation, table_lengths
 from dhkit.symbolic.inverse.chain import Chain

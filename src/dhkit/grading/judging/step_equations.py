@@ -13,11 +13,12 @@ from scipy.spatial.transform import Rotation
 from dhkit.description import Array
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Call, Number, Power, Product, Sum, Tree
+from dhkit.expressions.trees import names_of, parts_of
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.answers.inverse_steps import GivenStep
 from dhkit.grading.judging.changed_formulas import minus, square_of, with_calls_changed
 from dhkit.grading.judging.inverse_edits import Edit, Lengths, edits_of_parts
-from dhkit.grading.judging.numeric import EditedDoubles, doubles, names_of, parts_of
+from dhkit.grading.judging.numeric import EditedDoubles, doubles
 from dhkit.grading.judging.quotients import OutsideTheRingError, RingReader
 from dhkit.grading.judging.step_context import Part, StepContext
 from dhkit.grading.judging.step_roots import Residual, other_root

@@ -10,13 +10,14 @@ import numpy as np
 from dhkit.description import Array, Description, world_to_frames
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.expressions import ZERO
+from dhkit.expressions.trees import names_of
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.judging.changed_formulas import with_calls_changed, with_quadrant
 from dhkit.grading.judging.inverse_branch import Branch
 from dhkit.grading.judging.inverse_edits import with_signs_changed
 from dhkit.grading.judging.inverse_mistakes import Search
 from dhkit.grading.judging.inverse_poses import CLOSES, MATCHES, Mask, Poses
-from dhkit.grading.judging.numeric import doubles, names_of
+from dhkit.grading.judging.numeric import doubles
 from dhkit.grading.judging.step_context import StepContext
 from dhkit.symbolic.inverse.forms import Circle
 

@@ -19,11 +19,12 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Name, Number, Product, Sum, Tree
+from dhkit.expressions.trees import names_of
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.answers.inverse_steps import GivenStep
 from dhkit.grading.judging.inverse_branch import MISSED_SHARE, Branch
 from dhkit.grading.judging.inverse_poses import KNOWN, MATCHES, Mask
-from dhkit.grading.judging.numeric import doubles, names_of
+from dhkit.grading.judging.numeric import doubles
 from dhkit.grading.judging.step_context import Part, StepContext
 from dhkit.grading.judging.step_mistakes import SolutionMistakes
 from dhkit.grading.report import Verdict, Witness

@@ -16,7 +16,8 @@ from dhkit.expressions import CONSTANTS, ZERO, Expression, exact_angle, substitu
 from dhkit.expressions.budget import budgeted
 from dhkit.expressions.parser import value_of
 from dhkit.expressions.syntax import Tree
-from dhkit.grading.judging.numeric import doubles, names_of
+from dhkit.expressions.trees import names_of
+from dhkit.grading.judging.numeric import doubles
 from dhkit.grading.judging.quotients import multiple_angle, sum_of_angles
 from dhkit.grading.judging.same_arm import STATES
 from dhkit.grading.judging.table_arms import (

@@ -10,9 +10,9 @@ from functools import partial
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Name, Number, Product, Tree
+from dhkit.expressions.trees import names_of
 from dhkit.grading.judging.changed_formulas import renamed
 from dhkit.grading.judging.findings import Comparison, equal
-from dhkit.grading.judging.numeric import names_of
 from dhkit.grading.judging.quantities import JudgedQuantity
 from dhkit.grading.judging.quotients import OutsideTheRingError, RingReader
 from dhkit.grading.judging.rounding import has_decimals

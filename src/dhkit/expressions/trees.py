@@ -1,0 +1,135 @@
+"""Work on syntax trees: their parts and names, trees with other parts, and values in any arithmetic by one fold."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Generic, TypeVar
+
+from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
+
+T = TypeVar("T")
+
+
+class Algebra(ABC, Generic[T]):
+    """What the operations of a tree do with values: numbers, intervals, elements of a ring, text.
+
+    A part that occurs more than once is worked out once: CasADi's graphs share parts.
+    """
+
+    def __init__(self) -> None:
+        self.shared: dict[int, T] = {}
+        """Values of the parts met so far, by their ids."""
+
+    def of(self, tree: Tree) -> T:
+        """Return the value of a tree, worked out from its parts to the whole."""
+        key = id(tree)
+        if key not in self.shared:
+            self.shared[key] = self._value(tree)
+        return self.shared[key]
+
+    def _value(self, tree: Tree) -> T:
+        match tree:
+            case Number():
+                return self.number(tree)
+            case Name():
+                return self.name(tree)
+            case Call():
+                return self.call(tree)
+            case Power():
+                return self.power(tree)
+            case Product(factors):
+                return self.product([(is_factor, self.of(factor)) for is_factor, factor in factors])
+            case Sum(terms):
+                return self.sum([(added, self.of(term)) for added, term in terms])
+
+    @abstractmethod
+    def number(self, tree: Number) -> T:
+        """Return the value of a number."""
+
+    @abstractmethod
+    def name(self, tree: Name) -> T:
+        """Return the value of a name."""
+
+    @abstractmethod
+    def call(self, tree: Call) -> T:
+        """Return the value of a call; :meth:`of` has those of its arguments, unless they are no values here."""
+
+    @abstractmethod
+    def power(self, tree: Power) -> T:
+        """Return the value of a power; :meth:`of` has that of its base, and of its exponent where it may be any."""
+
+    @abstractmethod
+    def product(self, factors: Sequence[tuple[bool, T]]) -> T:
+        """Return the product of values, each multiplied (True) or divided by (False)."""
+
+    @abstractmethod
+    def sum(self, terms: Sequence[tuple[bool, T]]) -> T:
+        """Return the sum of values, each added (True) or subtracted (False)."""
+
+
+def operands(tree: Tree) -> tuple[Tree, ...]:
+    """Return the operands of a tree's outermost operation; none for a name or a number."""
+    match tree:
+        case Call(_, arguments):
+            return arguments
+        case Power(base, exponent):
+            return base, exponent
+        case Product(parts) | Sum(parts):
+            return tuple(part for _, part in parts)
+    return ()
+
+
+def with_operands(tree: Tree, children: Sequence[Tree]) -> Tree:
+    """Return a tree's outermost operation with other operands; the tree itself if they are the same."""
+    if all(new is old for new, old in zip(children, operands(tree), strict=True)):
+        return tree
+    match tree:
+        case Call():
+            return replace(tree, arguments=tuple(children))
+        case Power():
+            return replace(tree, base=children[0], exponent=children[1])
+        case Product(parts):
+            return Product(tuple((is_factor, child) for (is_factor, _), child in zip(parts, children, strict=True)))
+        case Sum(parts):
+            return Sum(tuple((added, child) for (added, _), child in zip(parts, children, strict=True)))
+    return tree
+
+
+def parts_of(tree: Tree, coefficients: bool = False) -> Iterator[Tree]:
+    """Yield every node of a tree once, also those that CasADi's graphs share.
+
+    Parameters
+    ----------
+    tree
+        Any tree.
+    coefficients
+        Whether to leave out arguments of functions and exponents.
+    """
+    seen: set[int] = set()
+    left = [tree]
+    while left:
+        part = left.pop()
+        if id(part) in seen:
+            continue
+        seen.add(id(part))
+        yield part
+        if coefficients and isinstance(part, Power):
+            left.append(part.base)
+        elif not (coefficients and isinstance(part, Call)):
+            left += operands(part)
+
+
+def names_of(tree: Tree) -> set[str]:
+    """Return the names that occur in a tree."""
+    return {part.text for part in parts_of(tree) if isinstance(part, Name)}
+
+
+def node_count(tree: Tree, limit: int) -> int:
+    """Return how many nodes a tree has, those that are shared each time; counting ends beyond a limit."""
+    count, waiting = 0, [tree]
+    while waiting and count <= limit:
+        count += 1
+        waiting += operands(waiting.pop())
+    return count
