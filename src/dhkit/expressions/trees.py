@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Generic, TypeVar
@@ -133,3 +134,45 @@ def node_count(tree: Tree, limit: int) -> int:
         count += 1
         waiting += operands(waiting.pop())
     return count
+
+
+# Equal parts
+
+
+def equal_parts(trees: Sequence[Tree]) -> dict[int, frozenset[int]]:
+    """Return, by the id of each part of some formulas, the ids of all parts equal to it."""
+    places: dict[str, list[int]] = defaultdict(list)
+    texts = _Texts()
+    for tree in trees:
+        for part in parts_of(tree):
+            places[texts.of(part)].append(id(part))
+    return {place: frozenset(same) for same in places.values() for place in same}
+
+
+def replaced_everywhere(tree: Tree, places: frozenset[int], new: Tree) -> Tree:
+    """Return a formula with the parts of the given ids replaced."""
+    if id(tree) in places:
+        return new
+    return with_operands(tree, [replaced_everywhere(child, places, new) for child in operands(tree)])
+
+
+class _Texts(Algebra[str]):
+    """Texts that are equal for equal parts."""
+
+    def number(self, tree: Number) -> str:
+        return str(tree.value)
+
+    def name(self, tree: Name) -> str:
+        return tree.text
+
+    def call(self, tree: Call) -> str:
+        return f"{tree.function}({', '.join(map(self.of, tree.arguments))})"
+
+    def power(self, tree: Power) -> str:
+        return f"({self.of(tree.base)})^({self.of(tree.exponent)})"
+
+    def product(self, factors: Sequence[tuple[bool, str]]) -> str:
+        return f"[{''.join(('*' if is_factor else '/') + text for is_factor, text in factors)}]"
+
+    def sum(self, terms: Sequence[tuple[bool, str]]) -> str:
+        return f"({''.join(('+' if added else '-') + text for added, text in terms)})"

@@ -1,8 +1,8 @@
 """Grading of students' work: answers are read as text, judged exactly, explained, marked and reported."""
 
+from dhkit.grading.catalogue import LIBRARY
 from dhkit.grading.entry_points import grade, grade_answers, robot_of
 from dhkit.grading.marks import Mark, Marks, marks
-from dhkit.grading.mistakes.library import LIBRARY
 from dhkit.grading.remarks import Note, NoteKind
 from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict, Witness
 from dhkit.grading.rubric import Credit, Rubric

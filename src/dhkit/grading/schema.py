@@ -24,7 +24,7 @@ from dhkit.grading.answers.sheet import (
     quantity_names,
     shape_of,
 )
-from dhkit.grading.mistakes.library import LIBRARY
+from dhkit.grading.catalogue import LIBRARY
 from dhkit.grading.rubric import WEIGHED, Rubric
 from dhkit.kinematics import classify
 

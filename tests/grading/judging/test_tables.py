@@ -11,8 +11,8 @@ from dhkit.description import Convention, from_dh, from_toml, library_robot, rob
 from dhkit.errors import AnswerError
 from dhkit.expressions import read
 from dhkit.grading.answers.sheet_values import Requirements
+from dhkit.grading.catalogue import LIBRARY
 from dhkit.grading.judging.tables import judge_table
-from dhkit.grading.mistakes.library import LIBRARY
 from dhkit.grading.remarks import Note, NoteKind
 from dhkit.grading.report import Verdict
 

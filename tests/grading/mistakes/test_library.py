@@ -4,9 +4,9 @@ import pytest
 
 from dhkit import Arm
 from dhkit.grading import LIBRARY
+from dhkit.grading.catalogue import INVERSE, JACOBIAN, TABLE, hint_of, sentence_of
 from dhkit.grading.judging.truth import truth_of
 from dhkit.grading.mistakes.diagnosis import variants_of
-from dhkit.grading.mistakes.library import INVERSE, JACOBIAN, TABLE, hint_of, sentence_of
 from dhkit.symbolic import Mistake, Subject
 from dhkit.symbolic.mistakes import catalogue
 from dhkit.symbolic.textbook_kinematics import KINEMATIC_MISTAKES

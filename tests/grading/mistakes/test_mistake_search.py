@@ -7,6 +7,7 @@ import pytest
 from dhkit.description import library_robot
 from dhkit.expressions import read
 from dhkit.grading.answers.sheet import sheet_of
+from dhkit.grading.catalogue import LIBRARY
 from dhkit.grading.judging.quotients import RingReader
 from dhkit.grading.judging.truth import right_value, truth_of
 from dhkit.grading.marks import marks
@@ -14,7 +15,6 @@ from dhkit.grading.mistakes import entries, plain_causes
 from dhkit.grading.mistakes.energy_variants import energy_variants
 from dhkit.grading.mistakes.equation_variants import equation_variants, lagrangian_sum
 from dhkit.grading.mistakes.explaining import explain
-from dhkit.grading.mistakes.library import LIBRARY
 from dhkit.grading.mistakes.parameter_variants import lengths_of, parameter_variants
 from dhkit.grading.mistakes.slips import slip_in
 from dhkit.grading.mistakes.sums_of_angles import derivatives_of_cosines

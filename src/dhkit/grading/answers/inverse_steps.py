@@ -10,14 +10,13 @@ from itertools import pairwise
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
-from dhkit.expressions.trees import names_of, operands, with_operands
+from dhkit.expressions.trees import equal_parts, names_of, operands, replaced_everywhere, with_operands
 from dhkit.grading.answers.pose_entries import with_pose_entries
 from dhkit.grading.answers.reading import answer_tokens, meaning_of, read_answer
 from dhkit.grading.answers.sheet_values import InverseStep
 from dhkit.grading.answers.tokens import nesting, quote
 from dhkit.grading.answers.typeset import typeset_equations
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Meaning, Vocabulary, plain_name
-from dhkit.grading.judging.changed_formulas import equal_parts, replaced_everywhere
 
 EQUALS = re.compile(r"&?\s*(?<![<>!=:])==?(?!=)\s*&?")
 """What stands between the two sides of an equation."""

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
-from dhkit.expressions.trees import Algebra, names_of, operands, parts_of, with_operands
+from dhkit.expressions.trees import names_of, operands, parts_of, with_operands
 from dhkit.grading.answers.given import POSE_NAMES
 
 MIN_LAW_TERMS = 3
@@ -32,23 +31,6 @@ def leaf_text(leaf: Name | Number) -> str:
 def is_joint(name: str) -> bool:
     """Whether a name is that of a joint's value: q1."""
     return name[:1] == "q" and name[1:].isdecimal()
-
-
-def equal_parts(trees: Sequence[Tree]) -> dict[int, frozenset[int]]:
-    """Return, by the id of each part of some formulas, the ids of all parts equal to it."""
-    places: dict[str, list[int]] = defaultdict(list)
-    texts = _Texts()
-    for tree in trees:
-        for part in parts_of(tree):
-            places[texts.of(part)].append(id(part))
-    return {place: frozenset(same) for same in places.values() for place in same}
-
-
-def replaced_everywhere(tree: Tree, places: frozenset[int], new: Tree) -> Tree:
-    """Return a formula with the parts of the given ids replaced."""
-    if id(tree) in places:
-        return new
-    return with_operands(tree, [replaced_everywhere(child, places, new) for child in operands(tree)])
 
 
 def has_call(tree: Tree, functions: Sequence[str]) -> bool:
@@ -124,25 +106,3 @@ def _terms(tree: Tree) -> list[Tree]:
 
 def _is_square(tree: Tree) -> bool:
     return isinstance(tree, Power) and isinstance(tree.exponent, Number) and tree.exponent.value == 2
-
-
-class _Texts(Algebra[str]):
-    """Texts that are equal for equal parts."""
-
-    def number(self, tree: Number) -> str:
-        return str(tree.value)
-
-    def name(self, tree: Name) -> str:
-        return tree.text
-
-    def call(self, tree: Call) -> str:
-        return f"{tree.function}({', '.join(map(self.of, tree.arguments))})"
-
-    def power(self, tree: Power) -> str:
-        return f"({self.of(tree.base)})^({self.of(tree.exponent)})"
-
-    def product(self, factors: Sequence[tuple[bool, str]]) -> str:
-        return f"[{''.join(('*' if is_factor else '/') + text for is_factor, text in factors)}]"
-
-    def sum(self, terms: Sequence[tuple[bool, str]]) -> str:
-        return f"({''.join(('+' if added else '-') + text for added, text in terms)})"

@@ -18,11 +18,11 @@ from dhkit.expressions import CONSTANTS
 from dhkit.expressions.syntax import Tree
 from dhkit.expressions.trees import names_of, parts_of
 from dhkit.grading.answers.given import POSE_NAMES
+from dhkit.grading.catalogue import hint_of, sentence_of
 from dhkit.grading.judging.inverse_branch import Branch, joint_order
 from dhkit.grading.judging.inverse_edits import with_signs_changed
 from dhkit.grading.judging.inverse_mistakes import Explanation, Search
 from dhkit.grading.judging.inverse_poses import CLOSES, Poses
-from dhkit.grading.mistakes.library import hint_of, sentence_of
 from dhkit.grading.remarks import Note, NoteKind
 from dhkit.grading.report import Diagnosis, Entry, KinematicJudgement, Verdict, Witness, entry_name
 from dhkit.symbolic import table_lengths

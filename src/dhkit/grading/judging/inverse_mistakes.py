@@ -18,16 +18,8 @@ import numpy as np
 from dhkit.description import Array, Description
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Call, Name, Number, Sum, Tree
-from dhkit.expressions.trees import names_of, parts_of
-from dhkit.grading.judging.changed_formulas import (
-    equal_parts,
-    has_call,
-    is_joint,
-    minus,
-    renamed,
-    replaced_everywhere,
-    with_calls_changed,
-)
+from dhkit.expressions.trees import equal_parts, names_of, parts_of, replaced_everywhere
+from dhkit.grading.judging.changed_formulas import has_call, is_joint, minus, renamed, with_calls_changed
 from dhkit.grading.judging.inverse_branch import Branch
 from dhkit.grading.judging.inverse_edits import ORDER, Edit, Lengths, edits, renamings
 from dhkit.grading.judging.inverse_poses import Mask

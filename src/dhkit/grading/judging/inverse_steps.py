@@ -19,12 +19,12 @@ from dhkit.expressions import ZERO, read
 from dhkit.expressions.syntax import Name, Sum, Tree
 from dhkit.expressions.trees import names_of
 from dhkit.grading.answers.inverse_steps import GivenStep
+from dhkit.grading.catalogue import hint_of, sentence_of
 from dhkit.grading.judging.changed_formulas import renamed
 from dhkit.grading.judging.inverse_poses import Poses
 from dhkit.grading.judging.step_context import Part, StepContext
 from dhkit.grading.judging.step_equations import Equations
 from dhkit.grading.judging.step_solutions import Solutions
-from dhkit.grading.mistakes.library import hint_of, sentence_of
 from dhkit.grading.remarks import Note, NoteKind
 from dhkit.grading.report import NO_STEP, Diagnosis, Entry, KinematicJudgement, Verdict, entry_name
 

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 
+from dhkit.grading.catalogue import FACTORS, capitalize, hint_of
 from dhkit.grading.judging.coordinates import ANGLE
 from dhkit.grading.judging.findings import Finding, readable
 from dhkit.grading.judging.quantities import Index, JudgedQuantity, place_of
 from dhkit.grading.judging.quotients import varying
 from dhkit.grading.judging.truth import Truth
-from dhkit.grading.mistakes.library import FACTORS, capitalize, hint_of
 from dhkit.grading.mistakes.slips import Slip, kind_of_terms, slip_in
 from dhkit.grading.mistakes.wording import diagnosis_of_slip
 from dhkit.grading.report import Diagnosis, entry_name

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from dhkit.grading.catalogue import hint_of
 from dhkit.grading.judging.findings import Comparison, equal, readable
 from dhkit.grading.judging.numeric import doubles, general_state
 from dhkit.grading.judging.quantities import Index, JudgedQuantity
@@ -19,7 +20,6 @@ from dhkit.grading.judging.rounding import has_decimals
 from dhkit.grading.judging.truth import DYNAMICS, Truth
 from dhkit.grading.mistakes import entries, plain_causes
 from dhkit.grading.mistakes.diagnosis import Differences
-from dhkit.grading.mistakes.library import hint_of
 from dhkit.grading.mistakes.plain_causes import tables_of
 from dhkit.grading.mistakes.variants import Variant
 from dhkit.grading.mistakes.wording import diagnosis_of, diagnosis_of_slip, merge

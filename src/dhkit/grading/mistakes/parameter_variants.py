@@ -8,8 +8,8 @@ from itertools import combinations, permutations
 
 from dhkit.description import INERTIA_PLACES, Description
 from dhkit.expressions import Expression
+from dhkit.grading.catalogue import PARAMETER_FACTORS, UNITS
 from dhkit.grading.judging.truth import Truth, right_value, translated_array
-from dhkit.grading.mistakes.library import PARAMETER_FACTORS, UNITS
 from dhkit.grading.mistakes.variants import Make, Variant
 from dhkit.symbolic.mistakes import MadeAt
 from dhkit.symbolic.ring import Element, Elements

@@ -11,6 +11,7 @@ from functools import partial
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Name, Number, Product, Tree
 from dhkit.expressions.trees import names_of
+from dhkit.grading.catalogue import UNITS
 from dhkit.grading.judging.changed_formulas import renamed
 from dhkit.grading.judging.findings import Comparison, equal
 from dhkit.grading.judging.quantities import JudgedQuantity
@@ -19,7 +20,6 @@ from dhkit.grading.judging.rounding import has_decimals
 from dhkit.grading.judging.truth import DYNAMICS, Truth, exact_number, substituted
 from dhkit.grading.mistakes.diagnosis import Variants, variants_of
 from dhkit.grading.mistakes.entries import mirrored, slip_of, slip_of_C
-from dhkit.grading.mistakes.library import UNITS
 from dhkit.grading.mistakes.parameter_variants import lengths_of
 from dhkit.grading.mistakes.wording import diagnosis_of_slip, diagnosis_of_whole
 from dhkit.grading.report import Diagnosis, Verdict

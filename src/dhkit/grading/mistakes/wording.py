@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from dhkit.grading.catalogue import LIBRARY, hint_of, sentence_of
 from dhkit.grading.judging.quantities import Index, JudgedQuantity
-from dhkit.grading.mistakes.library import LIBRARY, hint_of, sentence_of
 from dhkit.grading.mistakes.slips import Slip
 from dhkit.grading.mistakes.variants import Variant
 from dhkit.grading.report import Diagnosis, entry_name

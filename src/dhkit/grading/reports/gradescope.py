@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dhkit.grading.marks import Mark, Marks
+from dhkit.grading.marks import Marks
 from dhkit.grading.report import GradeReport
+from dhkit.grading.reports.cases import Case, cases
 from dhkit.grading.reports.sentences import (
     diagnosis_lines,
-    entry_lines,
     plain,
     provenance,
     remark_lines,
@@ -19,15 +19,6 @@ def gradescope(report: GradeReport, marks: Marks) -> dict[str, object]:
 
     Source: Gradescope, Autograder Specifications, "Output Format".
     """
-    tests = [
-        _test(
-            mark,
-            entry.verdict.passes,
-            [entry.verdict.value, *entry_lines(entry, mark), *diagnosis_lines(report, entry)],
-        )
-        for entry, mark in zip(report.entries, marks.entries, strict=False)
-    ]
-    tests += [_test(mark, False, [mark.rule]) for mark in marks.quantities if mark.rule]
     lines = [summary(report, marks), *diagnosis_lines(report), *remark_lines(report), provenance(report)]
     facts = {"version": report.version, "robot": report.robot, "digest": report.digest}
     return {
@@ -37,18 +28,19 @@ def gradescope(report: GradeReport, marks: Marks) -> dict[str, object]:
         "output_format": "text",
         "test_output_format": "text",
         "visibility": "visible",
-        "tests": tests,
+        "tests": [_test(case) for case in cases(report, marks)],
         "extra_data": {"max_score": marks.most, **facts},
     }
 
 
-def _test(mark: Mark, passed: bool, lines: list[str]) -> dict[str, object]:
+def _test(case: Case) -> dict[str, object]:
+    verdict = [] if case.verdict is None else [case.verdict.value]
     return {
-        "name": plain(mark.name),
-        "score": mark.points,
-        "max_score": mark.most,
-        "status": "passed" if passed else "failed",
-        "output": "\n".join(lines),
+        "name": plain(case.mark.name),
+        "score": case.mark.points,
+        "max_score": case.mark.most,
+        "status": "passed" if case.passes else "failed",
+        "output": "\n".join([*verdict, *case.lines, *case.diagnosis]),
         "output_format": "text",
         "visibility": "visible",
     }

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from dhkit.grading.marks import Mark, Marks
-from dhkit.grading.report import Entry, GradeReport, Verdict
-from dhkit.grading.reports.sentences import diagnosis_lines, entry_lines, plain, points, summary
+from dhkit.grading.marks import Marks
+from dhkit.grading.report import GradeReport, Verdict
+from dhkit.grading.reports.cases import Case, cases
+from dhkit.grading.reports.sentences import plain, points, summary
 
 OUTCOMES = {
     Verdict.WRONG: "failure",
@@ -48,28 +49,26 @@ def _add_suite(root: Element, report: GradeReport, marks: Marks) -> None:
     if report.error or not report.entries:
         case = SubElement(suite, "testcase", classname=name, name="sheet", time="0")
         SubElement(case, "error", message=summary(report, marks), type="unreadable")
-    for entry, mark in zip(report.entries, marks.entries, strict=False):
-        _add_case(suite, report, entry, mark)
-    for mark in marks.quantities:
-        if mark.rule:
-            case = SubElement(suite, "testcase", classname=plain(mark.name), name=plain(mark.name), time="0")
-            SubElement(case, "failure", message=mark.rule, type="missing")
+    for one in cases(report, marks):
+        _add_case(suite, one)
     suite.set("tests", str(len(suite.findall("testcase"))))
     for attribute, outcome in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
         suite.set(attribute, str(len(suite.findall(f"testcase/{outcome}"))))
 
 
-def _add_case(suite: Element, report: GradeReport, entry: Entry, mark: Mark) -> None:
-    case = SubElement(suite, "testcase", classname=plain(entry.quantity), name=plain(entry.name), time="0")
-    outcome = OUTCOMES.get(entry.verdict)
-    if outcome == "skipped" and report.proof_required:
-        outcome = "failure"
+def _add_case(suite: Element, one: Case) -> None:
+    case = SubElement(suite, "testcase", classname=plain(one.quantity), name=plain(one.mark.name), time="0")
+    if one.verdict is None:
+        SubElement(case, "failure", message=one.mark.rule, type="missing")
+        return
+    outcome = OUTCOMES.get(one.verdict)
     if outcome is None:
         return
-    diagnosis = list(diagnosis_lines(report, entry))
-    lines = [*entry_lines(entry, mark), *diagnosis]
-    message = [*diagnosis[:1], *lines[-1:], entry.verdict.value][0]
+    if outcome == "skipped" and not one.passes:
+        outcome = "failure"
+    lines = [*one.lines, *one.diagnosis]
+    message = [*one.diagnosis[:1], *lines[-1:], one.verdict.value][0]
     element = SubElement(case, outcome, message=message)
     if outcome != "skipped":
-        element.set("type", entry.verdict.value)
+        element.set("type", one.verdict.value)
     element.text = "\n".join(lines)
