@@ -83,10 +83,10 @@ def bare(description: Description) -> Description:
 
 def has_spherical_wrist(axes: JointAxes) -> bool:
     """Return whether the last three axes meet in a point."""
-    return wrist_centre(axes) is not None
+    return _wrist_centre(axes) is not None
 
 
-def wrist_centre(axes: JointAxes) -> Array | None:
+def _wrist_centre(axes: JointAxes) -> Array | None:
     """Return the point where the last three axes meet, shape (3,), m, world; None if they do not."""
     directions, points = axes.directions[-3:], axes.points[-3:]
     # Least squares of the distances to the three lines: sum (1 - h h^T) (x - p) = 0.
@@ -138,7 +138,7 @@ class OrthoParallel:
         if description.n != 6:
             raise UnavailableError(f"takes 6 joints; this arm has {description.n}")
         axes = joint_axes(description)
-        centre = wrist_centre(axes)
+        centre = _wrist_centre(axes)
         h = axes.directions
         cosines = [abs(h[i] @ h[i + 1]) for i in (0, 2, 3, 4)]
         if centre is None or max(cosines) > AXIS_TOLERANCE or np.linalg.norm(np.cross(h[1], h[2])) > AXIS_TOLERANCE:
@@ -176,10 +176,10 @@ def _fit_upright(description: Description) -> OrthoParallel:
 
     upper_arm = axes.points[2] - axes.points[1]
     axes = turn(1, upper_arm - (upper_arm @ y) * y, z)
-    axes = turn(2, _forearm_direction(wrist_centre(axes), axes), z)
+    axes = turn(2, _forearm_direction(_wrist_centre(axes), axes), z)
     axes = turn(3, axes.directions[4], y)
     axes = turn(4, axes.directions[5], z)
-    centre = wrist_centre(axes)
+    centre = _wrist_centre(axes)
     if centre is None:
         raise UnavailableError("takes a spherical wrist; the axes of this arm's meet too loosely")
 

@@ -344,7 +344,7 @@ def report_text(title: str, facts: Iterable[str], tables: Iterable[Table], meani
     """Return a report as text: title, facts of the machine, tables, and the meaning of their columns."""
     parts = [title, *(f"  {fact}" for fact in facts), ""]
     for heading, columns, cells in tables:
-        parts += [heading, *text_table(columns, cells), ""]
+        parts += [heading, *_text_table(columns, cells), ""]
     return "\n".join([*parts, meaning])
 
 
@@ -352,7 +352,7 @@ def report_markdown(title: str, facts: Iterable[str], tables: Iterable[Table], m
     """Return a report as Markdown; see :func:`report_text`."""
     parts = [f"# {title}", *(f"- {fact}" for fact in facts), ""]
     for heading, columns, cells in tables:
-        parts += [f"## {heading}", "", *markdown_table(columns, cells), ""]
+        parts += [f"## {heading}", "", *_markdown_table(columns, cells), ""]
     return "\n".join([*parts, meaning, ""])
 
 
@@ -369,7 +369,7 @@ def requirements_text(requirements: Sequence[Requirement]) -> str:
     return f"{sum(judged)} of {counted(len(judged), 'requirement')} met"
 
 
-def text_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
+def _text_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
     """Return the lines of a table for a terminal."""
     lines = [list(columns), *map(list, cells)]
     widths = [max(len(line[k]) for line in lines) for k in range(len(columns))]
@@ -378,7 +378,7 @@ def text_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[s
     ]
 
 
-def markdown_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
+def _markdown_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
     """Return the lines of a table in Markdown."""
     lines = [columns, ["---"] * len(columns), *cells]
     return ["| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines]

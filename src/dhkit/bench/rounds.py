@@ -34,7 +34,7 @@ def calm() -> Iterator[None]:
             gc.enable()
 
 
-def seconds_of(call: Call) -> float:
+def _seconds_of(call: Call) -> float:
     """Return the time of one call, s; its result is freed after the clock has stopped."""
     start = perf_counter()
     result = call()
@@ -48,8 +48,8 @@ def items_within(task: Task, mode: Mode, max_items: int) -> int:
     items = min(max_items, 1 if mode is Mode.SINGLE else 64)
     while True:
         call = task.prepare(items)
-        seconds_of(call)
-        seconds = seconds_of(call)
+        _seconds_of(call)
+        seconds = _seconds_of(call)
         room = BUDGET[mode] / max(seconds, 1e-9)
         if items == max_items or room < 2.0:
             return max(1, int(items * min(1.0, room)))
@@ -58,8 +58,8 @@ def items_within(task: Task, mode: Mode, max_items: int) -> int:
 
 def lasting(call: Call) -> int:
     """Return the number of repetitions of a call in a timing; this warms the call up as well."""
-    seconds_of(call)
-    return max(1, round(MIN_TIMING / max(seconds_of(call), 1e-7)))
+    _seconds_of(call)
+    return max(1, round(MIN_TIMING / max(_seconds_of(call), 1e-7)))
 
 
 def repeated(call: Call, times: int) -> Call:
@@ -76,4 +76,4 @@ def rounds(calls: Sequence[Call], repeats: int) -> Iterator[Array]:
     """Yield the times of the calls, shape (len(calls),), s, for each round."""
     for _ in range(repeats):
         gc.collect()
-        yield np.array([seconds_of(call) for call in calls])
+        yield np.array([_seconds_of(call) for call in calls])

@@ -50,7 +50,7 @@ CODE = ("python", "c", "matlab")
 app = typer.Typer(rich_markup_mode=None)
 
 
-def lagrangian_of(description: Description, symbols: str, base: bool) -> Lagrangian:
+def _lagrangian_of(description: Description, symbols: str, base: bool) -> Lagrangian:
     """Return the equations of motion, with these symbols, or in base parameters.
 
     Raises
@@ -120,7 +120,7 @@ def equations(
         lag: Source = kinematics
         shown = kinematic_quantities(kinematics, what)
     else:
-        lag = derived = lagrangian_of(arm.description, symbols, base)
+        lag = derived = _lagrangian_of(arm.description, symbols, base)
         shown = (quantities if form in ("python", "c", "matlab") else readable)(derived, what)
     if output is not None:
         files = _write(lag, shown, form, output)

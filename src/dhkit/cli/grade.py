@@ -79,9 +79,9 @@ def grade(
     unreadable.
     """
     if template is not None:
-        return write_template(template, output)
+        return _write_template(template, output)
     if explain is not None:
-        return write_explanation(read_arm(explain), form, output)
+        return _write_explanation(read_arm(explain), form, output)
     if not sheets:
         raise DescriptionError("no answer sheet; expected files or folders, --template NAME or --explain NAME")
     options: dict[str, Any] = {"form": form, "feedback": feedback, "output": output, "json": json}
@@ -345,7 +345,7 @@ def _progress(total: int) -> Iterator[Callable[[int, int], None] | None]:
         yield show
 
 
-def write_template(robot: str, output: Path | None) -> ExitStatus:
+def _write_template(robot: str, output: Path | None) -> ExitStatus:
     """Print or write an empty answer sheet."""
     description = read_arm(robot).description
     # A sheet finds robot files only in its own folder.
@@ -353,7 +353,7 @@ def write_template(robot: str, output: Path | None) -> ExitStatus:
     return _deliver(empty_sheet(description, name), output)
 
 
-def write_explanation(arm: Arm, form: str, output: Path | None) -> ExitStatus:
+def _write_explanation(arm: Arm, form: str, output: Path | None) -> ExitStatus:
     """Print or write a worked solution as text or HTML.
 
     Raises

@@ -106,7 +106,7 @@ def known_and_moving_arm(arm: Arm, carried: Payload | None, unmodelled: bool) ->
     return (arm if unmodelled else loaded), loaded
 
 
-def friction_of(text: str) -> bool | Friction:
+def _friction_of(text: str) -> bool | Friction:
     """Return the friction of a text: none, stiction, or the width of smooth friction in rad/s.
 
     Raises
@@ -152,7 +152,7 @@ def plant_options(
     """Return the options of :meth:`dhkit.Arm.simulate` about the plant: its steps, friction, stops and pushes."""
     return {
         "plant_rate": plant_rate,
-        "friction": friction_of(friction),
+        "friction": _friction_of(friction),
         "restitution": None if no_stops else restitution,
         "pushes": pushes(push),
     }

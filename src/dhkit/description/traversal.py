@@ -12,18 +12,18 @@ from dhkit.expressions import Expression, substitute
 T = TypeVar("T")
 
 
-def with_expressions(value: T, change: Callable[[Expression], Expression]) -> T:
+def _with_expressions(value: T, change: Callable[[Expression], Expression]) -> T:
     """Return a value with every expression in it changed; parts without a change stay the same objects."""
     result: Any = value
     if isinstance(value, Expression):
         result = change(value)
     elif isinstance(value, tuple):
-        result = tuple(with_expressions(entry, change) for entry in value)
+        result = tuple(_with_expressions(entry, change) for entry in value)
     elif isinstance(value, Named):
-        result = Named({name: with_expressions(entry, change) for name, entry in value.items()})
+        result = Named({name: _with_expressions(entry, change) for name, entry in value.items()})
     elif is_dataclass(value) and not isinstance(value, type):
         entries = {item.name: getattr(value, item.name) for item in fields(value) if item.init}
-        changed = {name: with_expressions(entry, change) for name, entry in entries.items()}
+        changed = {name: _with_expressions(entry, change) for name, entry in entries.items()}
         if any(changed[name] is not entry for name, entry in entries.items()):
             result = replace(value, **changed)
     return result if isinstance(value, Expression) or result != value else value
@@ -31,7 +31,7 @@ def with_expressions(value: T, change: Callable[[Expression], Expression]) -> T:
 
 def with_values(value: T, values: Mapping[str, Expression]) -> T:
     """Return a value with parameters replaced by their values."""
-    return with_expressions(value, lambda expression: substitute(expression, values))
+    return _with_expressions(value, lambda expression: substitute(expression, values))
 
 
 def expressions_in(value: object) -> Iterator[Expression]:

@@ -67,12 +67,12 @@ def velocity_regressor(
     """
     named = ((q, "q"), (qd, "qd"), (qd_r, "qd_r"), (qdd_r, "qdd_r"))
     states = [joint_array(description, x, name) for x, name in named]
-    run, parameters = velocity_regressor_kernel(description)
+    run, parameters = _velocity_regressor_kernel(description)
     return fill(run, parameters, states, (description.n, 10 * description.n), out, threads)
 
 
 @lru_cache(maxsize=512)
-def velocity_regressor_kernel(description: Description) -> tuple[Kernel, Array]:
+def _velocity_regressor_kernel(description: Description) -> tuple[Kernel, Array]:
     """Return the kernel of :func:`velocity_regressor` and the arm's values of its parameters."""
     pattern, parameters = table_pattern(description)
     numbers = description.numbers

@@ -104,7 +104,7 @@ class Child:
             # Late answers to earlier requests are passed over.
             answer = self._read_until(running, limit, lambda message: message.get("id") == number)
         if "error" in answer:
-            raise ProgramError(error_text(answer), Failure.RAISED, error_line(answer))
+            raise ProgramError(_error_text(answer), Failure.RAISED, _error_line(answer))
         return answer
 
     @property
@@ -150,7 +150,7 @@ class Child:
         first = self._read_until(running, MAX_START_TIME, lambda answer: "functions" in answer or "error" in answer)
         if "error" in first:
             self._end()
-            raise ProgramError(error_text(first), Failure.UNREADABLE, error_line(first))
+            raise ProgramError(_error_text(first), Failure.UNREADABLE, _error_line(first))
         self.first = first
         return running
 
@@ -217,12 +217,12 @@ class Child:
         return [octave, "--no-gui", "--quiet", "--norc", "--no-history", script, inside]
 
 
-def error_text(answer: Mapping[str, object]) -> str:
+def _error_text(answer: Mapping[str, object]) -> str:
     """Return the text of an answer that is an error, in one line."""
     return " ".join(printable(str(answer["error"])).split())[:MAX_ERROR_CHARACTERS] or "failed"
 
 
-def error_line(answer: Mapping[str, object]) -> int | None:
+def _error_line(answer: Mapping[str, object]) -> int | None:
     """Return the line of the source that an answer names; None where it names none."""
     line = answer.get("line")
     return line if isinstance(line, int) and not isinstance(line, bool) and 0 < line < MAX_LINE else None

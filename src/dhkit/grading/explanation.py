@@ -39,7 +39,7 @@ class Step:
     results: tuple[tuple[str, str, Element], ...]
 
 
-def worked_solution(description: Description) -> list[Step]:
+def _worked_solution(description: Description) -> list[Step]:
     """Return the steps from the table to the joint torques.
 
     Raises
@@ -62,7 +62,7 @@ def explanation_text(description: Description) -> str:
     if inverse is not None and not _has_bodies(description):
         return inverse.text()
     lines = [f"{description.name}: the equations of motion, step by step", ""]
-    for number, step in enumerate(worked_solution(description), start=1):
+    for number, step in enumerate(_worked_solution(description), start=1):
         lines += [f"{number}. {step.title}", f"   {step.method}", ""]
         lines += [f"   {name} = {plain_text(element)}" for name, _, element in step.results] or ["   all zero"]
         lines.append("")
@@ -75,7 +75,7 @@ def explanation_html(description: Description) -> str:
     if inverse is not None and not _has_bodies(description):
         return inverse.html()
     body = [f"<h1>{html.escape(description.name)}: the equations of motion, step by step</h1>"]
-    for number, step in enumerate(worked_solution(description), start=1):
+    for number, step in enumerate(_worked_solution(description), start=1):
         body += [f"<h2>{number}. {html.escape(step.title)}</h2>", f"<p>{html.escape(step.method)}</p>"]
         for name, head, element in step.results:
             text = f"{name} = {plain_text(element)}"

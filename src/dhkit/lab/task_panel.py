@@ -126,7 +126,7 @@ class TaskPanel(Panel):
 
     def _check_score(self, arm: Arm, report: Mapping[str, object]) -> None:
         """Check goals of a program at its score beside an arm."""
-        if self.assignment is not None and moves_alike(arm.description, self.assignment.arm.description):
+        if self.assignment is not None and _moves_alike(arm.description, self.assignment.arm.description):
             self._check(lambda goal: isinstance(goal, OwnScore) and goal.is_reached(report))
 
     def _check(self, is_reached: Callable[[Condition], bool]) -> None:
@@ -145,11 +145,11 @@ class TaskPanel(Panel):
         arm, was_assigned_arm = self.desk.arm, self._is_assigned_arm
         if arm is not self._arm and self.assignment is not None:
             self._arm = arm
-            self._is_assigned_arm = moves_alike(arm.description, self.assignment.arm.description)
+            self._is_assigned_arm = _moves_alike(arm.description, self.assignment.arm.description)
         return self._is_assigned_arm is not was_assigned_arm
 
 
-def moves_alike(first: Description, second: Description) -> bool:
+def _moves_alike(first: Description, second: Description) -> bool:
     """Return whether two arms have the same table, base, tool and limits; their bodies may differ."""
     limits = ("lower", "upper", "velocity", "effort")
     return has_same_geometry(first, second) and all(

@@ -138,7 +138,7 @@ def _table_part(where: str, cells: Sequence[str], factors: Mapping[str, float], 
         hint = "; decimal commas? write 1.5, not 1,5" if len(cells) > len(factors) else ""
         raise ModelError(f"{where}: {len(cells)} entries; expected {len(factors)}{hint}")
     row = dict(zip(factors, cells, strict=True))
-    numbers = [factors[name] * plain_number(row[name], f"{where}: {name}") for name in COLUMNS[1:]]
+    numbers = [factors[name] * _plain_number(row[name], f"{where}: {name}") for name in COLUMNS[1:]]
     mass, com, (xx, yy, zz), products = numbers[0], numbers[1:4], numbers[4:7], numbers[7:]
     if any(products) and sign is None:
         raise ModelError(
@@ -153,7 +153,7 @@ def _table_part(where: str, cells: Sequence[str], factors: Mapping[str, float], 
     return ReportedMass(row["link"], MassProperties(mass, np.array(com), tensor), (note,), where)
 
 
-def plain_number(text: str, where: str) -> float:
+def _plain_number(text: str, where: str) -> float:
     """Return a decimal number with a point; no expression is evaluated.
 
     Raises

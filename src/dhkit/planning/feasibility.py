@@ -44,7 +44,7 @@ def require_inside_limits(description: Description, limits: Limits, q: Array, wh
     raise PlanningError(f"{where}: joint {description.joints[i].name} is at {words}")
 
 
-def require_speed(description: Description, limits: Limits, qd: Array, where: str) -> None:
+def _require_speed(description: Description, limits: Limits, qd: Array, where: str) -> None:
     """Require joint rates qd (n,), rad/s and m/s, within their limits.
 
     Raises
@@ -103,7 +103,7 @@ def require_kept(description: LoadedArm, constraints: Sequence[Constraint], T_st
             raise PlanningError(f"{place.name}: its {constraint.what} is not allowed: {constraint.use_text(use)}")
 
 
-def require_bounded(description: Description, limits: Limits, objective: Objective, moves: Array) -> None:
+def _require_bounded(description: Description, limits: Limits, objective: Objective, moves: Array) -> None:
     """Require limits that keep every moving joint of a time-optimal motion from jumping.
 
     Parameters
@@ -147,8 +147,8 @@ def require_possible(
     if description.couplings:
         require_inertia(description)
     limits = request.limits
-    require_speed(description, limits, request.start_velocity, "start")
-    require_speed(description, limits, request.goal_velocity, "goal")
+    _require_speed(description, limits, request.start_velocity, "start")
+    _require_speed(description, limits, request.goal_velocity, "goal")
     for place in places:
         if place.q is not None:
             require_place(description, request, place.q, place.name)
@@ -162,7 +162,7 @@ def require_possible(
     moves = np.max([np.ptp(route.points, axis=0) for route in routes], axis=0) > 0
     if not moves.any() and request.rests_at("start") and request.rests_at("goal"):
         raise PlanningError("start and goal are the same configuration")
-    require_bounded(description, limits, objective, moves)
+    _require_bounded(description, limits, objective, moves)
 
 
 def require_place(description: Description, request: PlanRequest, q: Array, name: str) -> None:

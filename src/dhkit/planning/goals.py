@@ -55,7 +55,7 @@ class Route:
 def parse_places(
     description: Description, start: ArrayLike | str, via: Sequence[ArrayLike | str], goal: ArrayLike | str
 ) -> list[Place]:
-    """Return the places of a motion in order, as :func:`parse_place`; the start must be joint values (n,), rad and m.
+    """Return the places of a motion in order, as :func:`_parse_place`; the start must be joint values (n,), rad and m.
 
     Raises
     ------
@@ -70,13 +70,13 @@ def parse_places(
     between: list[Any] = [via] if is_single else list(via)
     names = ["start", *(f"via {k}" for k in range(1, len(between) + 1)), "goal"]
     values = (start, *between, goal)
-    places = [parse_place(description, value, name) for value, name in zip(values, names, strict=True)]
+    places = [_parse_place(description, value, name) for value, name in zip(values, names, strict=True)]
     if places[0].q is None:
         raise ValueError("start is a pose; expected joint values: choose one of inverse kinematics' solutions")
     return places
 
 
-def parse_place(description: Description, value: ArrayLike | str, name: str) -> Place:
+def _parse_place(description: Description, value: ArrayLike | str, name: str) -> Place:
     """Return the place of an argument: joint values (n,), the name of a configuration, or a pose (4, 4) of the tool.
 
     Raises

@@ -74,7 +74,7 @@ def check(
             functions[name] = (Part("defined", 0.0, most, f"{program.name} does not define {name}"),)
             continue
         rng = np.random.default_rng([seed, len(functions)])
-        score = {"fk": score_forward, "ik": score_inverse, "controller": score_controller}[name]
+        score = {"fk": _score_forward, "ik": score_inverse, "controller": _score_controller}[name]
         functions[name] = tuple(score(arm, Caller(program, name), rubric, rng, samples))
     notes = [f"{program.name} imports {module}" for module in program.imported]
     if not program.isolation:
@@ -89,7 +89,7 @@ def check(
 # Forward kinematics
 
 
-def score_forward(
+def _score_forward(
     arm: Arm, call: Caller, rubric: CheckRubric, rng: np.random.Generator, samples: int
 ) -> Iterator[Part]:
     """Score poses at random joint values."""
@@ -177,7 +177,7 @@ def _axis_hint(arm: Arm, call: Caller, rng: np.random.Generator) -> tuple[str, .
 # Controllers
 
 
-def score_controller(
+def _score_controller(
     arm: Arm, call: Caller, rubric: CheckRubric, rng: np.random.Generator, samples: int
 ) -> Iterator[Part]:
     """Score the peak error of the controller on the motion of the rubric."""

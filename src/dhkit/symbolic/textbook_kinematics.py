@@ -335,7 +335,7 @@ def derive_kinematics(
     """
     made = made_at(mistakes)
     for mistake in made:
-        check_kinematic_mistake(mistake, description.n)
+        _check_kinematic_mistake(mistake, description.n)
     return TextbookKinematics(_arm_with_tool(with_massless_links(description), symbols), made)
 
 
@@ -351,7 +351,7 @@ def with_massless_links(description: Description) -> Description:
     return replace(description, joints=joints)
 
 
-def check_kinematic_mistake(made: object, n: int) -> None:
+def _check_kinematic_mistake(made: object, n: int) -> None:
     """Check that a mistake is in :data:`KINEMATIC_MISTAKES` and is made at a link of an arm of n joints.
 
     Raises

@@ -36,7 +36,7 @@ def read_archive(suffix: str, content: bytes, kind: FileKind) -> dict[str, Any]:
     DescriptionError
         Not such an archive; says what was found.
     """
-    return read_npz(content, kind) if suffix == ".npz" else read_mat(content, kind)
+    return _read_npz(content, kind) if suffix == ".npz" else read_mat(content, kind)
 
 
 def archive_format(suffix: str, content: bytes, most: int) -> str:
@@ -82,7 +82,7 @@ def mat_bytes(values: Mapping[str, Any]) -> bytes:
     return file.getvalue()
 
 
-def read_npz(content: bytes, kind: FileKind) -> dict[str, Any]:
+def _read_npz(content: bytes, kind: FileKind) -> dict[str, Any]:
     """Return texts and arrays by name; nothing is unpickled, and the unpacked size is bounded."""
     keys = (*TEXTS, *kind.arrays)
     try:
@@ -119,7 +119,7 @@ def _npy(data: bytes, key: str) -> Any:
 
 
 def read_mat(content: bytes, kind: FileKind) -> dict[str, Any]:
-    """Return texts and arrays by name, as :func:`read_npz`."""
+    """Return texts and arrays by name, as :func:`_read_npz`."""
     variables = mat_files.read_mat(content, kind.most, advice=SAVED)
     _require_keys(variables, kind)
     keys = (*TEXTS, *kind.arrays, *(key for key in kind.optional if key in variables))

@@ -54,7 +54,7 @@ def played_motion(description: Description, motion: Motion) -> PlayedMotion:
     """
     if isinstance(motion, Trajectory):
         motion.require(description)
-        times = frame_times(motion.duration)
+        times = _frame_times(motion.duration)
         return PlayedMotion(times, motion.q(times), None)
     if isinstance(motion, SimulationResult):
         simulated = motion.description  # may carry a payload, or differ in its parameters
@@ -106,7 +106,7 @@ def resample(times: Array, q: Array) -> tuple[Array, Array]:
     times, q
         Times, shape (N,), s, increasing, and joint values, shape (N, n), rad and m.
     """
-    frames = frame_times(float(times[-1] - times[0]))
+    frames = _frame_times(float(times[-1] - times[0]))
     return frames, interpolate(times, q, times[0] + frames)
 
 
@@ -125,7 +125,7 @@ def interpolate(times: Array, rows: Array, at: Array) -> Array:
     return np.stack([np.interp(at, times, column) for column in rows.T], axis=1)
 
 
-def frame_times(duration: float) -> Array:
+def _frame_times(duration: float) -> Array:
     """Return the times of a page's frames, shape (N,), s, from 0 to a duration, s."""
     return np.linspace(0.0, duration, int(np.clip(np.ceil(FRAME_RATE * duration) + 1, MIN_FRAMES, MAX_FRAMES)))
 

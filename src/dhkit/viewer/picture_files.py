@@ -30,7 +30,7 @@ def write_png(image: Picture, path: str | Path) -> Path:
     return Path(path)
 
 
-def write_gif(images: Iterable[Picture], path: str | Path, rate: float) -> Path:
+def _write_gif(images: Iterable[Picture], path: str | Path, rate: float) -> Path:
     """Write pictures, ``rate`` of them a second, as a GIF that repeats, and return the path."""
     # All pictures share one palette, so that still parts do not flicker.
     from PIL import Image
@@ -102,7 +102,7 @@ def write_motion_gif(
             yield image
             progress(k, count)
 
-    return write_gif(images(), path, rate)
+    return _write_gif(images(), path, rate)
 
 
 def write_motion_pngs(

@@ -57,9 +57,9 @@ def is_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_names
         return False
     outermost, is_power, k = 0, False, 0
     while k < len(tokens):
-        if is_named_matrix(tokens, k, matrix_of):
+        if _is_named_matrix(tokens, k, matrix_of):
             return True
-        if not begins_matrix(tokens, k, text):
+        if not _begins_matrix(tokens, k, text):
             k += 1
             continue
         outermost += 1
@@ -68,7 +68,7 @@ def is_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_names
     return outermost > 1 or is_power
 
 
-def begins_matrix(tokens: Sequence[Token], k: int, text: str) -> bool:
+def _begins_matrix(tokens: Sequence[Token], k: int, text: str) -> bool:
     """Whether the bracket at k encloses a matrix: q[0] is an index, and Sin[q1[t]] a call of Mathematica's."""
     if tokens[k].text != "[":
         return False
@@ -77,15 +77,15 @@ def begins_matrix(tokens: Sequence[Token], k: int, text: str) -> bool:
     return not is_behind_operand or is_latex(text)
 
 
-def is_named_matrix(tokens: Sequence[Token], k: int, matrix_of: MatrixOf) -> bool:
+def _is_named_matrix(tokens: Sequence[Token], k: int, matrix_of: MatrixOf) -> bool:
     """Whether the token at k is the name of a whole matrix, and not of one of its entries, as in qd(1)."""
     if tokens[k].kind != "name" or matrix_of(tokens[k].text) is None:
         return False
     is_before_bracket = begins_with(tokens, k + 1, "(") or begins_with(tokens, k + 1, "[")
-    return not is_before_bracket or end_of_arguments(tokens, k, matrix_of) > k + 1
+    return not is_before_bracket or _end_of_arguments(tokens, k, matrix_of) > k + 1
 
 
-def end_of_arguments(tokens: Sequence[Token], k: int, matrix_of: MatrixOf) -> int:
+def _end_of_arguments(tokens: Sequence[Token], k: int, matrix_of: MatrixOf) -> int:
     """Return where the name at k ends with its arguments, as in M(q) and C(q, qd); the place behind it without."""
     if not begins_with(tokens, k + 1, "("):
         return k + 1
@@ -175,8 +175,8 @@ class _Reader:
         while k < len(tokens):
             token = tokens[k]
             end = closing_bracket(tokens, k) if token.text in ("[", "(") else k
-            if is_named_matrix(tokens, k, self.matrix_of):
-                end = end_of_arguments(tokens, k, self.matrix_of) - 1
+            if _is_named_matrix(tokens, k, self.matrix_of):
+                end = _end_of_arguments(tokens, k, self.matrix_of) - 1
             inside = tokens[k : end + 1]
             matrix = self._matrix(tokens, k, inside)
             if matrix is None:
@@ -196,18 +196,18 @@ class _Reader:
     def _matrix(self, tokens: Sequence[Token], k: int, inside: Sequence[Token]) -> Value | None:
         """Return the value of the factor at k if it is, or contains, a matrix; None of numbers."""
         first = tokens[k]
-        if begins_matrix(tokens, k, self.text):
+        if _begins_matrix(tokens, k, self.text):
             rows = [[self._entry(entry, first) for entry in row] for row in matrix_rows(inside, self.text)]
             if len(set(map(len, rows))) != 1:
                 fail(self.text, first.at, "a matrix whose rows have different lengths")
             return rows
         if first.text == "(" and self._contains_matrix(inside):
             return self.value(inside[1:-1])
-        return self.matrix_of(first.text) if is_named_matrix(tokens, k, self.matrix_of) else None
+        return self.matrix_of(first.text) if _is_named_matrix(tokens, k, self.matrix_of) else None
 
     def _contains_matrix(self, tokens: Sequence[Token]) -> bool:
         places = range(len(tokens))
-        return any(begins_matrix(tokens, k, self.text) or is_named_matrix(tokens, k, self.matrix_of) for k in places)
+        return any(_begins_matrix(tokens, k, self.text) or _is_named_matrix(tokens, k, self.matrix_of) for k in places)
 
     def _entry(self, entry: Sequence[Token], first: Token) -> Tree:
         if not entry:

@@ -78,8 +78,8 @@ class Poses:
 
     @classmethod
     def random(cls, description: Description, samples: int, seed: int, *, whole_turns: bool = False) -> Poses:
-        """Return the poses of random joint values in :func:`joint_ranges`; of angles of a whole turn if wanted."""
-        lower, upper = joint_ranges(description)
+        """Return the poses of random joint values in :func:`_joint_ranges`; of angles of a whole turn if wanted."""
+        lower, upper = _joint_ranges(description)
         if whole_turns:
             turning = ~description.numbers.prismatic
             lower, upper = np.where(turning, -np.pi, lower), np.where(turning, np.pi, upper)
@@ -222,7 +222,7 @@ class Poses:
         return bool(np.any(both) and np.all(self.gaps(a[both], b[both]) < MATCHES))
 
 
-def joint_ranges(description: Description) -> tuple[Array, Array]:
+def _joint_ranges(description: Description) -> tuple[Array, Array]:
     """Return the lower and upper ends of the random joint values, shape (n,) each, rad and m.
 
     They are a joint's limits; without both of them a turn about zero, or a metre outwards from zero, because slides are

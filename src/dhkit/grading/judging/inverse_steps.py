@@ -29,7 +29,7 @@ from dhkit.grading.remarks import Note, NoteKind
 from dhkit.grading.report import NO_STEP, Diagnosis, Entry, KinematicJudgement, Verdict, entry_name
 
 
-def steps_in_table_angles(description: Description, steps: Sequence[GivenStep]) -> list[GivenStep] | None:
+def _steps_in_table_angles(description: Description, steps: Sequence[GivenStep]) -> list[GivenStep] | None:
     """Return steps whose angles are the table's theta, joint value plus offset, in joint values; None if they agree."""
     offsets = {
         j: read(str(joint.theta))
@@ -82,7 +82,7 @@ def judge_steps(
     with np.errstate(all="ignore"):
         judge = _Judge(description, poses, seed, explain)
         judged = judge.judgement(steps)
-        in_table_angles = steps_in_table_angles(description, steps)
+        in_table_angles = _steps_in_table_angles(description, steps)
         if in_table_angles is None or all(entry.verdict is not Verdict.WRONG for entry in judged.entries):
             return judged
         other = judge.judgement(in_table_angles)

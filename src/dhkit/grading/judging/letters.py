@@ -51,12 +51,12 @@ class WrittenNumbers:
         values = self._values(tree, right)
         candidates = frozenset(name for name, value in values.items() if value != 0)
         whole = {values[name] for name in candidates - self.on_sheet if values[name] not in (0, 1)}
-        bare = without_written(tree, whole)
+        bare = _without_written(tree, whole)
         if bare is tree:
             return frozenset()
         whole_answer, remaining = self._element(tree), self._element(bare)
         if whole_answer is None or remaining is None:  # its terms cannot be told apart
-            return candidates if has_written(tree) else frozenset()
+            return candidates if _has_written(tree) else frozenset()
         while candidates:
             left_out = self._left_out(remaining, right, candidates, values)
             if not left_out:
@@ -111,12 +111,12 @@ def is_written(number: Number, whole: Collection[Fraction] = ()) -> bool:
     return "." in number.text or "e" in number.text.lower() or number.value in whole
 
 
-def has_written(tree: Tree) -> bool:
+def _has_written(tree: Tree) -> bool:
     """Whether a formula has a decimal."""
     return any(isinstance(part, Number) and is_written(part) for part in parts_of(tree))
 
 
-def without_written(tree: Tree, whole: Collection[Fraction] = ()) -> Tree:
+def _without_written(tree: Tree, whole: Collection[Fraction] = ()) -> Tree:
     """Return a formula with 0 for each number that may stand for a letter; itself if it has none.
 
     Exponents and the arguments of functions keep their numbers. A quotient by such a number is 0 too, as the product
@@ -126,15 +126,15 @@ def without_written(tree: Tree, whole: Collection[Fraction] = ()) -> Tree:
         case Number():
             return NOTHING if is_written(tree, whole) else tree
         case Power(base, exponent):
-            inner = without_written(base, whole)
+            inner = _without_written(base, whole)
             return tree if inner is base else replace(tree, base=inner, exponent=exponent)
         case Sum(terms):
-            changed = tuple((added, without_written(term, whole)) for added, term in terms)
+            changed = tuple((added, _without_written(term, whole)) for added, term in terms)
             return tree if all(a[1] is b[1] for a, b in zip(changed, terms, strict=True)) else Sum(changed)
         case Product(factors):
             parts: list[tuple[bool, Tree]] = []
             for is_factor, factor in factors:
-                inner = without_written(factor, whole if is_factor else ())
+                inner = _without_written(factor, whole if is_factor else ())
                 if inner is NOTHING:
                     return NOTHING
                 parts.append((is_factor, inner))

@@ -68,7 +68,7 @@ class SolutionMistakes:
                 return mistake, ""
         if self._is_in_base():
             return "rotation_not_reduced", ""
-        for name, other in arms_without_a_length(self.context.description):
+        for name, other in _arms_without_a_length(self.context.description):
             try:
                 poses = Poses.random(other, FEW_POSES, self.context.seed)
                 if is_right_for(StepContext(other, poses, self.context.seed, explain=False)):
@@ -131,7 +131,7 @@ class SolutionMistakes:
         return False
 
 
-def arms_without_a_length(description: Description) -> Iterator[tuple[str, Description]]:
+def _arms_without_a_length(description: Description) -> Iterator[tuple[str, Description]]:
     """Yield for each length of the table its name, and the arm with zero in its place."""
     for i, joint in enumerate(description.joints):
         for name, entry, other in (

@@ -108,7 +108,7 @@ def _judge(table: TableRows, task: Requirements) -> TableJudgement:
     entries = _entries(rows)
     if not wrong:
         return TableJudgement(entries, notes=notes, at_values=at_values)
-    mistakes = row_mistakes(table, wrong)
+    mistakes = _row_mistakes(table, wrong)
     overlay = _overlay(table)
     # Without changes all frames are the file's to 1e-9: the numbers that are wrong by less belong to another arm.
     if overlay is not None and overlay.changes:
@@ -244,7 +244,7 @@ class RowMistake:
         return Diagnosis(self.mistake, sentence, f"dh, row {self.row + 1}", names, hint_of(self.mistake))
 
 
-def row_mistakes(table: TableRows, wrong: Sequence[int]) -> tuple[RowMistake, ...]:
+def _row_mistakes(table: TableRows, wrong: Sequence[int]) -> tuple[RowMistake, ...]:
     """Return the mistakes in wrong rows, from 0, in their order; rows outside exact arithmetic are left out."""
     mistakes = []
     left = list(wrong)

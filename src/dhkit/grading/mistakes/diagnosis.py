@@ -92,7 +92,7 @@ class Variants:
 
     def change(self, variant: Variant, quantity: str) -> Elements:
         """Return what a mistake adds to a quantity, with the file's numbers for ``numbers``."""
-        return self.in_numbers(quantity, variant.adds_to(judged_by(quantity), self.truth.coordinates))
+        return self.in_numbers(quantity, variant.adds_to(_judged_by(quantity), self.truth.coordinates))
 
     def in_numbers(self, quantity: str, array: Elements) -> Elements:
         """Return elements with the file's numbers in place of the parameters that answers have as numbers."""
@@ -121,7 +121,7 @@ class Variants:
     def whole(self, quantity: str, differences: Differences) -> list[Variant]:
         """Return the mistakes that cause exactly the differences of all entries that were handed in."""
         self.prepare(quantity)
-        wanted = keys_of(quantity, differences)
+        wanted = _keys_of(quantity, differences)
         wrong = [(place, key) for place, key in wanted.items() if key]
         if not wrong:
             return []
@@ -216,7 +216,7 @@ class _Pairs:
     derived_pairs: dict[tuple[Any, ...], tuple[Variant, Variant]] = field(default_factory=dict)
 
     def find(self, differences: Differences) -> tuple[Variant, Variant] | None:
-        wanted = keys_of(self.quantity, differences)
+        wanted = _keys_of(self.quantity, differences)
         return self._summed(differences, wanted) or self._derived(wanted)
 
     def _summed(self, differences: Differences, wanted: Mapping[Index, Key]) -> tuple[Variant, Variant] | None:
@@ -231,7 +231,7 @@ class _Pairs:
 
     def _both(self, first: Variant, second: Variant) -> dict[Index, Key]:
         """Return the changes by a derivation with both mistakes."""
-        truth, judged, made = self.tables.truth, judged_by(self.quantity), {first.made, second.made}
+        truth, judged, made = self.tables.truth, _judged_by(self.quantity), {first.made, second.made}
         array: Elements
         if self.quantity in DYNAMICS:
             array = element_array(getattr(derive(truth.description, made), judged))
@@ -266,12 +266,12 @@ def variants_of(truth: Truth, numbers: frozenset[str]) -> Variants:  # without a
     return Variants(truth, numbers)
 
 
-def judged_by(quantity: str) -> str:
+def _judged_by(quantity: str) -> str:
     """Return the quantity that is compared with the truth: h = C qd for C."""
     return "h" if quantity == "C" else quantity
 
 
-def keys_of(quantity: str, differences: Differences) -> dict[Index, Key]:
+def _keys_of(quantity: str, differences: Differences) -> dict[Index, Key]:
     """Return the normal forms of a quantity's differences; those of C by rows."""
     return {place_of(quantity, index): key_of(quantity, element) for index, element in differences.items()}
 

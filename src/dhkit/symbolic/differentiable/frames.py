@@ -43,7 +43,7 @@ class SymbolicTable:
     def of(cls, description: Robot) -> SymbolicTable:
         """Return the table of an arm, rounded once from its exact numbers."""
         description = description_of(description)
-        return cls._filled(description, (table_numbers(description) + 0.0).tolist())
+        return cls._filled(description, (_table_numbers(description) + 0.0).tolist())
 
     @classmethod
     def parametric(cls, description: Robot) -> tuple[SymbolicTable, casadi.SX]:
@@ -118,7 +118,7 @@ def joint_symbols(name: str, n: int) -> casadi.SX:
     return casadi.SX.sym(name, n)
 
 
-def table_numbers(description: Description) -> Array:
+def _table_numbers(description: Description) -> Array:
     """Return the numbers of an arm's frames, shape (6 n + 24,): six a joint, twelve each of base and tool."""
     numbers = description.numbers
     columns = (numbers.a, numbers.d, numbers.cos_alpha, numbers.sin_alpha, numbers.cos_theta, numbers.sin_theta)
@@ -137,7 +137,7 @@ def table_pattern(description: Description) -> tuple[str, Array]:
 
 
 def _pattern(description: Description) -> NumberPattern:
-    return NumberPattern.of(table_numbers(description)[None])
+    return NumberPattern.of(_table_numbers(description)[None])
 
 
 def jacobian(table: SymbolicTable, q: casadi.SX, frame: ReferenceAxes = "world") -> casadi.SX:

@@ -126,7 +126,7 @@ def inverse_latex(derivation: InverseDerivation) -> str:
         rows = [f"{left} &= {right}" for left, right in displays]
         parts.append("\\begin{align*}\n" + " \\\\\n".join(rows) + "\n\\end{align*}")
         if step.choice:
-            parts.append(latex_sentence(f"The two solutions: {rule_in_dollars(write, step.choice)}."))
+            parts.append(_latex_sentence(f"The two solutions: {rule_in_dollars(write, step.choice)}."))
         parts += [
             escaped(f"{head} {text}.")
             for head, text in (("No solution where", step.nothing), ("Singular where", step.singular))
@@ -159,7 +159,7 @@ def rule_in_dollars(write: Phrases, choice: Choice) -> str:
     return text
 
 
-def latex_sentence(text: str) -> str:
+def _latex_sentence(text: str) -> str:
     """Return a sentence whose formulas stand between dollar signs in LaTeX."""
     parts = text.split("$")
     return "$".join(part if k % 2 else escaped(part) for k, part in enumerate(parts))

@@ -50,7 +50,7 @@ class LatexWriter:
         return self._names[self._notation(name)]
 
     def variable(self, generator: Generator) -> str:  # noqa: D102
-        return variable_latex(generator.text)
+        return _variable_latex(generator.text)
 
     def pi(self) -> str:  # noqa: D102
         return r"\pi"
@@ -90,7 +90,7 @@ class LatexWriter:
         return f"-{signed[3:]}" if signed.startswith(" - ") else signed[3:]
 
 
-def variable_latex(text: str) -> str:
+def _variable_latex(text: str) -> str:
     r"""Return a joint's variable in LaTeX: qdd1 is \ddot{q}_{1}, c23 is c_{23}."""
     kind, number = re.fullmatch(r"(qdd|qd|q|s|c)(\d[\d_]*)", text).groups()  # type: ignore[union-attr]
     symbol = {"qdd": r"\ddot{q}", "qd": r"\dot{q}"}.get(kind, kind)
@@ -151,7 +151,7 @@ def _marked(element: Element) -> str:
 @lru_cache(maxsize=64)
 def _writer(ring: Ring) -> LatexWriter:
     written = notation(ring)
-    taken = {variable_latex(name) for name in variables(ring)} | {_head(name) for name in entry_names(ring.n)}
+    taken = {_variable_latex(name) for name in variables(ring)} | {_head(name) for name in entry_names(ring.n)}
     return LatexWriter(latex_names(written.names.values(), taken), written)
 
 
@@ -233,7 +233,7 @@ def _where(angles: Sequence[Angle]) -> str:
     """Return the angles of the sines and cosines."""
     own = [r"s_{i} = \sin(q_{i})", r"c_{i} = \cos(q_{i})"] if any(len(angle.joints) == 1 for angle in angles) else []
     sums = [
-        f"{variable_latex(angle.name)} = \\{angle.function}({' + '.join(f'q_{{{j + 1}}}' for j in angle.joints)})"
+        f"{_variable_latex(angle.name)} = \\{angle.function}({' + '.join(f'q_{{{j + 1}}}' for j in angle.joints)})"
         for angle in angles
         if len(angle.joints) > 1
     ]

@@ -32,14 +32,14 @@ def latex_names(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, st
     used, written = set(taken), {}
     counts: dict[str, int] = {}
     for name in listed:
-        counts[nice(name)] = counts.get(nice(name), 0) + 1
+        counts[_nice(name)] = counts.get(_nice(name), 0) + 1
     for name in listed:
-        wanted = nice(name)
+        wanted = _nice(name)
         written[name] = wanted if counts[wanted] == 1 and wanted not in used else literal(name)
     return written
 
 
-def nice(name: str) -> str:
+def _nice(name: str) -> str:
     """Return a name as textbooks typeset it."""
     if match := AXES.fullmatch(name):
         letter, axes, number = match.groups()
@@ -60,7 +60,7 @@ def nice(name: str) -> str:
     return base + (f"_{{{','.join(scripts)}}}" if scripts else "")
 
 
-def greek(name: str) -> str | None:
+def _greek(name: str) -> str | None:
     """Return the command of a Greek letter; None if the name is none."""
     return f"\\{name}" if name in GREEK else None
 
@@ -72,7 +72,7 @@ def literal(name: str) -> str:
 
 def _base(letters: str) -> tuple[str, str]:
     """Split letters into a symbol and its subscript: l and c for lc."""
-    if command := greek(letters):
+    if command := _greek(letters):
         return command, ""
     if len(letters) == 1:
         return letters, ""
@@ -83,6 +83,6 @@ def _base(letters: str) -> tuple[str, str]:
 
 def _word(part: str) -> str:
     match = HEAD.fullmatch(part)
-    if match and greek(match[1]):
-        return greek(match[1]) + (f" {match[2]}" if match[2] else "")  # type: ignore[operator]
+    if match and _greek(match[1]):
+        return _greek(match[1]) + (f" {match[2]}" if match[2] else "")  # type: ignore[operator]
     return part if len(part) == 1 or part.isdecimal() or LETTER.fullmatch(part) else rf"\mathrm{{{part}}}"

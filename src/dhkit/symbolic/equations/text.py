@@ -91,7 +91,7 @@ def equations_text(quantities: Sequence[Quantity]) -> str:
     elements = [element for quantity in quantities for element in quantity.elements.flat]
     angles = [f"{angle.name} = {angle.function}({angle.text})" for angle in angles_of(generators_of(elements))]
     if angles:
-        blocks.append("\n".join(filled_lines("where ", angles)))
+        blocks.append("\n".join(_filled_lines("where ", angles)))
     if notes := renamings(elements):
         blocks.append("\n".join(f"note: {note}" for note in notes))
     return "\n\n".join(blocks)
@@ -102,7 +102,7 @@ def _entry_lines(quantity: Quantity) -> list[str]:
     for heads, element in quantity.entries:
         lines += broken_lines(f"{' = '.join(heads)} = ", plain_text(element))
     if zeros := quantity.zeros:
-        lines += filled_lines("", [f"{head} =" for head in zeros], "0", separator=" ")
+        lines += _filled_lines("", [f"{head} =" for head in zeros], "0", separator=" ")
     return lines
 
 
@@ -137,7 +137,7 @@ def _terms(text: str) -> list[str]:
     return [term for term in terms if term]
 
 
-def filled_lines(head: str, words: Sequence[str], tail: str = "", separator: str = ", ") -> list[str]:
+def _filled_lines(head: str, words: Sequence[str], tail: str = "", separator: str = ", ") -> list[str]:
     """Return words behind a head, with as many on a line as it holds."""
     lines, line = [], head + words[0]
     for word in [*words[1:], *([tail] if tail else [])]:

@@ -198,7 +198,7 @@ def reach_with_slide(bench: Workbench, i: int, vector: Elements, place: tuple[El
     x, y = place
     unknown = bench.unknown(i + 1)
     square = vector[0] * vector[0] + vector[1] * vector[1]
-    middle, rest = quadratic_parts(square, unknown.joint or 0)
+    middle, rest = _quadratic_parts(square, unknown.joint or 0)
     S = x * x + y * y - rest + middle * middle
     bench.add(
         Step(
@@ -252,7 +252,7 @@ def linear_parts(element: Element, i: int) -> tuple[Element, Element, Element]:
     return A, B, C
 
 
-def quadratic_parts(element: Element, i: int) -> tuple[Element, Element]:
+def _quadratic_parts(element: Element, i: int) -> tuple[Element, Element]:
     """Return m and c of q_i^2 + 2 m q_i + c; joint i counts from 0."""
     ring = element.ring
     place = ring.place("position", i)

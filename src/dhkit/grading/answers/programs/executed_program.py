@@ -94,7 +94,7 @@ def executed_answers(
             raise AnswerError(f"{path}: {code.suffix} files are not executed; expected {', '.join(RUNNERS)} or .ipynb")
         source = Path(folder) / (re.sub(r"\W", "_", path.stem, flags=re.ASCII)[:60] + code.suffix)
         if code.suffix == ".m":
-            code = functions_first(code)
+            code = _functions_first(code)
         source.write_text(code.text, "utf-8")
         child = Child(source, RUNNERS, LIMITS, isolation)
         try:
@@ -106,7 +106,7 @@ def executed_answers(
             child.close()
 
 
-def functions_first(code: SourceCode) -> SourceCode:
+def _functions_first(code: SourceCode) -> SourceCode:
     """Return a MATLAB file as a script with its functions in front: Octave knows them only after their definitions."""
     lines = code.text.split("\n")
     starts = [k for k, line in enumerate(lines) if re.match(r"\s*function\b", line)]

@@ -592,7 +592,7 @@ class MatlabProgram:
                 value = value.values[0]
         if isinstance(value, Unread):
             raise UnreadError(value.reason)
-        return with_use(value, scope.key_of(name))
+        return _with_use(value, scope.key_of(name))
 
 
 class _Expression:
@@ -750,7 +750,7 @@ class _Expression:
             return value
         match value:
             case Library(function):
-                return with_use(self._library(function, inside), self.scope.key_of(name))
+                return _with_use(self._library(function, inside), self.scope.key_of(name))
             case Function():
                 arguments = [self.program.value(x, self.scope) for x in _arguments(inside)]
                 return self.program.call(value, arguments, self.scope, name, self.count)
@@ -826,7 +826,7 @@ class _Expression:
         for base in (plain, plain.replace("dot", "")):
             known = rate_name(base, ("dot", "ddot")[order - 1 if base == plain else min(order, 1)])
             if vocabulary.is_position(base) and vocabulary.is_state(known):
-                return with_use(self.scope.known(known), self.scope.key_of(match[1]))
+                return _with_use(self.scope.known(known), self.scope.key_of(match[1]))
         raise UnreadError(f"diff({text[:40]}): {name} is the program's own name, of which no rate is read")
 
     def _symbol(self, inside: Tokens, text: str) -> Value:
@@ -859,14 +859,14 @@ OTHER_FUNCTIONS = word_set(
 """Functions of MATLAB's, besides those of numbers, that are read."""
 
 
-def with_use(value: Value, key: str) -> Value:
+def _with_use(value: Value, key: str) -> Value:
     """Return a value that knows that it is made of a name."""
     if isinstance(value, Scalar):
         return replace(value, uses=value.uses | {key})
     if isinstance(value, Matrix):
         return replace(value, entries={k: replace(x, uses=x.uses | {key}) for k, x in value.entries.items()})
     if isinstance(value, Several):
-        return replace(value, values=tuple(with_use(one, key) for one in value.values))
+        return replace(value, values=tuple(_with_use(one, key) for one in value.values))
     return value
 
 

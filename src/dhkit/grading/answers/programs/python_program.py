@@ -533,7 +533,7 @@ class PythonProgram:
     def _returned(self, node: ast.expr, scope: Scope) -> Value:
         if isinstance(node, ast.Tuple):
             values = tuple(self._right_side(one, scope, self.line(node)) for one in node.elts)
-            return Several(values, tuple(local_name(one) for one in node.elts))
+            return Several(values, tuple(_local_name(one) for one in node.elts))
         return self.value(node, scope)
 
     @staticmethod
@@ -549,7 +549,7 @@ class PythonProgram:
         body = function.definition
         last = body if isinstance(body, ast.expr) else body[-1]
         node = last.value if isinstance(last, ast.Return) else last
-        return local_name(node) if isinstance(node, ast.expr) else ""
+        return _local_name(node) if isinstance(node, ast.expr) else ""
 
     # Expressions
 
@@ -633,7 +633,7 @@ class PythonProgram:
         if any(isinstance(value, Matrix) and value.is_list and not value.is_flat for value in values):
             raise UnreadError("lists nested more than twice are not read")
         if any(isinstance(value, Matrix | Function | Structure | Several | Text | Module) for value in values):
-            return Several(tuple(values), tuple(local_name(one) for one in nodes))
+            return Several(tuple(values), tuple(_local_name(one) for one in nodes))
         if all(isinstance(value, Part) for value in values) and values:
             return Several(tuple(values))
         return vector_of([scope.scalar(value) for value in values], is_list=True)
@@ -1031,7 +1031,7 @@ def _is_written_out(node: ast.expr) -> bool:
     return False
 
 
-def local_name(node: ast.expr) -> str:
+def _local_name(node: ast.expr) -> str:
     """Return the name that an expression is, as it is or as an array; empty of another expression."""
     while True:
         match node:
