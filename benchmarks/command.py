@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from dhkit.cli.bench import Report, write
+from dhkit.bench.report import Report
+from dhkit.cli.bench import write
 
 
 def tell(line: str) -> None:

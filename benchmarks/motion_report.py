@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 from dhkit.bench.machine import Machine
-from dhkit.bench.report import Missing, Table, duration, report_html, report_markdown, report_text, with_lists
+from dhkit.bench.report import Missing, Report, Table, duration
 from dhkit.display import html_table, repr_line
 
 MEANING = (
@@ -78,7 +78,7 @@ class MeshBuild:
 
 
 @dataclass(frozen=True)
-class MotionReport:
+class MotionReport(Report):
     """Motions in least time beside others, for one robot in one process on one core."""
 
     robot: str
@@ -92,44 +92,39 @@ class MotionReport:
     machine: Machine
     interrupted: bool = False
 
-    def json(self) -> dict[str, Any]:
-        """Return the report as plain data for JSON."""
-        data: dict[str, Any] = with_lists(asdict(self))
-        return data
-
-    def markdown(self) -> str:
-        """Return the report as Markdown."""
-        return report_markdown(self._title, self.machine.facts, self._tables, MEANING)
-
-    def __str__(self) -> str:
-        return report_text(self._title, self.machine.facts, self._tables, MEANING)
+    @property
+    def meaning(self) -> str:
+        """What the columns mean."""
+        return MEANING
 
     def __repr__(self) -> str:
         return repr_line("MotionReport", self.robot, f"{self.pairs} random pairs, {len(self.rows)} rows")
 
-    def _repr_html_(self) -> str:
+    @property
+    def main_table(self) -> str:
+        """The motions, as HTML."""
         rows = [(f"{row.speed:g}", *row.cells) for row in self.rows]
-        table = html_table(("speed", *MotionRow.COLUMNS), rows, align="rlr")
-        return report_html(self._title, self.machine.facts, table)
+        return html_table(("speed", *MotionRow.COLUMNS), rows, align="rlr")
 
     @property
-    def _title(self) -> str:
+    def title(self) -> str:
+        """What was measured, in a line."""
         ending = " (interrupted)" if self.interrupted else ""
         return f"{self.robot}: motions in least time beside others, {self.pairs} random pairs, one core{ending}"
 
     @property
-    def _tables(self) -> list[Table]:
-        """The tables that have rows."""
+    def tables(self) -> list[Table]:
+        """Motions by speed, and the planners' programs."""
         columns: Sequence[str] = MotionRow.COLUMNS
         tables: list[Table] = [
             (_heading(speed), columns, [row.cells for row in self.rows if row.speed == speed])
             for speed in dict.fromkeys(row.speed for row in self.rows)
         ]
-        tables += [
+        return [
+            *tables,
             ("Programs", MeshBuild.COLUMNS, [build.cells for build in self.builds]),
             ("Did not take part", ("who", "why"), [[gap.name, gap.reason] for gap in self.missing]),
         ]
-        return [table for table in tables if table[2]]
 
 
 def _heading(speed: float) -> str:

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Any, ClassVar
@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.command import publish, tell
 from benchmarks.planning import holdable_pairs
 from dhkit.bench.machine import Machine
-from dhkit.bench.report import Table, duration, report_html, report_markdown, report_text, with_lists
+from dhkit.bench.report import Report, Table, duration
 from dhkit.bench.rounds import calm
 from dhkit.description import Payload, library_robot
 from dhkit.description.frames import world_to_tool
@@ -88,38 +88,34 @@ class CaseRow:
 
 
 @dataclass(frozen=True)
-class CaseReport:
+class CaseReport(Report):
     """Cases in which planners are slow or fail, in one process."""
 
     rows: tuple[CaseRow, ...]
     machine: Machine
     interrupted: bool = False
 
-    def json(self) -> dict[str, Any]:
-        """Return the report as plain data for JSON."""
-        data: dict[str, Any] = with_lists(asdict(self))
-        return data
-
-    def markdown(self) -> str:
-        """Return the report as Markdown."""
-        return report_markdown(self._title, self.machine.facts, self._tables, MEANING)
-
-    def __str__(self) -> str:
-        return report_text(self._title, self.machine.facts, self._tables, MEANING)
+    @property
+    def meaning(self) -> str:
+        """What the columns mean."""
+        return MEANING
 
     def __repr__(self) -> str:
         return repr_line("CaseReport", summary=f"{len(self.rows)} rows")
 
-    def _repr_html_(self) -> str:
-        rows = [tuple(row.cells) for row in self.rows]
-        return report_html(self._title, self.machine.facts, html_table(CaseRow.COLUMNS, rows, align="lr"))
+    @property
+    def main_table(self) -> str:
+        """The cases, as HTML."""
+        return html_table(CaseRow.COLUMNS, [tuple(row.cells) for row in self.rows], align="lr")
 
     @property
-    def _title(self) -> str:
+    def title(self) -> str:
+        """What was measured, in a line."""
         return f"planning, hard cases{' (interrupted)' if self.interrupted else ''}"
 
     @property
-    def _tables(self) -> list[Table]:
+    def tables(self) -> list[Table]:
+        """The cases."""
         return [("Cases", CaseRow.COLUMNS, [row.cells for row in self.rows])]
 
 

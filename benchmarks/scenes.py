@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Any, ClassVar
@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.command import publish, tell
 from benchmarks.peers.ompl import SampledPaths
 from dhkit.bench.machine import Machine
-from dhkit.bench.report import Table, duration, report_html, report_markdown, report_text, with_lists
+from dhkit.bench.report import Report, Table, duration
 from dhkit.description import Array, Description, library_robot
 from dhkit.display import html_table, repr_line
 from dhkit.dynamics import gravity_torque
@@ -152,7 +152,7 @@ class SceneResult:
 
 
 @dataclass(frozen=True)
-class SceneReport:
+class SceneReport(Report):
     """Motions among obstacles in scenes that OMPL solves."""
 
     COLUMNS: ClassVar[tuple[str, ...]] = (
@@ -169,10 +169,10 @@ class SceneReport:
     machine: Machine
     interrupted: bool = False
 
-    def json(self) -> dict[str, Any]:
-        """Return the report as plain data for JSON."""
-        data: dict[str, Any] = with_lists(asdict(self))
-        for result in data["results"]:
+    def json(self) -> dict[str, object]:
+        """Return the report as plain data for JSON; None for a motion that was not found."""
+        data = super().json()
+        for result in data["results"]:  # type: ignore[attr-defined]
             for name, value in result.items():
                 if isinstance(value, float) and not np.isfinite(value):
                     result[name] = None
@@ -197,13 +197,15 @@ class SceneReport:
         ]
 
     @property
-    def _tables(self) -> list[Table]:
+    def tables(self) -> list[Table]:
+        """Scenes by robot, and those without a motion."""
         failed = [[result.robot, str(result.obstacles), result.reason] for result in self.results if result.reason]
         tables: list[Table] = [("Scenes", self.COLUMNS, self._rows)]
         return tables + ([("Without a motion", ("robot", "obstacles", "why"), failed)] if failed else [])
 
     @property
-    def _meaning(self) -> str:
+    def meaning(self) -> str:
+        """What the columns mean."""
         short, over = (max(getattr(result, name) for result in self.results) for name in ("shortfall", "excess"))
         return (
             f"Motions in least time, {1000 * CLEARANCE:g} mm clear. Time: of one call, with the planner made before. "
@@ -212,21 +214,17 @@ class SceneReport:
             "more motions, each started from another path of OMPL beside our own starts."
         )
 
-    def markdown(self) -> str:
-        """Return the report as Markdown."""
-        return report_markdown(self._title, self.machine.facts, self._tables, self._meaning)
-
-    def __str__(self) -> str:
-        return report_text(self._title, self.machine.facts, self._tables, self._meaning)
-
     def __repr__(self) -> str:
         return repr_line("SceneReport", summary=f"{len(self.results)} scenes")
 
-    def _repr_html_(self) -> str:
-        return report_html(self._title, self.machine.facts, html_table(self.COLUMNS, self._rows, align="lr"))
+    @property
+    def main_table(self) -> str:
+        """The scenes by robot, as HTML."""
+        return html_table(self.COLUMNS, self._rows, align="lr")
 
     @property
-    def _title(self) -> str:
+    def title(self) -> str:
+        """What was measured, in a line."""
         ending = " (interrupted)" if self.interrupted else ""
         return f"motions among obstacles, {len(self.results)} scenes that OMPL solves{ending}"
 

@@ -2,21 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 from dhkit.bench.machine import Machine
-from dhkit.bench.report import (
-    Missing,
-    Requirement,
-    Table,
-    duration,
-    report_html,
-    report_markdown,
-    report_text,
-    requirements_text,
-    with_lists,
-)
+from dhkit.bench.report import Missing, Report, Requirement, Table, duration, requirements_text
 from dhkit.display import html_table, repr_line
 
 MEANING = (
@@ -155,7 +145,7 @@ class ModelCheck:
 
 
 @dataclass(frozen=True)
-class SimulationReport:
+class SimulationReport(Report):
     """Simulation beside peers, for one robot in one process."""
 
     robot: str
@@ -172,38 +162,30 @@ class SimulationReport:
     machine: Machine
     interrupted: bool = False
 
-    def json(self) -> dict[str, Any]:
-        """Return the report as plain data for JSON."""
-        plain = asdict(self)
-        for entry, line in zip(plain["requirements"], self.requirements, strict=True):
-            entry |= line.derived
-        data: dict[str, Any] = with_lists(plain)
-        return data
-
-    def markdown(self) -> str:
-        """Return the report as Markdown."""
-        return report_markdown(self._title, self.machine.facts, self._tables, MEANING)
-
-    def __str__(self) -> str:
-        return report_text(self._title, self.machine.facts, self._tables, MEANING)
+    @property
+    def meaning(self) -> str:
+        """What the columns mean."""
+        return MEANING
 
     def __repr__(self) -> str:
         return repr_line(
             "SimulationReport", self.robot, f"{self.repeats} rounds, {requirements_text(self.requirements)}"
         )
 
-    def _repr_html_(self) -> str:
-        table = html_table(BatchRow.COLUMNS, [row.cells for row in self.batch], align="lr")
-        return report_html(self._title, self.machine.facts, table, self.requirements)
+    @property
+    def main_table(self) -> str:
+        """Many arms in one call, as HTML."""
+        return html_table(BatchRow.COLUMNS, [row.cells for row in self.batch], align="lr")
 
     @property
-    def _title(self) -> str:
+    def title(self) -> str:
+        """What was measured, in a line."""
         ending = " (interrupted)" if self.interrupted else ""
         return f"{self.robot}: simulation beside peers, {self.repeats} rounds{ending}"
 
     @property
-    def _tables(self) -> list[Table]:
-        """The tables that have rows."""
+    def tables(self) -> list[Table]:
+        """Requirements, one arm, many arms, errors beside times."""
         tables: list[Table] = [
             ("Required", ("what", "required", "measured", ""), [list(line.cells) for line in self.requirements]),
             ("One arm, called at 1 kHz", SingleRow.COLUMNS, [row.cells for row in self.single]),
@@ -221,4 +203,4 @@ class SimulationReport:
                 [[gap.quantity, gap.name, gap.reason] for gap in self.missing],
             ),
         ]
-        return [table for table in tables if table[2]]
+        return tables

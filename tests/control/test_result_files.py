@@ -258,7 +258,7 @@ def test_what_could_not_be_read_is_not_written(suffix, name, value, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("suffix", [suffix for suffix in SUFFIXES if suffix != ".mat"])
+@pytest.mark.parametrize("suffix", SUFFIXES)
 @given(data=st.data())
 def test_no_damaged_byte_leads_anywhere_else(data, suffix, tmp_path_factory):
     path = swinging(ARM, 4).save(tmp_path_factory.mktemp("damaged") / f"run{suffix}")

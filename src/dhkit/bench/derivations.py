@@ -141,7 +141,7 @@ def _peer_seconds(arm: Arm, limit: float) -> float | None:
     return seconds if seconds <= limit else None
 
 
-def _report_peer() -> None:
+def report_peer() -> None:
     """Print the time of the peer, s, for the robot file in the arguments."""
     description = Arm.load(sys.argv[1]).description
     lagranges_equations(Arm.load("polar_rp").description)  # imports modules

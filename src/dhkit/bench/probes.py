@@ -194,7 +194,7 @@ def peak_memory(workload: Workload, quantity: str, called: str) -> PeakMemory:
     return PeakMemory(quantity, called, **json.loads(printed))
 
 
-def _report_peak() -> None:
+def report_peak() -> None:
     """Print the sizes of one call, bytes, as JSON; the arguments are those that :func:`peak_memory` passes."""
     robot, quantity, called, batch, threads = sys.argv[1:]
     workload = Workload.of(Arm.load(robot), int(batch), int(threads), seed=0)

@@ -197,8 +197,72 @@ class Requirement:
         return repr_line("Requirement", summary=", ".join(filter(None, (what, required, measured, verdict))))
 
 
+class Report:
+    """What all reports of benchmarks share: a title, tables, and the same facts as text, Markdown, HTML and JSON.
+
+    A report is a dataclass with the machine, and perhaps with requirements; it says its title, its tables and what
+    their columns mean.
+    """
+
+    machine: Machine
+
+    @property
+    def title(self) -> str:
+        """What was measured, in a line."""
+        raise NotImplementedError
+
+    @property
+    def meaning(self) -> str:
+        """What the columns mean."""
+        raise NotImplementedError
+
+    @property
+    def tables(self) -> list[Table]:
+        """The tables; those without rows are not shown."""
+        raise NotImplementedError
+
+    @property
+    def main_table(self) -> str:
+        """The table that a notebook shows, as HTML."""
+        raise NotImplementedError
+
+    @property
+    def _shown(self) -> list[Table]:
+        return [table for table in self.tables if table[2]]
+
+    def json(self) -> dict[str, object]:
+        """Return the report as plain data for JSON, without tuples and classes."""
+        plain = asdict(self)  # type: ignore[call-overload]
+        for key, listed in vars(self).items():
+            if isinstance(listed, tuple):
+                for entry, value in zip(plain[key], listed, strict=True):
+                    if hasattr(value, "derived"):
+                        entry |= value.derived
+        data: dict[str, object] = with_lists(plain)
+        return data
+
+    def markdown(self) -> str:
+        """Return the report as Markdown."""
+        parts = [f"# {self.title}", *(f"- {fact}" for fact in self.machine.facts), ""]
+        for heading, columns, cells in self._shown:
+            parts += [f"## {heading}", "", *_markdown_table(columns, cells), ""]
+        return "\n".join([*parts, self.meaning, ""])
+
+    def __str__(self) -> str:
+        parts = [self.title, *(f"  {fact}" for fact in self.machine.facts), ""]
+        for heading, columns, cells in self._shown:
+            parts += [heading, *_text_table(columns, cells), ""]
+        return "\n".join([*parts, self.meaning])
+
+    def _repr_html_(self) -> str:
+        requirements: Sequence[Requirement] = getattr(self, "requirements", ())
+        cells = [requirement.cells for requirement in requirements]
+        required = html_table(("what", "required", "measured", ""), cells) if cells else ""
+        return html_block(self.title, self.main_table, required, html_lines(list(self.machine.facts)))
+
+
 @dataclass(frozen=True)
-class BenchReport:
+class BenchReport(Report):
     """Timings of dhkit beside its peers, for one robot in one process.
 
     Attributes
@@ -239,37 +303,30 @@ class BenchReport:
     operations: tuple[Operations, ...] = ()
     requirements: tuple[Requirement, ...] = ()
 
+    @property
+    def meaning(self) -> str:
+        """What the columns mean."""
+        return RATIO_MEANING
+
     def json(self) -> dict[str, object]:
         """Return the report as plain data for JSON, without NaN, tuples and classes."""
-        plain = asdict(self)
-        for entry, row in zip(plain["rows"], self.rows, strict=True):
+        data = super().json()
+        for entry, row in zip(data["rows"], self.rows, strict=True):  # type: ignore[call-overload]
             verdict = entry.pop("verdict")
             entry |= verdict | {"mode": row.mode.value, "agrees": row.verdict.ok}
-        for key in ("outcomes", "requirements", "scaling", "memory"):
-            for entry, value in zip(plain[key], getattr(self, key), strict=True):
-                entry |= value.derived
-        data: dict[str, object] = with_lists(plain)
         return data
-
-    def markdown(self) -> str:
-        """Return the report as Markdown."""
-        return report_markdown(self._title, self.machine.facts, self._tables, RATIO_MEANING)
-
-    def __str__(self) -> str:
-        return report_text(self._title, self.machine.facts, self._tables, RATIO_MEANING)
 
     def __repr__(self) -> str:
         return repr_line(
             "BenchReport", self.robot, f"{counted(len(self.rows), 'row')}, {requirements_text(self.requirements)}"
         )
 
-    def _repr_html_(self) -> str:
+    @property
+    def main_table(self) -> str:
+        """The fastest peer of each quantity, as HTML."""
         endings = {outcome.quantity: outcome.ending.value for outcome in self.outcomes}
         rows = [(quantity, *self._fastest(quantity), endings.get(quantity, "")) for quantity in self.quantities]
-        headings = ("quantity", "dhkit, an item", "the fastest peer", "an item", "ended")
-        return report_html(
-            self._title, self.machine.facts, html_table(headings, rows, align="lrlrl"), self.requirements
-        )
+        return html_table(("quantity", "dhkit, an item", "the fastest peer", "an item", "ended"), rows, align="lrlrl")
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -285,14 +342,15 @@ class BenchReport:
         return (own_text, "–", "–") if peer is None else (own_text, peer.contender, duration(peer.seconds))
 
     @property
-    def _title(self) -> str:
+    def title(self) -> str:
+        """What was measured, in a line."""
         threads = "1 thread" if self.threads == 1 else f"{self.threads} threads"
         ending = " (interrupted)" if self.interrupted else ""
         return f"{self.robot}: dhkit beside its peers, batches of {self.batch}, {threads}{ending}"
 
     @property
-    def _tables(self) -> list[Table]:
-        """The tables that have rows."""
+    def tables(self) -> list[Table]:
+        """Timings by quantity, requirements, and what the probes measured."""
         columns = ("contender", "called", "items", "time", "quartiles", "x batch", "x single", "solutions", "error")
         tables: list[Table] = [
             (quantity, columns, [_cells(row) for row in self.rows if row.quantity == quantity])
@@ -308,7 +366,7 @@ class BenchReport:
         )
         tables += [(heading, columns, [list(row.cells) for row in rows]) for heading, columns, rows in others]
         gaps = [[gap.quantity, gap.name, gap.reason] for gap in self.missing]
-        return [table for table in (*tables, ("Did not take part", ("quantity", "who", "why"), gaps)) if table[2]]
+        return [*tables, ("Did not take part", ("quantity", "who", "why"), gaps)]
 
 
 def _cells(row: Row) -> list[str]:
@@ -338,29 +396,6 @@ def _ratio(value: float | None) -> str:
     if value is None:
         return ""
     return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
-
-
-def report_text(title: str, facts: Iterable[str], tables: Iterable[Table], meaning: str) -> str:
-    """Return a report as text: title, facts of the machine, tables, and the meaning of their columns."""
-    parts = [title, *(f"  {fact}" for fact in facts), ""]
-    for heading, columns, cells in tables:
-        parts += [heading, *_text_table(columns, cells), ""]
-    return "\n".join([*parts, meaning])
-
-
-def report_markdown(title: str, facts: Iterable[str], tables: Iterable[Table], meaning: str) -> str:
-    """Return a report as Markdown; see :func:`report_text`."""
-    parts = [f"# {title}", *(f"- {fact}" for fact in facts), ""]
-    for heading, columns, cells in tables:
-        parts += [f"## {heading}", "", *_markdown_table(columns, cells), ""]
-    return "\n".join([*parts, meaning, ""])
-
-
-def report_html(title: str, facts: Iterable[str], table: str, requirements: Sequence[Requirement] = ()) -> str:
-    """Return a report for a notebook: its main table, which is HTML already, and its requirements."""
-    cells = [requirement.cells for requirement in requirements]
-    required = html_table(("what", "required", "measured", ""), cells) if cells else ""
-    return html_block(title, table, required, html_lines(list(facts)))
 
 
 def requirements_text(requirements: Sequence[Requirement]) -> str:

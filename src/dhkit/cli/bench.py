@@ -6,12 +6,13 @@ import json as json_format
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Protocol
+from typing import Annotated
 
 import typer
 
 from dhkit.arm import Arm
 from dhkit.bench import QUANTITIES, BenchReport, Ending, Requirement, run as run_bench
+from dhkit.bench.report import Report
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.options import Json, Seed, read_arm
 from dhkit.cli.output import print_json, say
@@ -88,16 +89,6 @@ def run(
     if report.interrupted:
         return ExitStatus.INTERRUPTED
     return ExitStatus.FINE if all(outcome.ok for outcome in report.outcomes) else ExitStatus.NO
-
-
-class Report(Protocol):
-    """A report that can be written: about quantities, motions or simulations."""
-
-    def markdown(self) -> str:
-        """Return the report as Markdown."""
-
-    def json(self) -> dict[str, object]:
-        """Return the report as plain data."""
 
 
 def write(report: Report, path: Path) -> tuple[Path, Path]:
