@@ -17,7 +17,7 @@ from dhkit.grading import grade
 
 DATA = Path(__file__).with_name("data") / "programs.jsonl"
 PROGRAMS = [json.loads(line) for line in DATA.read_text("utf-8").splitlines()]
-SHARE = 4
+SHARE = 8
 """One program of so many is read unless all are."""
 MOST_UNREAD = 0.04
 """Share of the right programs that may be refused."""

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dhkit.cached_property import cached_property
 from dhkit.control.controller import continuous_law, name_of, reset
 from dhkit.control.gains import batch_of, effective_inertia, gain, gains_text, pd_gains
-from dhkit.control.law import Law, Symbols
+from dhkit.control.law import Law, LawFunction, Symbols
 from dhkit.control.references import Setpoint
 from dhkit.description import Array, Robot, description_of, require_bodies
 from dhkit.display import repr_line
-from dhkit.dynamics import Friction, friction_torque, gravity_torque, inverse_dynamics
+from dhkit.dynamics import Friction, friction_torque
 from dhkit.symbolic import InertialTable, recursive_gravity, recursive_inverse_dynamics
 
 if TYPE_CHECKING:
@@ -40,14 +41,31 @@ class _Proportional:
     def __repr__(self) -> str:
         return repr_line(type(self).__name__, self.description.name, gains_text(kp=self.kp, kd=self.kd))
 
+    def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
+        """Return the torques, shape (n,) or (B, n), N m and N."""
+        return self._function(q, qd, setpoint, self._gains)
+
+    @property
+    def _gains(self) -> Array:
+        """The gains kp and kd of each joint, shape (2n,) or (B, 2n)."""
+        shape = (*self.batch_shape, self.description.n)
+        both = (gains if gains.shape == shape else np.broadcast_to(gains, shape) for gains in (self.kp, self.kd))
+        return np.concatenate(tuple(both), axis=-1)
+
+    @cached_property
+    def _function(self) -> LawFunction:
+        return LawFunction(self.law())
+
+    def law(self) -> Law:
+        """Return the controller as a CasADi expression."""
+        raise NotImplementedError
+
     def _law(self, name: str, torques: Callable[[InertialTable, Symbols, casadi.SX], casadi.SX]) -> Law:
         """Return the law with these torques, whose gains are kp and kd of each joint."""
-        shape = (*self.batch_shape, self.description.n)
-        gains = [np.broadcast_to(gain, shape) for gain in (self.kp, self.kd)]
-        return Law(name, self.description, np.concatenate(gains, axis=-1), torques)
+        return Law(name, self.description, self._gains, torques)
 
-    def _correction(self, q: Array, qd: Array, setpoint: Setpoint) -> Array:
-        return self.kp * (setpoint.q - q) + self.kd * (setpoint.qd - qd)
+    def __getstate__(self) -> dict[str, object]:
+        return {name: value for name, value in vars(self).items() if name != "_function"}
 
 
 class ComputedTorque(_Proportional):
@@ -68,18 +86,9 @@ class ComputedTorque(_Proportional):
         """Return the controller with kp = w^2, kd = 2 z w for bandwidth w, rad/s, and damping z: numbers, or (B,)."""
         return cls(robot, *pd_gains(bandwidth, damping))
 
-    def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
-        """Return the torques, shape (n,) or (B, n), N m and N."""
-        return inverse_dynamics(self.description, q, qd, setpoint.qdd + self._correction(q, qd, setpoint))
-
     def law(self) -> Law:
         """Return the controller as a CasADi expression."""
-        return self._law(
-            "computed_torque",
-            lambda table, s, gains: recursive_inverse_dynamics(
-                table, s.q, s.qd, s.setpoint_qdd + _correction_expression(s, gains)
-            ),
-        )
+        return self._law("computed_torque", _computed_torque)
 
 
 class PDGravity(_Proportional):
@@ -108,15 +117,9 @@ class PDGravity(_Proportional):
         kp, kd = pd_gains(bandwidth, damping)
         return cls(robot, m * kp, m * kd)
 
-    def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
-        """Return the torques, shape (n,) or (B, n), N m and N."""
-        return self._correction(q, qd, setpoint) + gravity_torque(self.description, q)
-
     def law(self) -> Law:
         """Return the controller as a CasADi expression."""
-        return self._law(
-            "pd_gravity", lambda table, s, gains: _correction_expression(s, gains) + recursive_gravity(table, s.q)
-        )
+        return self._law("pd_gravity", _pd_gravity)
 
 
 class FeedForward(PDGravity):
@@ -126,23 +129,29 @@ class FeedForward(PDGravity):
     Gains as for :class:`PDGravity`.
     """
 
-    def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
-        """Return the torques, shape (n,) or (B, n), N m and N."""
-        ahead = inverse_dynamics(self.description, setpoint.q, setpoint.qd, setpoint.qdd)
-        return ahead + self._correction(q, qd, setpoint)
-
     def law(self) -> Law:
         """Return the controller as a CasADi expression."""
-        return self._law(
-            "feed_forward",
-            lambda table, s, gains: (
-                recursive_inverse_dynamics(table, s.setpoint_q, s.setpoint_qd, s.setpoint_qdd)
-                + _correction_expression(s, gains)
-            ),
-        )
+        return self._law("feed_forward", _feed_forward)
 
 
-def _correction_expression(s: Symbols, gains: casadi.SX) -> casadi.SX:
+# The laws: e = q_d - q
+
+
+def _computed_torque(table: InertialTable, s: Symbols, gains: casadi.SX) -> casadi.SX:
+    return recursive_inverse_dynamics(table, s.q, s.qd, s.setpoint_qdd + _correction(s, gains))
+
+
+def _pd_gravity(table: InertialTable, s: Symbols, gains: casadi.SX) -> casadi.SX:
+    return _correction(s, gains) + recursive_gravity(table, s.q)
+
+
+def _feed_forward(table: InertialTable, s: Symbols, gains: casadi.SX) -> casadi.SX:
+    ahead = recursive_inverse_dynamics(table, s.setpoint_q, s.setpoint_qd, s.setpoint_qdd)
+    return ahead + _correction(s, gains)
+
+
+def _correction(s: Symbols, gains: casadi.SX) -> casadi.SX:
+    """Return kp e + kd de/dt of each joint."""
     n = s.q.shape[0]
     return gains[:n] * (s.setpoint_q - s.q) + gains[n:] * (s.setpoint_qd - s.qd)
 
