@@ -70,7 +70,7 @@ def states(description: Description, count: int, seed: int = 0):
 def test_random_tables_come_back_and_are_as_tidy(law, tmp_path_factory):
     file = tmp_path_factory.mktemp("random") / "arm.urdf"
 
-    @settings(max_examples=law.samples(1000))
+    @settings(max_examples=law.samples(1000, quick=10))
     @given(degenerate_arms(), st.sampled_from(["standard", "modified"]))
     def check(arm, convention):
         file.write_text(urdf_text(arm))
