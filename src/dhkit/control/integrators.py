@@ -34,7 +34,7 @@ JUMP_SHARE = 1e-6
 LOOK_AHEAD = 10.0
 """Length of the line on which a jump is looked for, in steps: a step that is accepted often ends just before the jump
 that the rejected, longer steps crossed."""
-ROUNDING = 1e-12
+TORQUE_NOISE = 1e-12
 """Change of torques relative to the largest torque below which it is rounding."""
 Torques = Callable[[float, Array, Array, Array], tuple[Array, Array]]
 """Function of time (s), joint values and rates (n,) and the controller's internal states (m,), that returns torques
@@ -280,7 +280,7 @@ class DormandPrince:
         below, above = torques_at(low), torques_at(high)
         largest = max(float(np.abs(below).max()), float(np.abs(above).max()))
         first = float(np.abs(above - below).max())
-        least = max(JUMP_SHARE * first, ROUNDING * largest)
+        least = max(JUMP_SHARE * first, TORQUE_NOISE * largest)
         for _ in range(HALVINGS):
             if np.abs(above - below).max() <= least:
                 return False

@@ -21,7 +21,7 @@ from dhkit.description.joint_text import joint_text, violated_limit_text
 from dhkit.trajectories import Trajectory
 
 log = logging.getLogger(__name__)
-ROUNDING = 1e-9
+LIMIT_TOLERANCE = 1e-9
 """Distance beyond a joint limit (rad or m) that counts as rounding and is corrected without a message."""
 
 ROWS_RATE = 1000.0
@@ -146,7 +146,7 @@ def _warn_beyond_stops(plant: Plant, q: Array) -> None:
     """Log a warning if the reference leads beyond the stops, where the arm cannot follow."""
     lower, upper = plant.limits
     beyond = np.maximum(q - upper, lower - q).max(axis=0)
-    if (beyond > ROUNDING).any():
+    if (beyond > LIMIT_TOLERANCE).any():
         i = int(np.argmax(beyond))
         log.warning(
             "the reference leads %s by %s beyond its limits; are its angles in degrees?",
@@ -164,7 +164,7 @@ def _moved_to_stops(plant: Plant, q: Array, name: str) -> Array:
         A joint value beyond a stop by more than rounding.
     """
     lower, upper = plant.limits
-    if ((q >= lower - ROUNDING) & (q <= upper + ROUNDING)).all():
+    if ((q >= lower - LIMIT_TOLERANCE) & (q <= upper + LIMIT_TOLERANCE)).all():
         return np.clip(q, lower, upper)
     i = int(np.argmax((q < lower) | (q > upper)))
     joint = plant.description.joints[i]

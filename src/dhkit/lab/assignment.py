@@ -23,7 +23,7 @@ from dhkit.trajectories import Trajectory
 MAX_BYTES = 100_000
 MAX_ROBOT_BYTES = 1_000_000
 """Largest size of a file that is looked at to tell an assignment from a robot file."""
-ROUNDING = 1e-9
+GOAL_TOLERANCE = 1e-9
 """Rounding that joint limits (rad, m), durations (s) and shares of points may be exceeded by."""
 
 
@@ -102,7 +102,7 @@ class MotionBetween(Condition):
 
     def is_reached(self, motion: Trajectory, excess: str | None) -> bool:
         """Return whether a motion is as asked for; ``excess`` names the limit that it exceeds, None if it keeps all."""
-        if excess is not None or motion.duration > self.duration + ROUNDING:
+        if excess is not None or motion.duration > self.duration + GOAL_TOLERANCE:
             return False
         ends = motion.q(np.array([0.0, motion.duration]))
         return bool(np.abs(ends - np.stack([self.begin, self.end])).max() <= self.joint)
@@ -128,7 +128,9 @@ class OwnScore(Condition):
         functions = report.get("functions", {})
         parts = functions.get(self.function, ()) if isinstance(functions, Mapping) else ()
         max_points = sum(part["most"] for part in parts)
-        return bool(max_points > 0 and sum(part["points"] for part in parts) >= (self.share - ROUNDING) * max_points)
+        return bool(
+            max_points > 0 and sum(part["points"] for part in parts) >= (self.share - GOAL_TOLERANCE) * max_points
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -345,7 +347,7 @@ def _joint_values(arm: Arm, given: str | tuple[float, ...], place: str) -> Array
     else:
         q = np.array(given)
     numbers = arm.description.numbers
-    for i in np.flatnonzero((q < numbers.lower - ROUNDING) | (q > numbers.upper + ROUNDING)):
+    for i in np.flatnonzero((q < numbers.lower - GOAL_TOLERANCE) | (q > numbers.upper + GOAL_TOLERANCE)):
         joint, limits = arm.description.joints[i].name, f"{numbers.lower[i]:.4g} to {numbers.upper[i]:.4g}"
         raise DescriptionError(f"{place}{joint} is {q[i]:.4g}; expected {limits}, its limits")
     return q

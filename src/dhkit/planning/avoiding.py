@@ -30,7 +30,7 @@ POINTS = 9
 """Number of states of an interval at which gaps are measured, with both ends."""
 ACTIVE_GAP = 0.05
 """Gap beyond the clearance (m) below which pairs are kept apart by planes; others only once they have come too near."""
-ROUNDING = 1e-6
+NO_SHORTFALL = 1e-6
 """Shortfall of a gap (m) that counts as none."""
 INFLATION_FACTOR = 1.2
 """Factor of a gap's shortfall between knots that is added to its margin."""
@@ -78,7 +78,7 @@ class Planes:
     def widened(self, gap: Array, required: Array) -> bool:
         """Include pairs of another motion that came too near, and inflate others; return whether pairs were new."""
         short = required - gap
-        new = (short > ROUNDING) & ~self.active
+        new = (short > NO_SHORTFALL) & ~self.active
         # An active pair is too near only between knots.
         missing = np.where(self.active, np.maximum(short, 0.0), 0.0)
         self.inflation = self.inflation + INFLATION_FACTOR * missing
@@ -201,7 +201,7 @@ class AvoidingSearch:
         upper = np.where(np.isfinite(limits.upper), limits.upper, np.maximum(task.points.max(axis=0), 0) + span)
         ends = self.separation.gaps(task.points[:, None]).gap
         reduced = task.avoidance.at_ends(self.separation.pairs).min(axis=1)
-        at_ends = np.minimum(ends.min(axis=0) - ROUNDING, reduced)
+        at_ends = np.minimum(ends.min(axis=0) - NO_SHORTFALL, reduced)
         turn, which = divmod(seed, len(PATH_CLEARANCES))
         need = np.minimum(self.clearance + PATH_CLEARANCES[which], at_ends)
         samples = min(FIRST_SAMPLES * 2**turn, MAX_SAMPLES)
@@ -287,7 +287,7 @@ class AvoidingSearch:
             gaps, required = self._measured(found.trajectory, knots, self.clearance + ACTIVE_GAP)
             short = float(np.max(required - gaps.gap, initial=-np.inf))
             missing = 0.0
-            if isinstance(found, PlannedMotion) and short <= ROUNDING:
+            if isinstance(found, PlannedMotion) and short <= NO_SHORTFALL:
                 found = self._certified(found)
                 if isinstance(found, PlannedMotion):
                     saved = np.inf if best is None else best.cost - found.cost

@@ -21,7 +21,7 @@ from dhkit.trajectories.trajectory import Trajectory
 Torques: TypeAlias = Callable[[Array, Array, Array], Array]
 """Function from q, qd and qdd, shape (N, n) each, to joint torques, shape (N, n), N m and N."""
 
-ROUNDING = 1e-12
+TORQUE_NOISE = 1e-12
 """Differences of torque below this share of the largest torque are rounding and limit nothing."""
 MIN_JUMP = 1e-6
 """A velocity or acceleration jumps at a break if it changes by more than this share of its largest value."""
@@ -269,7 +269,7 @@ def _by_torques(trajectories: Sequence[Trajectory], limits: Limits, torques: Tor
             tau, g = inverse_dynamics(description, q, qd, qdd), gravity_torque(description, q)
         else:
             tau, g = torques(q, qd, qdd), torques(q, 0 * q, 0 * q)
-        moves = np.abs(tau - g) > ROUNDING * np.abs(tau).max()
+        moves = np.abs(tau - g) > TORQUE_NOISE * np.abs(tau).max()
         spare = limits.torque - np.where(moves, np.sign(tau - g), np.sign(g)) * g
         falls = (np.abs(g) > limits.torque) | (moves & (spare <= 0))
         if falls.any():

@@ -21,7 +21,7 @@ from dhkit.verification.report import VerificationReport, printable
 from dhkit.verification.second_opinion import second_opinion
 from dhkit.verification.states import random_motions
 
-ROUNDING = 1e-12
+SAME_POSE = 1e-12
 """Differences of positions, m, and rotation entries up to this are rounding."""
 ROUNDING_STATES = 100
 """Number of states at which a URDF is compared with itself, read as designed."""
@@ -157,7 +157,7 @@ def _tool(
     reach = max(1.0, description.reach)
     position = largest(ours[:, :3, 3] - theirs[:, :3, 3]) / reach
     rotation = largest(ours[:, :3, :3] - theirs[:, :3, :3])
-    differs = max(position.max(), rotation.max()) > max(tolerance, ROUNDING)
+    differs = max(position.max(), rotation.max()) > max(tolerance, SAME_POSE)
     comparisons = [Comparison("tool position", position, tolerance), Comparison("tool rotation", rotation, tolerance)]
     return comparisons, list(_constant_offsets(ours, theirs)) if differs else []
 

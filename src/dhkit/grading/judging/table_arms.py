@@ -19,7 +19,7 @@ from dhkit.symbolic.ring import Element
 
 _T = TypeVar("_T", Array, Element)
 
-ROUNDING = 1e-12
+SAME_TRANSFORM = 1e-12
 """Relative tolerance, to the largest entry, within which two A_i are taken for equal in doubles."""
 MAX_ENTRY = 1e6
 """Largest entry of a table, m or rad: no arm has larger ones, and comparing axes would lose digits."""
@@ -130,9 +130,9 @@ class TableArm:
             return None
         senses = np.sum((at(np.ones(n)) - entries) * own, axis=1)
         moved = entries + own * (senses * q)[:, None]
-        if not np.allclose(np.abs(senses), 1, atol=ROUNDING):
+        if not np.allclose(np.abs(senses), 1, atol=SAME_TRANSFORM):
             return None
-        return cls(convention, kinds, entries, senses) if np.allclose(at(q), moved, atol=ROUNDING) else None
+        return cls(convention, kinds, entries, senses) if np.allclose(at(q), moved, atol=SAME_TRANSFORM) else None
 
     @property
     def n(self) -> int:

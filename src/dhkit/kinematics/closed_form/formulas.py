@@ -15,7 +15,7 @@ SX: TypeAlias = Any
 Pair: TypeAlias = tuple[SX, SX]
 """Cosine and sine of an angle."""
 
-ROUNDING = 2e-14
+BOUNDARY_SHARE = 2e-14
 """Share of ``scale`` by which a pose may lie beyond the boundary of the workspace and still count as on it."""
 SINGULAR = 1e-5
 """A branch counts as singular where the sine, or distance over reach, that vanishes there is below this."""
@@ -156,7 +156,7 @@ def two_link(x: SX, y: SX, L1: SX, L2: SX, scale: SX) -> TwoLink:
     R = hypot(x, y)
     reach, gap = L1 + L2, fabs(L1 - L2)
     excess = fmax(R - reach, gap - R)
-    beyond = excess > ROUNDING * scale
+    beyond = excess > BOUNDARY_SHARE * scale
     # 1 + cos b and 1 - cos b as products, so that nothing cancels near the stretched and the folded arm.
     folded = (R - gap) * (R + gap) / (2 * L1 * L2)
     stretched = (reach - R) * (reach + R) / (2 * L1 * L2)

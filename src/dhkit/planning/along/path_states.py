@@ -15,7 +15,7 @@ from dhkit.planning.loaded import LoadedArm
 from dhkit.trajectories import JointPath, Limits
 from dhkit.trajectories.pieces import Side
 
-ROUNDING = 1e-9
+CANCELLED_SHARE = 1e-9
 """Magnitude of a sum relative to that of its parts below which it counts as zero."""
 
 
@@ -110,7 +110,7 @@ class PathStates:
             (self.qs, self.qss, 0 * self.q, limits.acceleration),
         ):
             used = by_sdd * sdd + by_b * b
-            used[np.abs(used) < ROUNDING * (np.abs(by_sdd * sdd) + np.abs(by_b * b) + np.abs(rest))] = 0.0
+            used[np.abs(used) < CANCELLED_SHARE * (np.abs(by_sdd * sdd) + np.abs(by_b * b) + np.abs(rest))] = 0.0
             spare = limit - np.sign(used) * rest
             with np.errstate(divide="ignore", invalid="ignore"):
                 most = np.where((spare > 0) & (used != 0), spare / np.abs(used), np.inf)

@@ -19,7 +19,7 @@ from dhkit.planning.obstacles.segments import Bounds, axis_bounds, segment_dista
 from dhkit.planning.obstacles.solid_arrays import Solids
 from dhkit.planning.obstacles.solids import capsule_distances, obstacle_distances
 
-ROUNDING = 1e-7
+EQUAL_BOUNDS = 1e-7
 """Difference of bounds (m) that counts as equal: coal's distances are accurate to about 1e-9."""
 
 Nearest = tuple[Array, NDArray[np.int_]]
@@ -213,10 +213,10 @@ def _nearer(
     # Balls around the solids and the capsules bound the distances from below, their centres from above.
     bound = np.minimum(least, (away - radii - solids.radii).min(axis=1))
     low = away - radii - half_lengths - solids.bounds
-    rows, p = np.nonzero(low <= bound[:, None] + ROUNDING)
+    rows, p = np.nonzero(low <= bound[:, None] + EQUAL_BOUNDS)
     low, high = (bounds - radii[p] for bounds in axis_bounds(solids[p], axes[rows, which[p]]))
     np.minimum.at(bound, rows, high)
-    is_candidate = low <= bound[rows] + ROUNDING
+    is_candidate = low <= bound[rows] + EQUAL_BOUNDS
     rows, p = rows[is_candidate], p[is_candidate]
     result = least.copy()
     for pair in np.unique(p):
@@ -284,7 +284,7 @@ def _exact(bounds: Bounds, measure: Callable[[int, NDArray[np.int_]], Array]) ->
     distances = np.full(low.shape, np.inf)
     least = np.min(high, axis=1, initial=np.inf)
     for k in range(low.shape[1]):
-        rows = np.flatnonzero(np.isfinite(low[:, k]) & (low[:, k] <= least + ROUNDING))
+        rows = np.flatnonzero(np.isfinite(low[:, k]) & (low[:, k] <= least + EQUAL_BOUNDS))
         if len(rows):
             distances[rows, k] = measure(k, rows)
     return _smallest(distances)

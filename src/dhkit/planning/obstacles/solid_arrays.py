@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dhkit.description import Array, Box
 from dhkit.planning.obstacles.scene import Obstacle
 
-ROUNDING = 1e-9
+BEHIND_TOLERANCE = 1e-9
 """Distance (m) by which a solid may stand before a plane and counts as behind it: of copies only rounding differs."""
 
 
@@ -92,7 +92,7 @@ def needed_planes(
         Distances of the link from each plane, shape (P,), m.
     """
     # Entry (i, j): whether solid j, with the distance required from it, is behind what the link keeps from plane i.
-    shields = solids.reach(which, normal) + required <= (level + required)[:, None] + ROUNDING
+    shields = solids.reach(which, normal) + required <= (level + required)[:, None] + BEHIND_TOLERANCE
     needed, is_shielded = np.zeros((2, len(which)), dtype=bool)
     for i in range(len(which)):
         if not is_shielded[i]:

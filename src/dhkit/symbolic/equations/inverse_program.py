@@ -13,7 +13,7 @@ from dhkit.symbolic.equations.programs import RESERVED, harmless, identifier
 from dhkit.symbolic.equations.writing import Printer
 from dhkit.symbolic.inverse.chain import POSE
 from dhkit.symbolic.inverse.derivation import IN_PLANE, InverseDerivation, in_branch_order
-from dhkit.symbolic.inverse.forms import ROUNDING, Form, Remainder
+from dhkit.symbolic.inverse.forms import ZERO_RADICAND, Form, Remainder
 from dhkit.symbolic.inverse.steps import Choice, Step
 from dhkit.symbolic.languages.statements import Comment, Digit, Guard, Let, Statement
 from dhkit.symbolic.languages.syntax import Syntax
@@ -216,7 +216,7 @@ class _Statements:
             yield Let(f"D_{name}", in_letters(words["D"]))
             guard = words["D"] = f"D_{name}"
         if guard:
-            yield Guard(in_letters(guard), f"-{ROUNDING!r}*({in_letters(least)})")
+            yield Guard(in_letters(guard), f"-{ZERO_RADICAND!r}*({in_letters(least)})")
         sign = "1.0"
         if form.has_two_roots:
             self.root += 1

@@ -36,7 +36,7 @@ DEFINED = (
     *("x", "y", "u", "v", "cphi", "sphi"),
 )
 """Names that steps may define."""
-ROUNDING = Fraction(1, 10**12)
+ZERO_LENGTH = Fraction(1, 10**12)
 """rad, and lengths over the reach."""
 
 
@@ -197,18 +197,18 @@ class Chain:
 
 
 def without_rounding(description: Description) -> tuple[Description, list[str]]:
-    """Return an arm with lengths within ROUNDING of 0 as 0, angles so near k pi/2 as k pi/2, and notes on these.
+    """Return an arm with lengths within ZERO_LENGTH of 0 as 0, angles so near k pi/2 as k pi/2, and notes on these.
 
     ``arm.family`` reads tables with the same tolerance; only numbers change, not parameters.
     """
     notes: list[str] = []
 
     def length(name: str, value: Expression) -> Expression:
-        return nearest(name, value, value.rational, ZERO, (description.reach or 1.0) * ROUNDING)
+        return nearest(name, value, value.rational, ZERO, (description.reach or 1.0) * ZERO_LENGTH)
 
     def angle(name: str, value: Expression) -> Expression:
         number = exact_angle(value).rational
-        return nearest(name, value, number, PI * Fraction(round(2 * (number or 0) / PI_DIGITS), 2), ROUNDING)
+        return nearest(name, value, number, PI * Fraction(round(2 * (number or 0) / PI_DIGITS), 2), ZERO_LENGTH)
 
     def nearest(
         name: str, value: Expression, number: Fraction | None, known: Expression, tolerance: float | Fraction

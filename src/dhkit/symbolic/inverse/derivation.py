@@ -19,7 +19,7 @@ from dhkit.formats import format_function
 from dhkit.symbolic.exact.lagrangian import Proof
 from dhkit.symbolic.inverse.chain import POSE, Chain, without_rounding
 from dhkit.symbolic.inverse.families import Derivable, family_of
-from dhkit.symbolic.inverse.forms import ROUNDING, Unknown, lemmas
+from dhkit.symbolic.inverse.forms import ZERO_RADICAND, Unknown, lemmas
 from dhkit.symbolic.inverse.missing import why_not
 from dhkit.symbolic.inverse.steps import Choice, Condition, Step, Workbench, names_in, without_unused
 from dhkit.symbolic.inverse.wrists import FLIPS
@@ -315,7 +315,7 @@ class InverseDerivation:
                 continue
             letters = {letter: values.of(element) for letter, element in step.form.letters.items()}
             found, radicand = step.form.solve(letters, signs.get(k, 1.0))
-            is_solved &= np.broadcast_to(radicand >= -ROUNDING, count)
+            is_solved &= np.broadcast_to(radicand >= -ZERO_RADICAND, count)
             values.set_unknown(step.form.unknown, np.broadcast_to(found, count))
         for condition in self.conditions:
             off = np.abs(values.of(condition.left) - values.of(condition.right))

@@ -19,7 +19,7 @@ from dhkit.symbolic.exact.lagrangian import Proof
 from dhkit.symbolic.ring import Element, Elements, Ring
 from dhkit.symbolic.ring.ring import Constant
 
-ROUNDING = 1e-12
+ZERO_RADICAND = 1e-12
 """Share of its terms by which the radicand of a root may be negative and counts as zero."""
 
 

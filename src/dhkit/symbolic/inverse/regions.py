@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from dhkit.symbolic.inverse.chain import ROUNDING, Chain
+from dhkit.symbolic.inverse.chain import ZERO_LENGTH, Chain
 from dhkit.symbolic.inverse.forms import Circle, Form, Line, Remainder, Sliding, Square, Turned
 from dhkit.symbolic.inverse.steps import Choice, Definition, Figure, Step, View, Workbench
 from dhkit.symbolic.ring import Element, Elements
@@ -77,7 +77,7 @@ def turn_the_plane(bench: Workbench, point: Elements, inside: Elements, who: str
     unknown, (c, s), tilt = bench.unknown(1), chain.cosine_and_sine(1), chain.alpha[0][1]
     px, py, pz = point
     beside, offset = inside[2], number(chain, inside[2])
-    if abs(offset) <= ROUNDING * (chain.description.reach or 1.0):
+    if abs(offset) <= ZERO_LENGTH * (chain.description.reach or 1.0):
         offset = 0.0  # as far as names go; the equation keeps it
     forward = tilt * (c * px + s * py)
     missing = "" if inside[2].is_zero else f"abs({inside[2]})"
