@@ -21,7 +21,7 @@ from dhkit.grading.judging.numeric import doubles
 from dhkit.grading.judging.quotients import multiple_angle, sum_of_angles
 from dhkit.grading.judging.same_arm import STATES
 from dhkit.grading.judging.table_arms import (
-    ROUNDING,
+    SAME_TRANSFORM,
     Row,
     link_entries,
     link_in_doubles,
@@ -139,7 +139,7 @@ class TableRows:
             if written and self.is_proved(i, self.reference_in_numbers(i)):
                 return JudgedRow(Verdict.CORRECT, f"A{i + 1} is proved with the file's numbers", written)
         if self.agrees_in_doubles(i):
-            statement = f"A{i + 1} agrees at {STATES} random states to {ROUNDING:g}, without a proof"
+            statement = f"A{i + 1} agrees at {STATES} random states to {SAME_TRANSFORM:g}, without a proof"
             return JudgedRow(Verdict.UNDECIDED, statement)
         return JudgedRow(Verdict.WRONG, f"A{i + 1} differs")
 
@@ -195,7 +195,7 @@ class TableRows:
                 return False
             answer = link_in_doubles(self.convention, *entries)
             truth = link_in_doubles(self.convention, *(number_of(entry, values) for entry in self.reference[i]))
-            if not np.max(np.abs(answer - truth)) <= ROUNDING * max(1.0, float(np.max(np.abs(truth)))):
+            if not np.max(np.abs(answer - truth)) <= SAME_TRANSFORM * max(1.0, float(np.max(np.abs(truth)))):
                 return False
         return True
 

@@ -17,7 +17,7 @@ from dhkit.description import Array
 from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.closed_form.family import PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
-    ROUNDING,
+    BOUNDARY_SHARE,
     SINGULAR,
     SX,
     Pair,
@@ -108,7 +108,7 @@ def shoulders(point: Vector, offset: SX, scale: SX, reach: SX, free: Pair) -> tu
     x, _, v = point
     r = hypot(x, v)
     short = fabs(offset) - r
-    beyond = short > ROUNDING * scale
+    beyond = short > BOUNDARY_SHARE * scale
     square = (r - fabs(offset)) * (r + fabs(offset))
     front = sqrt(if_else(square > 0, square, 0.0))
 

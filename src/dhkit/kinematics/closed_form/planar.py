@@ -29,7 +29,7 @@ from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.closed_form.arm_plane import UPRIGHT, as_pair
 from dhkit.kinematics.closed_form.family import Fit, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
-    ROUNDING,
+    BOUNDARY_SHARE,
     SINGULAR,
     SX,
     Branch,
@@ -150,7 +150,7 @@ def polar_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return two branches: the prismatic joint extended in its positive direction, then in its negative."""
     x, u, v = pose.seen(p["T_plane_world"], IDENTITY).position
     R, lift = hypot(x, u), fabs(p["lift"])
-    beyond = lift - R > ROUNDING * pose.scale
+    beyond = lift - R > BOUNDARY_SHARE * pose.scale
     square = (R - lift) * (R + lift)
     length = sqrt(positive_part(square))
     miss = hypot(if_else(beyond, lift - R, 0.0), _off_plane(v - p["height"], pose.scale))
@@ -202,7 +202,7 @@ def slider_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return two branches: the tool ahead of the revolute axis along the prismatic joint, then behind it."""
     x, u, v = pose.seen(p["T_plane_world"], IDENTITY).position
     L = p["L"]
-    beyond = fabs(u) - L > ROUNDING * pose.scale
+    beyond = fabs(u) - L > BOUNDARY_SHARE * pose.scale
     square = (L - u) * (L + u)
     ahead = sqrt(positive_part(square))
     miss = hypot(if_else(beyond, fabs(u) - L, 0.0), _off_plane(v - p["height"], pose.scale))

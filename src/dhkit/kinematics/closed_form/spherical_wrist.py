@@ -26,7 +26,7 @@ from dhkit.kinematics.closed_form.arm_plane import (
 )
 from dhkit.kinematics.closed_form.family import Fit, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (
-    ROUNDING,
+    BOUNDARY_SHARE,
     SINGULAR,
     SX,
     Branch,
@@ -136,7 +136,7 @@ def slide_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
         x, u = shoulder.x - p["a1"], T.position[1]
         R, lift = hypot(x, u), fabs(p["lift"])
         short = lift - R
-        beyond = short > ROUNDING * pose.scale
+        beyond = short > BOUNDARY_SHARE * pose.scale
         square = (R - lift) * (R + lift)
         length = sqrt(positive_part(square))
         for along in (length, -length):
