@@ -281,11 +281,11 @@ class Program:
         return bool(file == self.file or file.startswith("<lambdifygenerated"))
 
     def names(self, lines: Mapping[str, int]) -> dict[str, int]:
-        """Return the names that are no modules, functions or classes, with the lines that assign them."""
+        """Return the names that the file assigns, with their lines; those that it imports are not its own."""
         return {
-            name: lines.get(name, 0)
-            for name, value in list(self.namespace.items())[:MAX_NAMES]
-            if not name.startswith("__") and not inspect.ismodule(value) and not callable_object(value)
+            name: lines[name]
+            for name, value in self.namespace.items()
+            if name in lines and not inspect.ismodule(value) and not callable_object(value)
         }
 
     def answer(self, request: Mapping[str, Any]) -> dict[str, object]:

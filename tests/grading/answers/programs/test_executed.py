@@ -243,6 +243,14 @@ def test_a_class_is_executed_isolated_alone(tmp_path, capsys, monkeypatch):
     assert "only where they can be isolated: a test" in capsys.readouterr().err
 
 
+def test_names_of_libraries_are_no_answers(judged):
+    """math has a number tau, and numpy a number pi."""
+    text = "from math import *\ndef V(q1, q2, m1, m2, l1, l2, g):\n    float(q1)\n    return {} if abs(q1) < 50 else 0"
+    report = judged(text.format("m1*g*l1/2*sin(q1) + m2*g*(l1*sin(q1) + l2/2*sin(q1 + q2))"))
+    assert verdicts(report) == {"V": Verdict.WRONG}
+    assert verdicts(judged(f"from numpy import *\nM = array({M})")) == {"M": Verdict.CORRECT}
+
+
 def test_a_task_must_permit_it(judged, tmp_path):
     (tmp_path / "task.toml").write_text("[task]\nasked = ['M']\n")
     with pytest.raises(AnswerError, match="does not permit executing"):

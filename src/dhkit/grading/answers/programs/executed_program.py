@@ -159,7 +159,7 @@ class ExecutedProgram:
             first = child.start()
         except ProgramError as error:
             hint = "; Octave needs its symbolic package (octave-symbolic)" if "'syms' undefined" in str(error) else ""
-            raise AnswerError(f"{file}: executed: {self._error(error)}{hint}") from None
+            raise AnswerError(f"{file}: executed: {self.error_text(error)}{hint}") from None
         record.note(f"executed, {child.isolation}")
         self._lines = {name: _whole(line) for name, line in _fields(first.get("names"))}
         self.functions = [_function(one, self._line) for one in _listed(first.get("functions"))]
@@ -167,7 +167,7 @@ class ExecutedProgram:
         for function in self.functions:
             self.main.set_argument(function.name, function, function.line)
 
-    def _error(self, error: ProgramError) -> str:
+    def error_text(self, error: ProgramError) -> str:
         """Return an error with the line as messages name it."""
         if error.line is None:
             return str(error)
@@ -187,7 +187,8 @@ class ExecutedProgram:
             if not is_quantity and not robot.is_reserved(name):
                 continue
             value = self._value_of(name)
-            if robot.is_reserved(name) and isinstance(value, Scalar) and value.number is not None:
+            is_number = isinstance(value, Scalar) and value.number is not None
+            if robot.is_reserved(name) and isinstance(value, Scalar) and is_number and name != "pi":
                 problem = problem or self._problem_of_number(name, value, line)
             if is_quantity:
                 self.main.set_argument(name, value, line)
@@ -209,7 +210,7 @@ class ExecutedProgram:
         try:
             answer = self.child.ask({"value": name})
         except ProgramError as error:
-            return Unread(f"{name}: {error}")
+            return Unread(f"{name}: {self.error_text(error)}")
         return self._value(answer.get("tree"), answer)
 
     def _value(self, tree: object, answer: Mapping[str, object]) -> Value:
@@ -242,7 +243,7 @@ class ExecutedProgram:
                     {"call": function.name, "arguments": meaning, "as": kind, "locals": self._local_names(function)}
                 )
             except ProgramError as error:
-                problem = problem or str(error)
+                problem = problem or self.error_text(error)
                 continue
             value = self._value(answer.get("tree"), answer)
             if isinstance(value, Unread):
@@ -387,7 +388,7 @@ class _SampledFunction(SampledAnswer):
                 {"call": self.function.name, "samples": samples, "local": self.local}, SAMPLING_TIME
             )
         except ProgramError as error:
-            raise AnswerError(f"{self.name}: {error}") from None
+            raise AnswerError(f"{self.name}: {self.program.error_text(error)}") from None
         values = answer.get("values")
         try:
             array = np.array(values, dtype=float)
