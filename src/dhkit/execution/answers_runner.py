@@ -27,6 +27,7 @@ import json
 import math
 import numbers
 import os
+import re
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping
@@ -205,11 +206,17 @@ def number_symbols_from_one() -> None:
     of_casadi = casadi.SX.sym
 
     def sym(name: str, *size: Any) -> Any:
-        shape = size[0] if size and isinstance(size[0], tuple) else size
-        is_column = len(shape) == 1 or (len(shape) == 2 and shape[1] == 1)
-        if not is_column or shape[0] == 1:
+        """Return a symbol, a vector of numbered ones, or a matrix of those with two numbers."""
+        first = size[0] if size else 1
+        shape = first.shape if hasattr(first, "shape") else first if isinstance(first, tuple) else size
+        m, n = (*shape, 1, 1)[:2]
+        if (m, n) == (1, 1) or len(shape) > 2:
             return of_casadi(name, *size)
-        return casadi.vertcat(*(of_casadi(f"{name}{k + 1}") for k in range(shape[0])))
+        if 1 in (m, n):
+            entries = [of_casadi(f"{name}{k + 1}") for k in range(m * n)]
+            return casadi.vertcat(*entries) if n == 1 else casadi.horzcat(*entries)
+        rows = [[of_casadi(f"{name}_{i + 1}_{j + 1}") for j in range(n)] for i in range(m)]
+        return casadi.vertcat(*(casadi.horzcat(*row) for row in rows))
 
     casadi.SX.sym = staticmethod(sym)  # type: ignore[method-assign, assignment]
 
@@ -272,7 +279,9 @@ class Program:
                 continue
             needed = [one.name for one in parameters if one.default is one.empty]
             line = code.co_firstlineno if code.co_filename == self.file else 0
-            found.append({"name": name, "line": line, "parameters": needed, "locals": list(code.co_varnames)})
+            keys = [one for one in code.co_consts if isinstance(one, str) and one.isidentifier()]
+            names = {"parameters": needed, "locals": list(code.co_varnames), "keys": keys}
+            found.append({"name": name, "line": line, **names})
         return found
 
     def _is_own(self, value: Any) -> bool:
@@ -321,7 +330,12 @@ class Program:
         """Return the numbers that a function returns, or those of one of its local names; None where it fails."""
         np = self.symbolic.numpy
         value, names = called(function, [self._numbers(x) for x in arguments.values()])
-        array = np.asarray(names[local] if local else value).astype(float)
+        array = np.asarray(names[local] if local else value)
+        if array.dtype.kind not in "fiub":
+            entries = array.ravel().tolist() if array.dtype.kind == "O" else [None]
+            if not all(isinstance(x, numbers.Real) for x in entries):
+                raise TypeError(f"returned {type(value).__name__} of {array.dtype}; expected real numbers")
+        array = array.astype(float)
         return np.where(np.isfinite(array), array.astype(object), None).tolist()
 
     def _numbers(self, value: Any) -> Any:
@@ -416,6 +430,12 @@ class Writer:
         value = value.doit()  # Derivative(V, q1) is written out; that of q1(t) stays
         import sympy
 
+        for symbol in value.free_symbols:
+            checked_name(str(symbol))
+        for call in value.atoms(sympy.core.function.AppliedUndef):
+            if len(call.args) != 1 or not call.args[0].is_Symbol:
+                raise ValueError(f"{call} is no joint variable as a function of time")
+            checked_name(call.func.__name__)
         for count, _ in enumerate(sympy.preorder_traversal(value)):
             if count > MAX_NODES:
                 raise ValueError(f"an expression of more than {MAX_NODES} nodes")
@@ -485,7 +505,7 @@ def casadi_operation(node: Any, arguments: list[str]) -> str:
     import casadi
 
     if node.is_symbolic():
-        return str(node.name())
+        return checked_name(str(node.name()))
     if node.is_constant():
         return number_text(float(node))
     forms = {
@@ -518,6 +538,13 @@ def casadi_operation(node: Any, arguments: list[str]) -> str:
     if form is None:
         raise TypeError(f"CasADi's operation {node.op()} is not read")
     return form.format(*arguments)
+
+
+def checked_name(name: str) -> str:
+    """Return the name of a symbol, which must not read as a formula."""
+    if re.fullmatch(r"[\w\\{}']+", name) is None:
+        raise ValueError(f"a symbol called {name[:40]!r}; expected a name")
+    return name
 
 
 def rows_of(shape: tuple[int, int], entries: list[str]) -> object:

@@ -243,6 +243,53 @@ def test_a_class_is_executed_isolated_alone(tmp_path, capsys, monkeypatch):
     assert "only where they can be isolated: a test" in capsys.readouterr().err
 
 
+RIGHT = "m1*g*l1/2*sin(q1) + m2*g*(l1*sin(q1) + l2/2*sin(q1 + q2))"
+OF_NUMBERS = f"(q1, q2, m1, m2, l1, l2, g):\n    float(q1)\n    return {{}}*({RIGHT})\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"from math import sin\nV = 2*({RIGHT})\ndef U{OF_NUMBERS.format(1)}",
+        f"from math import sin\ndef V{OF_NUMBERS.format(1)}def U{OF_NUMBERS.format(2)}",
+        f"from math import sin\ndef V{OF_NUMBERS.format('(1 + 7j)')}",
+        f"from math import sin\ndef V{OF_NUMBERS.format('(1 + t)').replace('(q1', '(t, q1')}",
+        f"from math import sin\ndef energy(q1, q2, m1, m2, l1, l2, g):\n    V = {RIGHT}\n    return 2*V",
+        f"from math import sin\ndef energy(q1, q2, m1, m2, l1, l2, g):\n    float(q1)\n    V = {RIGHT}\n    return 2*V",
+        f"from sympy import *\nx = Symbol('0*g + {RIGHT}')\nV = 5*x",
+        "from sympy import *\nx = Function('m1')(g*l1*sin(q1)/2)\nV = x + m2*g*(l1*sin(q1) + l2/2*sin(q1 + q2))",
+        "import casadi as ca\nq = ca.SX.sym('q', 1, 2)\nc, s = ca.cos(q[1]), ca.sin(q[1])\n"
+        "l1 = ca.SX.sym('l1')\nA1 = ca.vertcat(ca.horzcat(c, -s, 0, l1*c), ca.horzcat(s, c, 0, l1*s),"
+        " ca.horzcat(0, 0, 1, 0), ca.horzcat(0, 0, 0, 1))",
+        f"from sympy import *\nq1 = pi/2\nV = {RIGHT}",
+        "import sys\nsys.setrecursionlimit(20000)\nV = m1\nfor _ in range(960):\n    V = [V]",
+    ],
+)
+def test_no_wrong_program_is_right(judged, text):
+    """Conflicts, complex numbers, times, changed results, symbols that read as formulas, one state: none passes."""
+    try:
+        report = judged(text)
+    except AnswerError:
+        return
+    assert not report, report
+
+
+def test_functions_that_agree_are_sampled(judged):
+    text = f"from math import sin\ndef V{OF_NUMBERS.format(1)}def potential_energy{OF_NUMBERS.format(1)}"
+    assert verdicts(judged(text)) == {"V": Verdict.SAMPLED}
+
+
+def test_functions_without_a_quantity_are_not_called(judged):
+    text = f"from sympy import *\ndef helper():\n    while True: pass\nV = {RIGHT}"
+    assert verdicts(judged(text)) == {"V": Verdict.CORRECT}
+
+
+@pytest.mark.usefixtures("octave")
+def test_a_script_of_octave_may_clear(judged):
+    text = f"clear all; clc\nclose all\nfunction V = V(q1, q2, m1, m2, l1, l2, g)\n  V = {RIGHT};\nend\n"
+    assert verdicts(judged(text, "answer.m")) == {"V": Verdict.SAMPLED}
+
+
 def test_names_of_libraries_are_no_answers(judged):
     """math has a number tau, and numpy a number pi."""
     text = "from math import *\ndef V(q1, q2, m1, m2, l1, l2, g):\n    float(q1)\n    return {} if abs(q1) < 50 else 0"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
@@ -16,8 +17,8 @@ from dhkit.description import Array, Description
 from dhkit.errors import AnswerError
 from dhkit.execution.child import Child
 from dhkit.execution.isolation import Isolation
-from dhkit.execution.process import Limits, ProgramError
-from dhkit.grading.answers.programs.program_answers import answers_of
+from dhkit.execution.process import Failure, Limits, ProgramError, printable
+from dhkit.grading.answers.programs.program_answers import WRITTEN_BY_DHKIT, answers_of
 from dhkit.grading.answers.programs.robot_names import RobotNames, is_same_number
 from dhkit.grading.answers.programs.scope import Bound, Record, Scope
 from dhkit.grading.answers.programs.values import (
@@ -44,6 +45,10 @@ LIMITS = Limits(seconds=20.0, memory=2 << 30)
 SAMPLING_TIME = 60.0
 """Processor time for calling a function at all states, s."""
 MAX_NAMES = 2_000
+MAX_TREE_DEPTH = 6
+MAX_ROWS = 1_000
+SAME_VALUES = 1e-9
+"""Relative and absolute difference up to which two functions give the same numbers."""
 KINDS = ("numpy", "sympy", "casadi")
 """How symbols are made, in the order in which they are tried."""
 PARAMETER_SETS = frozenset(("p", "par", "params", "param", "parameters", "robot", "P", "prm", "constants"))
@@ -108,10 +113,11 @@ def executed_answers(
 
 def _functions_first(code: SourceCode) -> SourceCode:
     """Return a MATLAB file as a script with its functions in front: Octave knows them only after their definitions."""
-    lines = code.text.split("\n")
+    # A file begins in a new process; clear would take the runner's own names away.
+    lines = [re.sub(r"^\s*(?:clear|clearvars|clc|close)\b[^=(\n]*$", "", line) for line in code.text.split("\n")]
     starts = [k for k, line in enumerate(lines) if re.match(r"\s*function\b", line)]
     if not starts:
-        return code
+        return replace(code, text="\n".join(lines))
     order = [*range(starts[0], len(lines)), *range(starts[0])]
 
     def line_name(line: int) -> str:
@@ -151,6 +157,8 @@ class ExecutedProgram:
         self.state = names.state
         self.main = Scope(record)
         self.definitions: dict[str, str] = {}
+        self._ended = ""
+        """Why no function is called with symbols any more."""
         self.problems: list[str] = []
         """Why functions are not called."""
         self.numeric: list[tuple[Function, str]] = []
@@ -187,8 +195,7 @@ class ExecutedProgram:
             if not is_quantity and not robot.is_reserved(name):
                 continue
             value = self._value_of(name)
-            is_number = isinstance(value, Scalar) and value.number is not None
-            if robot.is_reserved(name) and isinstance(value, Scalar) and is_number and name != "pi":
+            if robot.is_reserved(name) and isinstance(value, Scalar) and _is_constant(value) and name != "pi":
                 problem = problem or self._problem_of_number(name, value, line)
             if is_quantity:
                 self.main.set_argument(name, value, line)
@@ -210,7 +217,7 @@ class ExecutedProgram:
         try:
             answer = self.child.ask({"value": name})
         except ProgramError as error:
-            return Unread(f"{name}: {self.error_text(error)}")
+            return Unread(self.error_text(error))
         return self._value(answer.get("tree"), answer)
 
     def _value(self, tree: object, answer: Mapping[str, object]) -> Value:
@@ -235,15 +242,20 @@ class ExecutedProgram:
         UnreadError
             An argument is not known, or it fails with all kinds of symbols.
         """
+        if not self._may_answer(function):
+            raise UnreadError(f"{function.name}(...) has no quantity in it")
         meaning = {name: self.symbols(name, function) for name in function.parameters}
-        problem = ""
-        for kind in KINDS if self.child.name.endswith(".py") else ():
+        problem = self._ended
+        for kind in KINDS if self.child.name.endswith(".py") and not self._ended else ():
             try:
                 answer = self.child.ask(
                     {"call": function.name, "arguments": meaning, "as": kind, "locals": self._local_names(function)}
                 )
             except ProgramError as error:
                 problem = problem or self.error_text(error)
+                if error.failure is not Failure.RAISED:  # it hangs, or has ended: nothing else is called with symbols
+                    self._ended = f"after {function.name}: {problem}"
+                    raise UnreadError(f"{function.name}(...): {problem}") from None
                 continue
             value = self._value(answer.get("tree"), answer)
             if isinstance(value, Unread):
@@ -252,9 +264,34 @@ class ExecutedProgram:
             scope = Scope(self.record, self.main, frozenset(function.definition))
             for name, tree in _fields(answer.get("locals")):
                 scope.set_argument(name, self._value(tree, answer), function.line)
+            self._refuse_changed(function, value, scope)
             return self._with_names(value, scope), scope
         self.numeric.append((function, problem))
         raise UnreadError(f"{function.name}(...) is not computed with symbols: {problem}")
+
+    def _may_answer(self, function: Function) -> bool:
+        """Whether a function's name, a local name or a key in it is that of a quantity: others are not called."""
+        quantities = self.record.robot.quantities
+        names = (WRITTEN_BY_DHKIT.get(function.name, function.name), *function.definition, *function.captured)
+        return any(quantities.quantity(name) or quantities.entries(name) for name in names)
+
+    def _refuse_changed(self, function: Function, value: Value, scope: Scope) -> None:
+        """Refuse a function's only local quantity where it returns something else of the same shape."""
+        quantities = self.record.robot.quantities
+        own = [name for name in scope.names if name in self.local_quantities(function)]
+        if len(own) != 1 or quantities.quantity(WRITTEN_BY_DHKIT.get(function.name, function.name)):
+            return
+        local = scope.names[own[0]].value
+        are_scalars = isinstance(value, Scalar) and isinstance(local, Scalar)
+        are_alike = isinstance(value, Matrix) and isinstance(local, Matrix) and value.shape == local.shape
+        if (are_scalars or are_alike) and value != local:
+            reason = f"{function.name} returns something else that it makes of {own[0]}, in {function.line}"
+            scope.set_argument(own[0], Unread(reason), function.line)
+
+    def local_quantities(self, function: Function) -> list[str]:
+        """Return the local names of a function, its arguments aside, that are called like a quantity."""
+        quantities = self.record.robot.quantities
+        return [name for name in function.definition if quantities.quantity(name) and name not in function.parameters]
 
     def _local_names(self, function: Function) -> list[str]:
         """Return the local names of a function that may be quantities."""
@@ -280,16 +317,16 @@ class ExecutedProgram:
     def symbols(self, name: str, function: Function) -> object:
         """Return an argument as names of symbols."""
         robot, plain = self.record.robot, plain_name(name)
+        if name in ("t", "time"):
+            return "t"
+        if name in STATES and self.state:
+            return list(self._state_names())
         if robot.vocabulary.is_state(plain) or robot.quantities.is_parameter(name):
             return name
         if robot.is_vector(plain):
             return [f"{plain}{k + 1}" for k in range(robot.n)]
         if name in PARAMETER_SETS:
             return {}
-        if name in ("t", "time"):
-            return "t"
-        if name in STATES and self.state:
-            return list(self._state_names())
         if name in TORQUES:
             return [f"torque{k + 1}" for k in range(robot.n)]
         more = ', or a state whose order the task gives ([names] state = "q, qd")' if name in STATES else ""
@@ -343,18 +380,31 @@ class ExecutedProgram:
     def _sampled(self, answers: Mapping[str, object]) -> dict[str, SampledAnswer]:
         """Return the quantities that are given by functions of numbers alone."""
         quantities = self.record.robot.quantities
-        found: dict[str, SampledAnswer] = {}
+        found: dict[str, _SampledFunction] = {}
         for function, _ in self.numeric:
             for local in ("", *function.definition):
-                name = local or function.name
+                name = local or WRITTEN_BY_DHKIT.get(function.name, function.name)
                 quantity = quantities.quantity(name)
                 is_given = quantity in answers and not isinstance(answers[quantity], Refusal)
-                if not quantity or is_given or quantity in found or quantities.is_parameter(name):
+                if not quantity or is_given or quantity in self._in_main or quantities.is_parameter(name):
                     continue
-                if local and local in function.parameters:
+                before = found.get(quantity)
+                if local and (local in function.parameters or (before is not None and before.function is function)):
                     continue
-                found[quantity] = _SampledFunction(self, function, local)
-        return found
+                one = _SampledFunction(self, function, local)
+                # Several functions may give a quantity; all must give the same.
+                found[quantity] = one if before is None else replace(before, others=(*before.others, one))
+        return dict(found)
+
+    @property
+    def _in_main(self) -> set[str]:
+        """The quantities that the program's own names give, whole or in part."""
+        quantities = self.record.robot.quantities
+        given = set()
+        for name in self._lines:
+            if not quantities.is_parameter(name):
+                given |= {quantities.quantity(name), *(target.quantity for target in quantities.entries(name))}
+        return given - {""}
 
 
 @dataclass(frozen=True)
@@ -364,6 +414,7 @@ class _SampledFunction(SampledAnswer):
     program: ExecutedProgram
     function: Function
     local: str
+    others: tuple[_SampledFunction, ...] = ()
 
     @property
     def name(self) -> str:
@@ -382,6 +433,29 @@ class _SampledFunction(SampledAnswer):
 
     def at(self, states: Sequence[Mapping[str, float]], shape: tuple[int, ...]) -> Array:
         """Return its values at states, shape (states, *shape); see :class:`SampledAnswer`."""
+        values = self._own_values(states, shape)
+        for other in self.others:
+            if not _are_same(other._own_values(states, shape), values):
+                raise AnswerError(f"{self.name} and {other.name} give different values; keep one")
+        if self.local and self.program.child.name.endswith(".py"):  # of Octave's functions the locals are the results
+            self._refuse_changed(states, values)
+        return values
+
+    def _refuse_changed(self, states: Sequence[Mapping[str, float]], values: Array) -> None:
+        """Refuse the only local quantity of a function that returns something else of its shape."""
+        if len(self.program.local_quantities(self.function)) > 1:
+            return
+        try:
+            returned = replace(self, local="", others=())._own_values(states, values.shape[1:])
+        except AnswerError:
+            return  # it returns another shape: the quantity is a step of its own
+        if not _are_same(returned, values):
+            raise AnswerError(f"{self.function.name} returns something else that it makes of {self.local}")
+
+    def _own_values(self, states: Sequence[Mapping[str, float]], shape: tuple[int, ...]) -> Array:
+        rng = np.random.default_rng()
+        extra = ("t", *(f"torque{k + 1}" for k in range(self.program.record.robot.n)))
+        states = [{**state, **{name: float(rng.uniform(-5, 5)) for name in extra}} for state in states]
         samples = [{name: self._argument(name, state) for name in self.function.parameters} for state in states]
         try:
             answer = self.program.child.ask(
@@ -407,8 +481,8 @@ class _SampledFunction(SampledAnswer):
         return self._number(str(symbols), state)
 
     def _number(self, symbol: str, state: Mapping[str, float]) -> float:
-        if symbol == "t" or symbol.startswith("torque"):
-            return 0.0
+        if symbol == "t" or symbol.startswith("torque"):  # no quantity depends on them
+            return state[symbol]
         robot = self.program.record.robot
         parameter = robot.quantities.parameters.get(plain_name(symbol))
         if parameter is not None:
@@ -417,6 +491,10 @@ class _SampledFunction(SampledAnswer):
         if meaning is None or len(meaning) != 1 or meaning[0] not in state:
             raise AnswerError(f"{self.name}: the argument {symbol[:40]} is no single joint variable")
         return state[meaning[0]]
+
+
+def _are_same(values: Array, others: Array) -> bool:
+    return bool(np.allclose(values, others, rtol=SAME_VALUES, atol=SAME_VALUES, equal_nan=True))
 
 
 # What a process says, which is not trusted
@@ -444,13 +522,14 @@ def _whole(value: object) -> int:
 
 
 def _function(one: Mapping[str, Any], line: Callable[[int], str]) -> Function:
-    """Return a function of the program; its definition is its local names."""
+    """Return a function of the program; its definition is its local names, and ``captured`` has keys in it."""
     name = one.get("name")
     return Function(
         name if isinstance(name, str) and name.isidentifier() else "function",
         _texts(one.get("parameters")),
         _texts(one.get("locals")),
         line(_whole(one.get("line"))),
+        captured=dict.fromkeys(_texts(one.get("keys")), Unread("")),
     )
 
 
@@ -469,7 +548,14 @@ def _renamed(text: str, names: Mapping[str, str]) -> str:
     return re.sub(r"\bcasadi\d+\b", lambda match: names.get(match[0], match[0]), text, flags=re.ASCII)
 
 
-def _value_of_tree(tree: object, names: Mapping[str, str]) -> Value:
+def _is_constant(value: Scalar) -> bool:
+    """Whether a formula has no symbol: 0.3, pi/2, sqrt(2)."""
+    return not set(re.findall(r"[A-Za-z_]\w*", value.text)) - {"pi", "E", "sqrt", "sin", "cos", "e"}
+
+
+def _value_of_tree(tree: object, names: Mapping[str, str], depth: int = 0) -> Value:
+    if depth > MAX_TREE_DEPTH:
+        return Unread("nested too deep")
     match tree:
         case str(text):
             text = _renamed(text, names)
@@ -478,11 +564,13 @@ def _value_of_tree(tree: object, names: Mapping[str, str]) -> Value:
             with suppress(ValueError):
                 return Scalar(text, Level.SUM, float(text) if NUMBER.fullmatch(text) else None)
         case list(rows):
-            return _value_of_list([_value_of_tree(row, names) for row in rows])
+            if len(rows) > MAX_ROWS:
+                return Unread(f"a list of more than {MAX_ROWS} values")
+            return _value_of_list([_value_of_tree(row, names, depth + 1) for row in rows])
         case {"fields": dict(fields)}:
-            return Structure({name: _value_of_tree(one, names) for name, one in _fields(fields)})
+            return Structure({name: _value_of_tree(one, names, depth + 1) for name, one in _fields(fields)})
         case {"error": error}:
-            return Unread(" ".join(str(error).split())[:300])
+            return Unread(" ".join(printable(str(error)).split())[:300])
     return Unread("no formula and no numbers")
 
 
@@ -498,6 +586,6 @@ def _value_of_list(values: Sequence[Value]) -> Value:
             entries |= {(i, j): entry for (j,), entry in one.entries.items()}
         else:
             return Several(tuple(values))
-    lengths = {sum(1 for index in entries if index[0] == i) for i in range(len(values))}
+    lengths = set(Counter(index[0] for index in entries).values())
     is_even = len({len(index) for index in entries}) == 1 and len(lengths) == 1
     return Matrix(entries) if entries and is_even else Several(tuple(values))
