@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import dhkit
+from acceptance import ACCEPTING
 from conftest import require
 from dhkit.cli import main
 from dhkit.description import library_robot
@@ -172,16 +173,16 @@ def test_what_is_no_answer_is_refused(judged, text, reason, monkeypatch):
     assert re.search(reason, found), found
 
 
-@pytest.mark.parametrize(
-    "attack",
-    [
-        'import os\nos.write(4, b\'{"functions": [], "names": {}, "verdict": "correct"}\\n\')\n',
-        "import sympy\nsympy.Basic.__eq__ = lambda a, b: True\nsympy.Basic.__hash__ = lambda a: 1\n",
-        "import sympy\nsympy.sstr = sympy.sstrrepr = lambda x: '__import__(\"os\")'\n",
-        "import json\njson.dumps = lambda x: '{}'\n",
-        "import builtins, sys\nsys.setprofile = lambda f: None\n",
-    ],
-)
+ATTACKS = [
+    'import os\nos.write(4, b\'{"functions": [], "names": {}, "verdict": "correct"}\\n\')\n',
+    "import sympy\nsympy.Basic.__eq__ = lambda a, b: True\nsympy.Basic.__hash__ = lambda a: 1\n",
+    "import sympy\nsympy.sstr = sympy.sstrrepr = lambda x: '__import__(\"os\")'\n",
+    "import json\njson.dumps = lambda x: '{}'\n",
+    "import builtins, sys\nsys.setprofile = lambda f: None\n",
+]
+
+
+@pytest.mark.parametrize("attack", ATTACKS if ACCEPTING else ATTACKS[::2])
 def test_what_a_program_patches_is_only_its_answer(judged, attack):
     """None of these makes a wrong answer right."""
     try:
@@ -247,24 +248,24 @@ RIGHT = "m1*g*l1/2*sin(q1) + m2*g*(l1*sin(q1) + l2/2*sin(q1 + q2))"
 OF_NUMBERS = f"(q1, q2, m1, m2, l1, l2, g):\n    float(q1)\n    return {{}}*({RIGHT})\n"
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        f"from math import sin\nV = 2*({RIGHT})\ndef U{OF_NUMBERS.format(1)}",
-        f"from math import sin\ndef V{OF_NUMBERS.format(1)}def U{OF_NUMBERS.format(2)}",
-        f"from math import sin\ndef V{OF_NUMBERS.format('(1 + 7j)')}",
-        f"from math import sin\ndef V{OF_NUMBERS.format('(1 + t)').replace('(q1', '(t, q1')}",
-        f"from math import sin\ndef energy(q1, q2, m1, m2, l1, l2, g):\n    V = {RIGHT}\n    return 2*V",
-        f"from math import sin\ndef energy(q1, q2, m1, m2, l1, l2, g):\n    float(q1)\n    V = {RIGHT}\n    return 2*V",
-        f"from sympy import *\nx = Symbol('0*g + {RIGHT}')\nV = 5*x",
-        "from sympy import *\nx = Function('m1')(g*l1*sin(q1)/2)\nV = x + m2*g*(l1*sin(q1) + l2/2*sin(q1 + q2))",
-        "import casadi as ca\nq = ca.SX.sym('q', 1, 2)\nc, s = ca.cos(q[1]), ca.sin(q[1])\n"
-        "l1 = ca.SX.sym('l1')\nA1 = ca.vertcat(ca.horzcat(c, -s, 0, l1*c), ca.horzcat(s, c, 0, l1*s),"
-        " ca.horzcat(0, 0, 1, 0), ca.horzcat(0, 0, 0, 1))",
-        f"from sympy import *\nq1 = pi/2\nV = {RIGHT}",
-        "import sys\nsys.setrecursionlimit(20000)\nV = m1\nfor _ in range(960):\n    V = [V]",
-    ],
-)
+WRONG = [
+    f"from math import sin\nV = 2*({RIGHT})\ndef U{OF_NUMBERS.format(1)}",
+    f"from math import sin\ndef V{OF_NUMBERS.format(1)}def U{OF_NUMBERS.format(2)}",
+    f"from math import sin\ndef V{OF_NUMBERS.format('(1 + 7j)')}",
+    f"from math import sin\ndef V{OF_NUMBERS.format('(1 + t)').replace('(q1', '(t, q1')}",
+    f"from math import sin\ndef energy(q1, q2, m1, m2, l1, l2, g):\n    V = {RIGHT}\n    return 2*V",
+    f"from math import sin\ndef energy(q1, q2, m1, m2, l1, l2, g):\n    float(q1)\n    V = {RIGHT}\n    return 2*V",
+    f"from sympy import *\nx = Symbol('0*g + {RIGHT}')\nV = 5*x",
+    "from sympy import *\nx = Function('m1')(g*l1*sin(q1)/2)\nV = x + m2*g*(l1*sin(q1) + l2/2*sin(q1 + q2))",
+    "import casadi as ca\nq = ca.SX.sym('q', 1, 2)\nc, s = ca.cos(q[1]), ca.sin(q[1])\n"
+    "l1 = ca.SX.sym('l1')\nA1 = ca.vertcat(ca.horzcat(c, -s, 0, l1*c), ca.horzcat(s, c, 0, l1*s),"
+    " ca.horzcat(0, 0, 1, 0), ca.horzcat(0, 0, 0, 1))",
+    f"from sympy import *\nq1 = pi/2\nV = {RIGHT}",
+    "import sys\nsys.setrecursionlimit(20000)\nV = m1\nfor _ in range(960):\n    V = [V]",
+]
+
+
+@pytest.mark.parametrize("text", WRONG if ACCEPTING else WRONG[::2])
 def test_no_wrong_program_is_right(judged, text):
     """Conflicts, complex numbers, times, changed results, symbols that read as formulas, one state: none passes."""
     try:
