@@ -10,7 +10,6 @@ from typing import Annotated
 import typer
 
 from dhkit.execution import Isolation, find_isolation
-from dhkit.execution.isolation import PACKAGES
 
 Isolated = Annotated[
     bool,
@@ -37,7 +36,7 @@ def isolation_for(program: str, required: bool, hidden: Iterable[Path] = (), pac
     IsolationError
         It must be isolated, and cannot be.
     """
-    found = find_isolation(hidden, packages or PACKAGES, required=required)
+    found = find_isolation(hidden, packages, required=required)
     if not found:
         sys.stderr.write(
             f"dhkit: {program} is {found}: it can do everything that you can; run only programs that you trust\n"

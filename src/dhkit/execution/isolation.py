@@ -73,9 +73,7 @@ class IsolationError(DhkitError):
     """A program that must be isolated cannot be isolated on this system."""
 
 
-def find_isolation(
-    hidden: Iterable[Path] = (), packages: Sequence[str] = PACKAGES, *, required: bool = False
-) -> Isolation:
+def find_isolation(hidden: Iterable[Path] = (), packages: Sequence[str] = (), *, required: bool = False) -> Isolation:
     """Return the best isolation that works on this system.
 
     Parameters
@@ -83,7 +81,7 @@ def find_isolation(
     hidden
         Files and folders that a program must not read, beside dhkit itself: task, rubric, results.
     packages
-        Packages that it may import, with those that they need.
+        Packages that it may import, with those that they need; :data:`PACKAGES` where none are named.
     required
         Whether programs of others are to be run, which must be isolated.
 
@@ -98,9 +96,12 @@ def find_isolation(
         *(Path(x) for x in (reference and reference.submodule_search_locations) or ()),
     ]
     unseen = tuple(str(path.resolve()) for path in (*folders, *hidden))
-    found = _probed(unseen, tuple(dict.fromkeys(("numpy", *packages))), os.geteuid())  # the runner needs numpy
+    named = packages or PACKAGES
+    needed = tuple(dict.fromkeys(("numpy", *named)))  # the runner needs numpy
+    found = _probed(unseen, needed, os.geteuid())
     if required and not found:
-        raise IsolationError(f"programs of others are run only where they can be isolated: {found.reason}")
+        reason = f"programs of others are run only where they can be isolated: {found.reason}"
+        raise IsolationError(reason)
     return found
 
 

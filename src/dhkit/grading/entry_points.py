@@ -10,7 +10,6 @@ from dhkit.description import Description, Robot, library_robot, read_robot, rob
 from dhkit.description.robot import description_of, takes_robot
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.execution import Isolation, find_isolation
-from dhkit.execution.isolation import PACKAGES
 from dhkit.grading.answers.objects import entries_of
 from dhkit.grading.answers.sheet import quantity_names, read_sheet, sheet_of
 from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Names
@@ -89,7 +88,9 @@ def grade(
         names = NO_NAMES if task is None else task.names
         if execute and suffix != ".tex":
             _require_permission(path, task)
-            found = find_isolation(packages=_packages(task)) if isolation is None else isolation
+            found = isolation
+            if found is None:
+                found = find_isolation(packages=task.task.packages if task is not None else ())
             with executed_source(path, given, names, isolation=found) as sheet:
                 return _judged(sheet, given, task, digits, seed, explain)
         sheet = read_source(path, given, names)
@@ -110,11 +111,6 @@ def _require_permission(path: Path, task: AnswerSheet | None) -> None:
     """Refuse to execute a program for a task that does not permit it."""
     if task is not None and not task.task.may_execute:
         raise AnswerError(f"{path}: the task does not permit executing programs (execute = true in [task])")
-
-
-def _packages(task: AnswerSheet | None) -> tuple[str, ...]:
-    """Return the packages that a task's programs may import."""
-    return (task.task.packages if task is not None else ()) or PACKAGES
 
 
 def _merge_names(own: Names, given: Names) -> Names:

@@ -18,7 +18,7 @@ from dhkit.errors import AnswerError
 from dhkit.execution.child import Child
 from dhkit.execution.isolation import Isolation
 from dhkit.execution.process import Failure, Limits, ProgramError, printable
-from dhkit.grading.answers.programs.program_answers import WRITTEN_BY_DHKIT, answers_of
+from dhkit.grading.answers.programs.program_answers import answers_of, called_name
 from dhkit.grading.answers.programs.robot_names import RobotNames, is_same_number
 from dhkit.grading.answers.programs.scope import Bound, Record, Scope
 from dhkit.grading.answers.programs.values import (
@@ -44,6 +44,7 @@ LIMITS = Limits(seconds=20.0, memory=2 << 30)
 """Limits of one request: derivations by Lagrange in sympy take seconds."""
 SAMPLING_TIME = 60.0
 """Processor time for calling a function at all states, s."""
+MAX_FILE_NAME = 60
 MAX_NAMES = 2_000
 MAX_TREE_DEPTH = 6
 MAX_ROWS = 1_000
@@ -94,12 +95,13 @@ def executed_answers(
     AnswerError
         The program cannot be executed, or gives no answer.
     """
+    if code.suffix not in RUNNERS:
+        raise AnswerError(f"{path}: {code.suffix} files are not executed; expected {', '.join(RUNNERS)} or .ipynb")
+    if code.suffix == ".m":
+        code = _functions_first(code)
+    name = re.sub(r"\W", "_", path.stem, flags=re.ASCII)[:MAX_FILE_NAME] + code.suffix
     with tempfile.TemporaryDirectory(prefix="dhkit-answers-") as folder:
-        if code.suffix not in RUNNERS:
-            raise AnswerError(f"{path}: {code.suffix} files are not executed; expected {', '.join(RUNNERS)} or .ipynb")
-        source = Path(folder) / (re.sub(r"\W", "_", path.stem, flags=re.ASCII)[:60] + code.suffix)
-        if code.suffix == ".m":
-            code = _functions_first(code)
+        source = Path(folder) / name
         source.write_text(code.text, "utf-8")
         child = Child(source, RUNNERS, LIMITS, isolation)
         try:
@@ -161,8 +163,8 @@ class ExecutedProgram:
         """Why no function is called with symbols any more."""
         self.problems: list[str] = []
         """Why functions are not called."""
-        self.numeric: list[tuple[Function, str]] = []
-        """Functions that fail with symbols, and why."""
+        self.numeric: list[Function] = []
+        """Functions that fail with symbols."""
         try:
             first = child.start()
         except ProgramError as error:
@@ -266,20 +268,20 @@ class ExecutedProgram:
                 scope.set_argument(name, self._value(tree, answer), function.line)
             self._refuse_changed(function, value, scope)
             return self._with_names(value, scope), scope
-        self.numeric.append((function, problem))
+        self.numeric.append(function)
         raise UnreadError(f"{function.name}(...) is not computed with symbols: {problem}")
 
     def _may_answer(self, function: Function) -> bool:
         """Whether a function's name, a local name or a key in it is that of a quantity: others are not called."""
         quantities = self.record.robot.quantities
-        names = (WRITTEN_BY_DHKIT.get(function.name, function.name), *function.definition, *function.captured)
+        names = (called_name(function), *function.definition, *function.captured)
         return any(quantities.quantity(name) or quantities.entries(name) for name in names)
 
     def _refuse_changed(self, function: Function, value: Value, scope: Scope) -> None:
         """Refuse a function's only local quantity where it returns something else of the same shape."""
         quantities = self.record.robot.quantities
         own = [name for name in scope.names if name in self.local_quantities(function)]
-        if len(own) != 1 or quantities.quantity(WRITTEN_BY_DHKIT.get(function.name, function.name)):
+        if len(own) != 1 or quantities.quantity(called_name(function)):
             return
         local = scope.names[own[0]].value
         are_scalars = isinstance(value, Scalar) and isinstance(local, Scalar)
@@ -380,13 +382,14 @@ class ExecutedProgram:
     def _sampled(self, answers: Mapping[str, object]) -> dict[str, SampledAnswer]:
         """Return the quantities that are given by functions of numbers alone."""
         quantities = self.record.robot.quantities
+        in_main = self._in_main()
         found: dict[str, _SampledFunction] = {}
-        for function, _ in self.numeric:
+        for function in self.numeric:
             for local in ("", *function.definition):
-                name = local or WRITTEN_BY_DHKIT.get(function.name, function.name)
+                name = local or called_name(function)
                 quantity = quantities.quantity(name)
                 is_given = quantity in answers and not isinstance(answers[quantity], Refusal)
-                if not quantity or is_given or quantity in self._in_main or quantities.is_parameter(name):
+                if not quantity or is_given or quantity in in_main or quantities.is_parameter(name):
                     continue
                 before = found.get(quantity)
                 if local and (local in function.parameters or (before is not None and before.function is function)):
@@ -396,9 +399,8 @@ class ExecutedProgram:
                 found[quantity] = one if before is None else replace(before, others=(*before.others, one))
         return dict(found)
 
-    @property
     def _in_main(self) -> set[str]:
-        """The quantities that the program's own names give, whole or in part."""
+        """Return the quantities that the program's own names give, whole or in part."""
         quantities = self.record.robot.quantities
         given = set()
         for name in self._lines:
@@ -453,10 +455,15 @@ class _SampledFunction(SampledAnswer):
             raise AnswerError(f"{self.function.name} returns something else that it makes of {self.local}")
 
     def _own_values(self, states: Sequence[Mapping[str, float]], shape: tuple[int, ...]) -> Array:
+        """Return the values of this function alone, at random times and torques: no quantity depends on them."""
         rng = np.random.default_rng()
-        extra = ("t", *(f"torque{k + 1}" for k in range(self.program.record.robot.n)))
-        states = [{**state, **{name: float(rng.uniform(-5, 5)) for name in extra}} for state in states]
-        samples = [{name: self._argument(name, state) for name in self.function.parameters} for state in states]
+        others = ("t", *(f"torque{k + 1}" for k in range(self.program.record.robot.n)))
+        known = frozenset((*states[0], *others))
+        keys = {name: self._keys(name, known) for name in self.function.parameters}
+        samples = []
+        for state in states:
+            numbers = {**state, **{name: float(rng.uniform(-5, 5)) for name in others}}
+            samples.append({name: _numbers_of(key, numbers) for name, key in keys.items()})
         try:
             answer = self.program.child.ask(
                 {"call": self.function.name, "samples": samples, "local": self.local}, SAMPLING_TIME
@@ -472,25 +479,39 @@ class _SampledFunction(SampledAnswer):
             raise AnswerError(f"{self.name}: returns shape {array.shape[1:]}; expected {shape}")
         return array.reshape(len(states), *shape)
 
-    def _argument(self, name: str, state: Mapping[str, float]) -> object:
+    def _keys(self, name: str, known: frozenset[str]) -> object:
+        """Return the names in a state of an argument's numbers, in the structure of the argument."""
         symbols = self.program.symbols(name, self.function)
         if isinstance(symbols, dict):
-            return {known: state[known] for known in self.program.record.robot.quantities.parameters.values()}
+            return {parameter: parameter for parameter in self.program.record.robot.quantities.parameters.values()}
         if isinstance(symbols, list):
-            return [self._number(one, state) for one in symbols]
-        return self._number(str(symbols), state)
+            return [self._key(one, known) for one in symbols]
+        return self._key(str(symbols), known)
 
-    def _number(self, symbol: str, state: Mapping[str, float]) -> float:
-        if symbol == "t" or symbol.startswith("torque"):  # no quantity depends on them
-            return state[symbol]
+    def _key(self, symbol: str, known: frozenset[str]) -> str:
+        """Return the name of a symbol in a state: that of the robot's variable or parameter."""
         robot = self.program.record.robot
+        if symbol == "t" or symbol.startswith("torque"):
+            return symbol
         parameter = robot.quantities.parameters.get(plain_name(symbol))
         if parameter is not None:
-            return state[parameter]
+            return parameter
         meaning = robot.find(symbol)
-        if meaning is None or len(meaning) != 1 or meaning[0] not in state:
+        if meaning is None or len(meaning) != 1 or meaning[0] not in known:
             raise AnswerError(f"{self.name}: the argument {symbol[:40]} is no single joint variable")
-        return state[meaning[0]]
+        return meaning[0]
+
+
+def _numbers_of(keys: object, numbers: Mapping[str, float]) -> object:
+    """Return the numbers under some names, in their structure."""
+    match keys:
+        case str():
+            return numbers[keys]
+        case list():
+            return [numbers[key] for key in keys]
+        case dict():
+            return {name: numbers[key] for name, key in keys.items()}
+    raise TypeError(f"found {keys!r}; expected a name, a list or names by name")
 
 
 def _are_same(values: Array, others: Array) -> bool:

@@ -89,6 +89,11 @@ class _Candidate:
     function: str = ""
 
 
+def called_name(function: Function) -> str:
+    """Return what a function is called: dhkit's own names of functions stand for the quantities."""
+    return WRITTEN_BY_DHKIT.get(function.name, function.name)
+
+
 def answers_of(program: Program, file: str) -> AnswerSheet:
     """Return the answers of a program.
 
@@ -268,8 +273,8 @@ class _ProgramAnswers:
             try:
                 value, scope = self.program.applied(function, self.program.arguments_as_given(function))
             except UnreadError as error:
-                quantity = self.quantities.quantity(self._called(function))
-                if quantity and not self.quantities.is_parameter(self._called(function)):
+                quantity = self.quantities.quantity(called_name(function))
+                if quantity and not self.quantities.is_parameter(called_name(function)):
                     returned.append(self._unread(function, quantity, f"{function.line}: {error}"))
                 continue
             self._function_scopes.append(scope)
@@ -283,18 +288,13 @@ class _ProgramAnswers:
         known = known | {one.target.quantity for one in returned}
         return [*returned, *self._noted([one for one in local if one.target.quantity not in known])]
 
-    @staticmethod
-    def _called(function: Function) -> str:
-        """Return what a function is called: dhkit's own names of functions stand for the quantities."""
-        return WRITTEN_BY_DHKIT.get(function.name, function.name)
-
     def _unread(self, function: Function, quantity: str, reason: str) -> _Candidate:
         key = self.program.main.key(function.name)
         return _Candidate(Target(quantity), function.line, Unread(reason), function.name, key)
 
     def _local_to(self, function: Function, scope: Scope, value: Value, given: set[str]) -> Iterator[_Candidate]:
         """Yield the quantities that a function assigns and does not return."""
-        quantity = self.quantities.quantity(self._called(function))
+        quantity = self.quantities.quantity(called_name(function))
         for name in list(scope.names):
             if name in given or name in function.parameters:
                 continue
@@ -386,7 +386,7 @@ class _ProgramAnswers:
 
     def _returned_names(self, function: Function, value: Value) -> list[tuple[str, str, Value]]:
         """Return each local name that a function returns, what it is called, and its value."""
-        own = self._called(function)
+        own = called_name(function)
         match value:
             case Several(values, names):
                 returned: list[tuple[str, str, Value]] = []
