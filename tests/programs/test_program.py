@@ -9,6 +9,7 @@ import tempfile
 import threading
 from contextlib import suppress
 from pathlib import Path
+from shutil import copytree, ignore_patterns
 
 import numpy as np
 import psutil
@@ -18,7 +19,8 @@ import dhkit.arm
 from acceptance import ACCEPTING
 from conftest import require
 from dhkit import Arm
-from dhkit.execution import child as child_module, isolation as isolation_module, other_user
+from dhkit.execution import child as child_module, isolated_commands, isolation as isolation_module, other_user
+from dhkit.execution.bubblewrap import package_paths
 from dhkit.execution.isolation import Isolation, IsolationError, Kind, find_isolation
 from dhkit.execution.process import Failure, Limits, ProgramError
 from dhkit.programs import check
@@ -273,6 +275,11 @@ def test_another_user_reads_nothing_of_ours_and_leaves_nothing(program, tmp_path
     tmp_path.chmod(0o755)
     for folder in list(tmp_path.parents)[:-2]:
         folder.chmod(0o755)
+    # The checkout may lie where no other user may enter.
+    packages = {tmp_path / path.name: inside for path, inside in package_paths(("numpy",)).items()}
+    for path in package_paths(("numpy",)):
+        copytree(path, tmp_path / path.name, ignore=ignore_patterns("tests"))
+    monkeypatch.setattr(isolated_commands, "package_paths", lambda names: packages)
     task = tmp_path / "task.toml"
     task.write_text("")
     task.chmod(0o600)
@@ -287,7 +294,10 @@ def test_another_user_reads_nothing_of_ours_and_leaves_nothing(program, tmp_path
     assert user >= other_user.FIRST_USER and other_user.processes_of(int(user))
     one.close()
     assert not other_user.processes_of(int(user)) and not Path("/var/tmp/dhkit-left").exists()
-    assert "can read" in isolation_module._problem_of_user([str(tmp_path)])
+    problem = isolation_module._problem_of_user
+    assert "can read" in problem([str(tmp_path)], [])
+    assert f"cannot read {task}" in problem([], [str(task)])
+    assert not problem([str(task)], [str(path) for path in packages])
 
 
 @isolated

@@ -24,7 +24,7 @@ from pathlib import Path
 
 from dhkit.display import repr_line
 from dhkit.errors import DhkitError
-from dhkit.execution.bubblewrap import base_python, bubblewrap
+from dhkit.execution.bubblewrap import base_python, bubblewrap, package_paths
 from dhkit.execution.other_user import FIRST_USER
 
 PACKAGES = ("numpy", "scipy", "sympy", "casadi")
@@ -114,13 +114,13 @@ def _probed(hidden: tuple[str, ...], packages: tuple[str, ...], user: int) -> Is
         return Isolation(Kind.BUBBLEWRAP, "", packages)
     if user != 0:
         return Isolation(Kind.NONE, reason, packages)
-    problem = _problem_of_user(hidden)
+    problem = _problem_of_user(hidden, [str(path) for path in package_paths(packages)])
     if not problem:
         return Isolation(Kind.USER, reason, packages)
     return Isolation(Kind.NONE, f"{reason}; as another user: {problem}", packages)
 
 
-IS_SEEN = """
+WHAT_IS_SEEN = """
 import os, sys
 for path in sys.argv[1:]:
     try:
@@ -128,31 +128,36 @@ for path in sys.argv[1:]:
     except OSError:
         continue
     print(path)
-    break
 """
-"""Prints the first of some paths that a program can read."""
+"""Prints those of some paths that a program can read, a line each."""
 
 
 def _problem_of_bubblewrap(hidden: Sequence[str], packages: tuple[str, ...]) -> str:
     """Return why bubblewrap isolates nothing here; empty where it does."""
     if shutil.which("bwrap") is None:
         return "bubblewrap is not installed (Debian: apt-get install bubblewrap)"
-    seen, error = _probe([*bubblewrap(packages), "--", base_python(), "-I", "-S", "-c", IS_SEEN, *hidden], 0)
+    seen, error = _probe([*bubblewrap(packages), "--", base_python(), "-I", "-S", "-c", WHAT_IS_SEEN, *hidden], 0)
     if error:
         return f"bubblewrap fails: {error}"
-    return f"bubblewrap shows {seen}, which lies among the files of the system" if seen else ""
+    return f"bubblewrap shows {seen[0]}, which lies among the files of the system" if seen else ""
 
 
-def _problem_of_user(hidden: Sequence[str]) -> str:
-    """Return why another user is no isolation here; empty where it is."""
-    seen, error = _probe([base_python(), "-I", "-S", "-c", IS_SEEN, *hidden], FIRST_USER)
+def _problem_of_user(hidden: Sequence[str], needed: Sequence[str]) -> str:
+    """Return why another user is no isolation here, or cannot read the packages it needs; empty where it works."""
+    seen, error = _probe([base_python(), "-I", "-S", "-c", WHAT_IS_SEEN, *hidden, *needed], FIRST_USER)
     if error:
         return error
-    return f"can read {seen} (chmod -R go-rwx)" if seen else ""
+    for path in hidden:
+        if path in seen:
+            return f"can read {path} (chmod -R go-rwx)"
+    for path in needed:
+        if path not in seen:
+            return f"cannot read {path} (install dhkit in a folder that every user may enter)"
+    return ""
 
 
-def _probe(command: list[str], user: int) -> tuple[str, str]:
-    """Return what a command prints, and its error."""
+def _probe(command: list[str], user: int) -> tuple[list[str], str]:
+    """Return the lines that a command prints, and its error."""
     try:
         done = subprocess.run(  # noqa: S603 - a command of our own
             command,
@@ -167,8 +172,8 @@ def _probe(command: list[str], user: int) -> tuple[str, str]:
             check=False,
         )
     except (OSError, subprocess.SubprocessError) as error:
-        return "", str(error)[:200]
+        return [], str(error)[:200]
     if done.returncode:
         last = (done.stderr.strip().splitlines() or [f"status {done.returncode}"])[-1]
-        return "", last[:200]
-    return done.stdout.strip(), ""
+        return [], last[:200]
+    return done.stdout.splitlines(), ""
