@@ -165,6 +165,8 @@ def test_a_joint_that_passes_its_stop_and_comes_back_within_a_step_is_stopped():
 
 
 def test_states_of_a_continuous_controller_are_its_own_only_by_their_rates():
+    law = PDGravity.tuned(SMALL)
+
     class Meddling:
         def __init__(self, meddles):
             self.meddles = meddles
@@ -173,7 +175,7 @@ def test_states_of_a_continuous_controller_are_its_own_only_by_their_rates():
             return np.ones(1)
 
         def continuous(self, t, q, qd, setpoint, state):
-            torque = PDGravity.tuned(SMALL)(t, q, qd, setpoint) + 0.1 * state
+            torque = law(t, q, qd, setpoint) + 0.1 * state
             if self.meddles:
                 state *= 50
             return torque, -state * (1 / 50 if self.meddles else 1)

@@ -207,9 +207,10 @@ class Poses:
     def gaps(self, a: Array, b: Array, joint: int | slice | list[int] = slice(None)) -> Array:
         """Return the distances of joint values (..., n): angles the short way in rad, slides relative to the reach."""
         prismatic = self.description.numbers.prismatic[joint]
-        with np.errstate(invalid="ignore"):
-            turned = np.abs(np.remainder(a - b + np.pi, 2 * np.pi) - np.pi)
-            return np.where(prismatic, np.abs(a - b) / self.scale, turned)
+        gap = a - b
+        # The nearest whole number of turns is taken off: many times faster than a remainder.
+        turned = gap - 2 * np.pi * np.rint(gap / (2 * np.pi))
+        return np.abs(np.where(prismatic, gap / self.scale, turned))
 
     def matches(self, q: Array, solutions: Array) -> Mask:
         """Return whether solutions (S, B, n), rad and m, equal joint values q (S, n), shape (S, B)."""

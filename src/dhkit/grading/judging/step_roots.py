@@ -81,8 +81,10 @@ def _roots(residual: Residual, grid: Array, count: int) -> tuple[NDArray[np.intp
     centres = grid[1:-1][places]
     width = 2 * (grid[1] - grid[0])
     # A smallest value lies between the neighbours on the grid: the quarter that does not have it is left out.
+    twice = np.concatenate([rows, rows])
     for _ in range(REFINEMENTS if len(rows) else 0):
-        left, right = (np.nan_to_num(residual(rows, centres + x), nan=np.inf) for x in (-width / 4, width / 4))
+        both = residual(twice, np.concatenate([centres - width / 4, centres + width / 4]))
+        left, right = np.split(np.nan_to_num(both, nan=np.inf), 2)
         centres = np.where(left < right, centres - width / 8, centres + width / 8)
         width *= 0.75
     is_root = np.nan_to_num(residual(rows, centres), nan=np.inf) < IS_ROOT if len(rows) else np.zeros(0, dtype=bool)

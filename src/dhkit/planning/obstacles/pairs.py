@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dhkit.description import Array, Convention, Description, world_to_frames
+from dhkit.description import Array, Convention, Description, link_transforms, world_to_frames
 from dhkit.model.shapes import MeshVersions, link_parts, mesh_versions
 from dhkit.planning.obstacles.capsules import LinkBody, link_capsules, world_axes
 from dhkit.planning.obstacles.link_shapes import shape_distances
@@ -268,11 +268,17 @@ def _least_of_turns(description: Description, i: int, j: int) -> float | None:
         return np.inf  # locked together: not even one configuration differs from another
     if len(joints) > MOST_JOINTS or numbers.prismatic[inner:outer].any():
         return None
+    # The outer capsule's ends in the inner link's frame, A_(inner+1) ... A_outer applied to them: every joint from the
+    # last to the first adds an axis of GRID values to the front, shape (GRID, ..., 2, 3).
     values = np.linspace(-np.pi, np.pi, GRID, endpoint=False)
-    q = np.zeros((GRID ** len(joints), description.n))
-    q[:, inner:outer] = np.stack(np.meshgrid(*[values] * len(joints)), axis=-1).reshape(-1, len(joints))
-    axes = world_axes(description, q)
-    gap = segment_distances(axes[:, i], axes[:, j]) - capsules[i].radius - capsules[j].radius
+    A = link_transforms(description, np.broadcast_to(values[:, None], (GRID, description.n)))
+    outer_ends = np.stack([capsules[j].start, capsules[j].end])
+    for k in reversed(joints):
+        R, p = A[:, k, :3, :3], A[:, k, :3, 3]
+        turned = np.tensordot(R, outer_ends, axes=(-1, -1))  # (GRID, 3, ..., 2)
+        outer_ends = np.moveaxis(turned, 1, -1) + p.reshape(GRID, *(1,) * (outer_ends.ndim - 1), 3)
+    inner_ends = np.broadcast_to(np.stack([capsules[i].start, capsules[i].end]), outer_ends.shape)
+    gap = segment_distances(inner_ends, outer_ends) - capsules[i].radius - capsules[j].radius
 
     end = max(float(np.linalg.norm(capsules[j].start)), float(np.linalg.norm(capsules[j].end)))
     lengths = np.hypot(numbers.a, numbers.d)
