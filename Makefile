@@ -15,6 +15,9 @@ PYTEST = $(BIN)/python -m pytest -n 2 --dist loadfile -q $(ORDER)
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Compiled modules are kept: without them each of the processes that tests start compiles all sources anew.
 unexport PYTHONDONTWRITEBYTECODE
+# Tests run in two processes on two cores: linear algebra with threads of its own would wait for theirs.
+test test-all coverage: export OPENBLAS_NUM_THREADS = 1
+test test-all coverage: export OMP_NUM_THREADS = 1
 
 .PHONY: help demo test test-all coverage check accept bench assets lowest format clean
 

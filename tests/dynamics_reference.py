@@ -18,7 +18,7 @@ from dhkit.verification.measure import Floors, forward_tolerance, relative_error
 from random_arms import arms
 
 TOLERANCE = 1e-12
-ARMS = 1000 if ACCEPTING else 20
+ARMS = 1000 if ACCEPTING else 8
 """Random arms of laws for which everything is derived anew, by differentiation too."""
 
 

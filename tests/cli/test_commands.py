@@ -76,7 +76,7 @@ def test_a_benchmark_is_written_as_markdown_and_json_whatever_the_suffix(tmp_pat
 
 
 @pytest.mark.parametrize(
-    "words", [["build", "r.toml", "-o", "r.urdf"], ["verify", "r.toml"], ["demo", "--robot", "r.toml"]]
+    "words", [["build", "r.toml", "-o", "r.urdf"], ["verify", "r.toml"], ["demo", "--quick", "--robot", "r.toml"]]
 )
 def test_commands_print_the_warnings_of_a_robot_file(words, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 
+from acceptance import different_robots_first
 from dhkit.description import library_robot, robots
 from dhkit.dynamics import (
     bias,
@@ -15,7 +16,7 @@ from dhkit.dynamics import (
     mass_matrix,
     potential_energy,
 )
-from dynamics_reference import hold, motions, tilted_arms
+from dynamics_reference import ARMS, hold, motions, tilted_arms
 
 
 def kernels(arm, q, qd, x):
@@ -42,7 +43,7 @@ def test_compiled_dynamics_agree_with_pinocchio(name, law):
 
 
 @pytest.mark.usefixtures("interpreted")
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", different_robots_first(robots()))
 def test_interpreted_dynamics_agree_with_pinocchio(name, law):
     arm = library_robot(name)
     states = motions(arm, law.samples(1000), seed=1)
@@ -50,8 +51,9 @@ def test_interpreted_dynamics_agree_with_pinocchio(name, law):
 
 
 @pytest.mark.usefixtures("interpreted")
+@settings(max_examples=ARMS)
 @given(tilted_arms())
 def test_dynamics_of_any_arm_agree_with_pinocchio(law, arm):
-    law.samples(1000)
+    law.samples(1000, quick=ARMS)
     states = motions(arm, 4)
     hold(law, arm, kernels(arm, *states), *states, "interpreted")

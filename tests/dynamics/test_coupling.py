@@ -7,6 +7,7 @@ import pytest
 import sympy as sp
 from hypothesis import given, settings
 
+from acceptance import sample_size
 from dhkit import Arm, ComputedTorque
 from dhkit.description import Coupling, from_toml, library_robot, lock, to_toml
 from dhkit.dynamics import regressor
@@ -71,7 +72,7 @@ def derive_in(arm, like):
     return textbook.K - textbook.rotors
 
 
-@settings(max_examples=25)
+@settings(max_examples=sample_size(25, quick=8))
 @given(tilted_arms(least=2, most=3))
 def test_exact_equations_of_any_arm_agree_with_pinocchio(law, description):
     law.samples(100)

@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from acceptance import different_robots_first
 from dhkit.description import Body, Inertia, from_dh, library_robot, robots, with_payload
 from dhkit.dynamics import forward_dynamics, inverse_dynamics, mass_matrix
 from dhkit.errors import DescriptionError
@@ -96,7 +97,7 @@ def test_a_wrench_is_pinocchios_external_force(law):
         law.holds("tau with a wrench against Pinocchio", error, 1e-12, q)
 
 
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", different_robots_first(robots()))
 def test_the_library_can_be_accelerated(name):
     arm = library_robot(name)
     assert np.all(np.isfinite(forward_dynamics(arm, *motions(arm, 3))))

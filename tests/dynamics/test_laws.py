@@ -44,6 +44,7 @@ def derivative(values):
     return np.tensordot(WEIGHTS / STEP, values, axes=(0, 1))
 
 
+@settings(max_examples=ARMS)
 @given(tilted_arms(least=1))
 def test_power_is_the_change_of_energy(law, arm):
     q, qd, qdd = smooth_motion(arm, law.samples(1000) // 10)
@@ -56,6 +57,7 @@ def test_power_is_the_change_of_energy(law, arm):
     law.holds("dE/dt against qd . tau", error.max(), RATES, arm)
 
 
+@settings(max_examples=ARMS)
 @given(tilted_arms(least=1))
 def test_the_rate_of_M_less_2_C_is_skew(law, arm):
     q, qd, _ = smooth_motion(arm, law.samples(1000) // 10)
@@ -69,7 +71,7 @@ def test_the_rate_of_M_less_2_C_is_skew(law, arm):
 @settings(max_examples=ARMS)
 @given(tilted_arms(least=1))
 def test_terms_belong_together(law, arm):
-    law.samples(1000)
+    law.samples(1000, quick=ARMS)
     q, qd, qdd = motions(arm, 4)
     M, C, g = mass_matrix(arm, q), coriolis_matrix(arm, q, qd), gravity_torque(arm, q)
     assert np.array_equal(M, np.swapaxes(M, 1, 2))
@@ -87,9 +89,10 @@ def test_terms_belong_together(law, arm):
     law.holds("forward of inverse, of the tolerance", error.max(), 1.0, arm)
 
 
+@settings(max_examples=ARMS)
 @given(tilted_arms(least=1))
 def test_a_wrench_works_through_the_jacobian(law, arm):
-    law.samples(1000)
+    law.samples(1000, quick=ARMS)
     q, qd, qdd = motions(arm, 4)
     wrench = np.random.default_rng(9).uniform(-10, 10, (4, 6))
     pushed = np.einsum("kij,ki->kj", jacobian(arm, q), wrench)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from acceptance import different_robots_first
 from dhkit.description import Payload, from_dh, library_robot, robots, with_payload
 from dhkit.dynamics import Friction, inverse_dynamics
 from dhkit.errors import DescriptionError
@@ -22,7 +23,7 @@ BETWEEN = 1e-11  # rad and m: quintics through samples of a smooth motion, every
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".mat"])
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", different_robots_first(robots()))
 def test_archives_hold_every_bit_and_the_robot(name, suffix, tmp_path):
     motion = continuous_motion(library_robot(name))
     path = motion.save(tmp_path / f"motion{suffix}")

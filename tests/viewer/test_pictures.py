@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from acceptance import different_robots_first
 from dhkit import Arm, robots
 from dhkit.control import PDGravity
 from dhkit.description import library_robot
@@ -51,7 +52,7 @@ def test_neighbours_leave_no_gap_between_them():
         assert len(dark) == 0 or len(dark) == dark[-1] - dark[0] + 1
 
 
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", different_robots_first(robots()))
 def test_the_whole_arm_is_in_view_and_fills_it(name):
     image = np.asarray(picture(Arm.load(name).description, size=(200, 150), frames=True)).astype(int)
     differs = np.abs(image - GROUND_COLOR).max(axis=-1) > 60  # the grid differs by less

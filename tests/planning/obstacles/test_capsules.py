@@ -96,7 +96,7 @@ def test_axes_move_with_their_frames():
     assert np.isnan(world_axes(arm, [np.nan, 0, 0, 0, 0, 0])).all()
 
 
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", different_robots_first(robots()))
 def test_what_cannot_move_is_not_checked(name):
     arm = library_robot(name)
     capsules, pairs = link_capsules(arm), checked_pairs(arm)

@@ -70,6 +70,6 @@ def test_library_robots(name, law):
 @settings(max_examples=ARMS)
 @given(tilted_arms())
 def test_any_arm(law, arm):
-    law.samples(1000)
+    law.samples(1000, quick=ARMS)
     states = motions(arm, 3)
     hold(law, arm, evaluated(arm, LAGRANGE | RECURSIVE, states), *states, "in CasADi")

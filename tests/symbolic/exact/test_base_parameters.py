@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 
 import dhkit
-from acceptance import different_robots_first
+from acceptance import different_robots_first, sample_size
 from dhkit.description import from_dh, library_robot, with_uniform_links
 from dhkit.model import pinocchio_model
 from dhkit.symbolic.exact.base_parameters import base_parameters
@@ -58,7 +58,7 @@ def test_base_parameters_agree_with_pinocchio(name):
         assert error <= 1e-12
 
 
-@settings(max_examples=20)
+@settings(max_examples=sample_size(20, quick=8))
 @given(arms(least=1, most=3).filter(in_general_position))
 def test_random_arms(description):
     base = base_parameters(description)

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 
 import dhkit
-from acceptance import different_robots_first
+from acceptance import different_robots_first, sample_size
 from dhkit import Arm
 from dhkit.description import Body, Convention, Description, Placement, Tool, from_dh, library_robot, with_uniform_links
 from dhkit.errors import DescriptionError
@@ -52,7 +52,7 @@ def test_exact_equations_agree_with_pinocchio(name, symbols, law):
         law.holds(f"exact {quantity}", error, TOLERANCE, name)
 
 
-@settings(max_examples=25)
+@settings(max_examples=sample_size(25, quick=8))
 @given(arms(least=1, most=3))
 def test_random_arms_agree_with_pinocchio(description):
     lag = lagrangian(description, "none")

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from acceptance import sample_size
 from dhkit import Arm
 from dhkit.description import Body, Description, Inertia, Named, from_toml, library_robot, with_payload
 from dhkit.expressions import exact, substitute
@@ -149,7 +150,7 @@ def test_equations_are_polynomials_in_the_parameters(name):
     assert set(lagrangian(ROBOTS[name]).arm.ring.constants) <= {*ROBOTS[name].parameters, "sqrt(2)", "sqrt(3)"}
 
 
-@settings(max_examples=25)
+@settings(max_examples=sample_size(25, quick=8))
 @given(arms(most=3), st.integers(2, 3), st.integers(0, 10**6))
 def test_random_arms_with_bodies_agree(arm, count, seed):
     rng = np.random.default_rng(seed)

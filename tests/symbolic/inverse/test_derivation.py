@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 
 import dhkit
+from acceptance import sample_size
 from dhkit.description import from_dh, from_toml, library_robot, pose, with_base, with_tool, world_to_tool
 from dhkit.errors import DescriptionError
 from dhkit.kinematics import classify, inverse_kinematics
@@ -160,16 +161,19 @@ def check_family(law, arm):
     hold(law, arm, derivation, random_states(arm, 50), found.words)
 
 
+@settings(max_examples=sample_size(1000, quick=8))
 @given(arm=elbow_arms())
 def test_any_arm_of_the_pumas_family(law, arm):
     check_family(law, arm)
 
 
+@settings(max_examples=sample_size(1000, quick=8))
 @given(arm=three_parallel_arms())
 def test_any_arm_of_the_urs_family(law, arm):
     check_family(law, arm)
 
 
+@settings(max_examples=sample_size(1000, quick=8))
 @given(arm=slide_arms())
 def test_any_arm_of_the_stanfords_family(law, arm):
     check_family(law, arm)
