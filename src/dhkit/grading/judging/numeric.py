@@ -113,6 +113,13 @@ class Evaluation(Algebra[Any]):
         return total
 
 
+class _Doubles(Evaluation):
+    """Values in NumPy's doubles: where Python's own floats raise, they give infinity."""
+
+    def name(self, tree: Name) -> Any:
+        return np.asarray(super().name(tree), dtype=float)[()]
+
+
 def doubles(tree: Tree, values: Mapping[str, Any]) -> Any:
     """Return the value of a tree as a double, or as an array (...) of them; NaN or infinite where it has none.
 
@@ -143,9 +150,7 @@ class EditedDoubles:
     """
 
     def __init__(self, tree: Tree, values: Mapping[str, Any]) -> None:
-        # Python's own floats would raise where NumPy's give infinity.
-        arrays = {name: np.asarray(value, dtype=float)[()] for name, value in {**UNITS, **values}.items()}
-        self._evaluation = Evaluation(arrays)
+        self._evaluation = _Doubles({**UNITS, **values})
         self._tree = tree  # keeps its parts alive, whose ids are used
         with np.errstate(all="ignore"):
             self.numbers = self._evaluation.of(tree)

@@ -106,7 +106,7 @@ class Equations:
             return None
 
         def values_at(rows: NDArray[np.intp], q: Array) -> dict[str, Array | float]:
-            pose = {name: np.broadcast_to(x, len(poses.q))[rows] for name, x in poses.values.items()}
+            pose = {name: np.broadcast_to(x, len(poses.q))[rows] for name, x in poses.values.items() if name in used}
             return {**pose, **_joints(q)}
 
         def residual_on(rows: NDArray[np.intp], q: Array) -> Residual:
