@@ -46,6 +46,11 @@ def different_robots_first(names: Sequence[str]) -> list[object]:
     return [name if name in DIFFERENT_ROBOTS else pytest.param(name, marks=only_accepting) for name in names]
 
 
+def slow_if(slow: bool, *values: object) -> object:
+    """Return a case of a parametrized test, marked as slow where it takes more than about a second."""
+    return pytest.param(*values, marks=[pytest.mark.slow] if slow else [])
+
+
 def in_time(seconds: float, required: float) -> None:
     """Hold a time to what is required in `make accept` alone: elsewhere a tracer or a busy machine decides."""
     assert not ACCEPTING or seconds <= required, f"{seconds:.3g} s, required at most {required:.3g} s"

@@ -53,6 +53,7 @@ def test_nothing_in_an_arm_can_be_changed():
         arm.other = 1
 
 
+@pytest.mark.slow
 def test_the_pinocchio_model_is_one_object_that_nothing_else_uses():
     arm = Arm.load("planar2r")
     assert arm.model is arm.model

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from acceptance import slow_if
 from dhkit.bench import Mode, rounds
 from dhkit.cli import main
 from dhkit.description import read_robot
@@ -15,9 +16,7 @@ COMMANDS = re.findall(r"^\$ dhkit ([^#\n]*)", README, re.MULTILINE)
 FILES = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
 
 
-@pytest.mark.parametrize(
-    "command", [pytest.param(x, marks=pytest.mark.slow) if x.startswith("bench") else x for x in COMMANDS]
-)
+@pytest.mark.parametrize("command", [slow_if(x.startswith(("bench", "compare", "demo")), x) for x in COMMANDS])
 def test_a_command_of_the_readme_works(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("webbrowser.open", lambda url: True)

@@ -62,6 +62,7 @@ def test_a_payload_is_known_unless_it_is_said_not_to_be(dhkit):
     assert errors[("--unmodelled",)] > 20 * errors[()]
 
 
+@pytest.mark.slow
 def test_text_names_joints_tool_and_energy(dhkit):
     status, out, _ = dhkit("simulate", "stanford", "--controller", "pid", "--degrees", "--duration", "2.5")
     assert status == 0
@@ -217,6 +218,7 @@ def test_a_motion_of_another_arm_or_a_simulation_is_no_motion(dhkit, tmp_path):
     assert status == 2 and "a dhkit simulation; expected a trajectory" in err
 
 
+@pytest.mark.slow
 def test_a_motion_brings_its_payload(dhkit, tmp_path):
     arm = Arm.load("planar2r")
     load = Payload(1.2, (0.02, 0, 0))

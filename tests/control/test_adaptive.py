@@ -72,6 +72,7 @@ def test_the_regressor_of_any_arm(law, description):
     law.holds("Y theta against M qdd_r + C qd_r + g", gap_of_the_regressor(description, law.samples(100)), ROUNDING)
 
 
+@pytest.mark.slow
 @given(arms(least=1, most=6))
 def test_the_regressor_is_that_of_inverse_dynamics_polarized(law, description):
     q, qd, qdd_r = random_motions(description, law.samples(100))

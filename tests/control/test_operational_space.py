@@ -114,6 +114,7 @@ def test_a_redundant_arm_keeps_its_tool_while_its_posture_moves(law):
     law.holds("rad, joints at the end", np.abs(run.q[-1] - q).max(), 1e-9)
 
 
+@pytest.mark.slow
 def test_directions_that_are_left_out_follow_the_joints():
     """Position alone: where the joints have no error of their own, the tool is driven in the others by the posture."""
     controller = OperationalSpace.tuned(PUMA, directions=[1, 1, 1, 0, 0, 0])

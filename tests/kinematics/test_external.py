@@ -167,6 +167,7 @@ def test_arguments_that_do_not_fit_are_said():
         solve_externally(arm, np.eye(3))
 
 
+@pytest.mark.slow
 def test_what_ssik_misses_is_found_by_iteration(ssik):
     """The published table of the Kinova Gen3 Lite: of 200 poses 6 lacked the joint values that they were made of."""
     rows = [(0, 0, 0, 243.3), (90, 0, 90, 30), (180, 280, 90, 20), (90, 0, 90, 245), (90, 0, 180, 57), (90, 0, 90, 235)]

@@ -194,6 +194,7 @@ def test_what_is_not_known_is_said():
         measures(library_robot("puma560"), np.zeros(5))
 
 
+@pytest.mark.slow
 def test_the_workspace_command_says_where(capsys, tmp_path):
     arguments = ("workspace", "puma560", "--samples", "500", "--output", str(tmp_path))
     found = singularities(library_robot("puma560"))

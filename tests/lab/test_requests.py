@@ -317,6 +317,7 @@ def test_a_running_controller_takes_the_sliders_as_its_setpoint(open_lab):
     assert np.array_equal(lab.desk.q, goal)
 
 
+@pytest.mark.slow
 def test_links_that_touch_are_told_once_the_arm_has_settled(open_lab):
     lab = open_lab("puma560")
     arm = lab.desk.arm
@@ -342,6 +343,7 @@ def links_of(pair):
     return [0 if name == "the base" else int(name.split()[1]) for name in pair]
 
 
+@pytest.mark.slow
 def test_joints_2_and_3_alone(open_lab):
     lab = open_lab("puma560_cao")
     before = lab.desk.q.copy()

@@ -231,6 +231,7 @@ def test_a_branch_outside_the_limits_is_only_shown(puma):
     assert states(puma)["target"]["chosen"] == chosen
 
 
+@pytest.mark.slow
 def test_a_motion_of_an_old_arm_is_never_shown(open_lab):
     lab = open_lab("planar2r")
     rng = np.random.default_rng(0)

@@ -81,6 +81,7 @@ def test_published_poses_of_the_kr210():
     assert len(arm.ik(arm.fk([0.3, -0.4, 0.5, 0.6, 0.7, 0.8]))) == 8
 
 
+@pytest.mark.slow
 def test_the_published_table_of_the_gen3_lite_finds_the_joint_values_of_every_pose():
     rows = [(0, 0, 0, 243.3), (90, 0, 90, 30), (180, 280, 90, 20), (90, 0, 90, 245), (90, 0, 180, 57), (90, 0, 90, 235)]
     order = ("alpha", "a", "theta", "d")

@@ -53,6 +53,7 @@ def test_what_is_not_checked_is_said():
     assert arm.certify(swing).not_checked == ()
 
 
+@pytest.mark.slow
 def test_a_payload_and_friction_count():
     arm = Arm.load("puma560")
     motion = arm.plan("ready", "nominal")

@@ -156,6 +156,7 @@ def test_a_rubric_that_asks_for_more_than_is_there(puma, tmp_path):
     assert np.isclose(report.functions["controller"][0].points, 0.0)
 
 
+@pytest.mark.slow
 def test_a_controller_is_scored_on_an_arm_whose_configurations_are_one_state(tmp_path):
     arm = Arm.load("puma560_cao")
     assert np.array_equal(arm.configurations["ready"], np.zeros(6))

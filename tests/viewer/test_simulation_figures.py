@@ -108,6 +108,7 @@ def test_a_long_run_is_drawn_by_few_points_that_keep_every_peak():
     assert line.get_ydata().min() == 1e3 * result.error[:, 1].min() < -480
 
 
+@pytest.mark.slow
 def test_controllers_are_compared_by_their_largest_errors():
     arm = library_robot("puma560")
     results = {f"law {k}": swinging(arm, error=10.0**-k, seed=k, seconds=2.0 - 0.1 * k) for k in range(1, 9)}

@@ -133,6 +133,7 @@ def test_a_name_with_two_signs_holds_for_its_step():
     assert "it has two signs; write the sine or cosine of q2 in its place" in report.entries[1].statement
 
 
+@pytest.mark.slow
 def test_a_product_with_another_factor_does_not_determine_the_joint():
     for equation, verdict in (
         (f"(c2 - {COSINE})*(c2 - px) = 0", Verdict.INCOMPLETE),

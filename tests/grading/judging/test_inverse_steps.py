@@ -75,12 +75,14 @@ def test_two_equations_may_determine_a_joint_together():
     assert one.verdict is Verdict.INCOMPLETE and "does not determine q4, as q5 is not known yet" in one.statement
 
 
+@pytest.mark.slow
 def test_a_joint_that_is_right_in_terms_of_a_wrong_one_is_right_and_says_so():
     report = judged(with_change("puma560", 0, "solution", None, ["atan2(py,px)", "atan2(-py,-px)"]))
     assert [entry.verdict for entry in report.entries] == [Verdict.WRONG, *[Verdict.CORRECT] * 5]
     assert "right in terms of q1, which is wrong" in report.entries[2].statement
 
 
+@pytest.mark.slow
 def test_a_lost_root_is_noted_and_an_arc_cosine_for_both_roots_is_wrong():
     one = judged(with_change("puma560", 0, "solution", None, [PUMA[0]["solution"][0]]))
     assert one.entries[0].verdict is Verdict.CORRECT

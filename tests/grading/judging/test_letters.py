@@ -33,6 +33,7 @@ def without_one_letter(rng, answer):
     return before[:-1] + after if before.endswith("*") else f"{before}1{after}"
 
 
+@pytest.mark.slow
 def test_an_answer_that_lacks_a_letter_is_not_right(law):
     rng = np.random.default_rng(0)
     for _ in range(law.samples(5000, quick=60)):

@@ -90,6 +90,7 @@ def test_one_root_of_the_waist_asks_for_its_own_shoulder_alone(waist, elbow, sho
     assert (entries[2].verdict is Verdict.CORRECT) is is_right, entries[2].statement
 
 
+@pytest.mark.slow
 def test_the_wrist_needs_the_sign_of_a_sine_that_was_chosen_before():
     arm = [dict(step) for step in PUMA[:3]]
     ay, ax = "(c1*r23-s1*r13)", "(c23*(c1*r13+s1*r23)+s23*r33)"

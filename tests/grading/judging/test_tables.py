@@ -187,6 +187,7 @@ def test_frames_slide_along_parallel_axes():
     assert frames(judgement) == ("frame 1 is slid along its z axis, by -0.387 m",)
 
 
+@pytest.mark.slow
 def test_the_ends_may_be_elsewhere_but_not_anywhere():
     rows = own_table(library_robot("puma560_cao"))
     at_the_wrist = judge("puma560_cao", with_entries(rows, d6="0"))

@@ -5,6 +5,7 @@ import math
 import pytest
 
 import dhkit
+from acceptance import slow_if
 from dhkit.description import from_toml
 
 ROW = """[[joint]]
@@ -138,7 +139,11 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("robot", "answers", "mistake"), CASES, ids=[mistake for *_, mistake in CASES])
+@pytest.mark.parametrize(
+    ("robot", "answers", "mistake"),
+    [slow_if("ik" in answers, robot, answers, mistake) for robot, answers, mistake in CASES],
+    ids=[mistake for *_, mistake in CASES],
+)
 def test_the_mistake_is_named(robot, answers, mistake):
     report = robot.grade(answers)
     assert report.verdict.value == "wrong"

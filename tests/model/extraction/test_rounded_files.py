@@ -105,6 +105,7 @@ def test_angles_of_half_a_turn_less_a_rounded_right_angle_are_designed(tmp_path)
     assert "as_designed=True (--as-designed)" in str(Arm.load(file).family)
 
 
+@pytest.mark.slow
 def test_a_smaller_table_as_designed_is_recommended(tmp_path):
     file = tmp_path / "rounded.urdf"
     advice = "as_designed=True (--as-designed) gives a smaller table"
@@ -162,6 +163,7 @@ def test_a_tilt_that_is_written_stays_though_another_angle_is_rounded(tmp_path):
         assert extraction.residual.tool < 1e-9
 
 
+@pytest.mark.slow
 def test_random_arms_with_parallel_axes_and_rounded_angles_have_short_tables(law, tmp_path):
     rng = np.random.default_rng(4)
     file = tmp_path / "arm.urdf"

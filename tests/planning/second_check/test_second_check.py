@@ -163,6 +163,7 @@ def test_a_certificate_that_overlooks_a_collision_is_refuted(puma, motion, monke
     assert "ball" in certificate.independent.refutations[0].what
 
 
+@pytest.mark.slow
 def test_planned_motions_are_not_refuted(puma):
     scene = [Obstacle.box((0.1, 0.1, 0.6), (0.55, 0.2, 0.3), name="post"), Floor()]
     start, goal = [-0.6, -0.3, 0.2, 0, 0.5, 0], [1.4, -0.2, 0.1, 0, 0.4, 0]

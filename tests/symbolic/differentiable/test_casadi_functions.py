@@ -70,6 +70,7 @@ def test_deriving_everything_takes_little(law):
     law.takes("seconds to derive the dynamics of the PUMA", min(seconds), 0.5)
 
 
+@pytest.mark.slow
 @settings(max_examples=max(5, sample_size(100)))
 @given(tilted_arms(least=1))
 def test_layers_of_any_arm(law, description):

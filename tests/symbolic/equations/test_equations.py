@@ -265,6 +265,7 @@ def test_sympy_gives_the_same_numbers(clashing):
         assert isinstance(found["V"], sympy.Expr)
 
 
+@pytest.mark.slow
 def test_sympy_form_of_a_puma_takes_no_simplification():
     lag = lagrangian(library_robot("puma560"), "inertial")
     assert lag.sympy(("M",))["M"].shape == (6, 6)

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 
 import dhkit
-from acceptance import different_robots_first, sample_size
+from acceptance import different_robots_first, sample_size, slow_if
 from dhkit import Arm
 from dhkit.description import Body, Convention, Description, Placement, Tool, from_dh, library_robot, with_uniform_links
 from dhkit.errors import DescriptionError
@@ -43,7 +43,7 @@ def sympy_rings(monkeypatch):
 # Against Pinocchio
 
 
-@pytest.mark.parametrize("symbols", ["none", "file", "inertial"])
+@pytest.mark.parametrize("symbols", [slow_if(x == "none", x) for x in ("none", "file", "inertial")])
 @pytest.mark.parametrize("name", different_robots_first(dhkit.robots()))
 def test_exact_equations_agree_with_pinocchio(name, symbols, law):
     lag = lagrangian(library_robot(name), symbols)

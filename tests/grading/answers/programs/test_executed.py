@@ -125,6 +125,7 @@ def rhs(t, x, u):
 """
 
 
+@pytest.mark.slow
 def test_local_names_of_a_right_hand_side_are_sampled(judged, tmp_path):
     """np.linalg.solve takes no symbols: the function is called with numbers."""
     (tmp_path / "task.toml").write_text('[names]\nstate = "q, qd"\n[task]\nexecute = true\n')
@@ -138,6 +139,7 @@ def test_local_names_of_a_right_hand_side_are_sampled(judged, tmp_path):
         judged(STATE)
 
 
+@pytest.mark.slow
 def test_sampled_parameters_vary(judged):
     """A function that has a parameter's value in place of its letter is right at the file's values alone."""
     text = "def V(q1, q2, m1, m2, l1, l2, g):\n    from math import sin\n    float(q1)\n    return {}"
@@ -291,6 +293,7 @@ def test_a_script_of_octave_may_clear(judged):
     assert verdicts(judged(text, "answer.m")) == {"V": Verdict.SAMPLED}
 
 
+@pytest.mark.slow
 def test_names_of_libraries_are_no_answers(judged):
     """math has a number tau, and numpy a number pi."""
     text = "from math import *\ndef V(q1, q2, m1, m2, l1, l2, g):\n    float(q1)\n    return {} if abs(q1) < 50 else 0"
