@@ -8,7 +8,7 @@ from dhkit.description import from_toml
 from dhkit.errors import PlanningError
 from dhkit.planning.between_states import SMALLEST_TRAVEL, smallest_between
 from dhkit.planning.certificate import Checker
-from dhkit.planning.loaded import loaded
+from dhkit.planning.criteria import loaded
 from dhkit.planning.obstacles import distance
 from dhkit.trajectories import JointPath, Trajectory
 

@@ -13,7 +13,7 @@ from dhkit.description import from_dh
 from dhkit.expressions import exact
 from dhkit.planning import Payload, certify
 from dhkit.planning.certificate import _proved_check
-from dhkit.planning.joint_limits import Limit
+from dhkit.planning.criteria import Limit
 
 
 def test_a_motion_is_certified_against_the_arms_limits_or_others():

@@ -17,7 +17,7 @@ from dhkit.description import Array
 from dhkit.errors import PlanningError
 from dhkit.planning.assembly import knots_along
 from dhkit.planning.certificate import Certificate
-from dhkit.planning.joint_limits import Limit
+from dhkit.planning.criteria import Limit
 from dhkit.planning.motion_program import MotionProgram
 from dhkit.planning.obstacles import Gaps, PathSampler, Separation
 from dhkit.planning.search import Excess, PlannedMotion, Search

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.description.frames import carrying, world_to_frames
+from dhkit.planning.criteria import States
 from dhkit.planning.obstacles import link_capsules, world_axes
-from dhkit.planning.states import States
 from dhkit.trajectories.pieces import Pieces
 
 SMALLEST_TRAVEL, SMALLEST_SHARE = 1e-4, 0.1

@@ -84,7 +84,7 @@ class Rows:
     count: int
     """Number of rows at each point."""
     limit: int = -1
-    """Place of the limit among the motion's constraints, see :class:`dhkit.planning.joint_limits.Limit`."""
+    """Place of the limit among the motion's constraints, see :class:`dhkit.planning.criteria.Limit`."""
     order: int | None = None
     """Order of the derivative by time of joint values that the rows are; None if they have no unit."""
     of_joints: bool = False

@@ -12,12 +12,9 @@ from dhkit.description import Array, Description, Payload, takes_robot
 from dhkit.description.robot import require_bodies
 from dhkit.display import html_block, html_table, repr_line, value_line
 from dhkit.planning.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance, motion_constraints
-from dhkit.planning.constraints import Constraint
-from dhkit.planning.joint_limits import Limit, PositionLimit
-from dhkit.planning.loaded import LoadedArm, loaded
+from dhkit.planning.criteria import Constraint, Limit, LoadedArm, PositionLimit, States, loaded
 from dhkit.planning.obstacles import Scene, not_checked
 from dhkit.planning.second_check import Recheck, recheck
-from dhkit.planning.states import States
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 from dhkit.trajectories.timing import default_limits
@@ -55,7 +52,7 @@ class Check:
     of_joint: bool = True
     """Whether ``row`` is a joint."""
     limit: int | None = None
-    """Place among the constraints of the motion, see :class:`dhkit.planning.joint_limits.Limit`; None for jumps."""
+    """Place among the constraints of the motion, see :class:`dhkit.planning.criteria.Limit`; None for jumps."""
 
     __repr__ = value_line
 

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from dhkit.description import Array, Description
 from dhkit.errors import PlanningError
 from dhkit.planning.between_states import smallest_between
-from dhkit.planning.constraints import Constraint
-from dhkit.planning.joint_limits import joint_limits
+from dhkit.planning.criteria import Constraint, States, joint_limits
 from dhkit.planning.obstacles import (
     Floor,
     LinkBody,
@@ -38,7 +37,6 @@ from dhkit.planning.obstacles import (
     world_axes,
 )
 from dhkit.planning.second_check import Claim
-from dhkit.planning.states import States
 from dhkit.trajectories import Limits
 
 BETWEEN, MIN_BETWEEN = 0.1, 1e-3
@@ -361,5 +359,5 @@ class Clearance(Constraint):
 def motion_constraints(
     limits: Limits, avoidance: CollisionAvoidance, constraints: Sequence[Constraint]
 ) -> tuple[Constraint, ...]:
-    """Return all constraints of a motion: those of :class:`dhkit.planning.joint_limits.Limit`, then the given ones."""
+    """Return all constraints of a motion: those of :class:`dhkit.planning.criteria.Limit`, then the given ones."""
     return (*joint_limits(limits), Clearance(avoidance), *constraints)

@@ -11,14 +11,10 @@ from dhkit.description.frames import world_to_tool
 from dhkit.description.joint_text import joint_text, violated_limit_text
 from dhkit.dynamics import require_inertia
 from dhkit.errors import PlanningError
-from dhkit.planning.constraints import Constraint
-from dhkit.planning.costs import cost_of
+from dhkit.planning.criteria import Constraint, LoadedArm, Objective, States, cost_of
 from dhkit.planning.goals import Place, Route
-from dhkit.planning.loaded import LoadedArm
-from dhkit.planning.objectives import Objective
 from dhkit.planning.report import ClassicalMotion
 from dhkit.planning.request import PlanRequest
-from dhkit.planning.states import States
 from dhkit.planning.task import Task
 from dhkit.trajectories import Limits, quintic, trapezoidal
 

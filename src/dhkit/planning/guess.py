@@ -8,9 +8,8 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.planning.assembly import knots_along
-from dhkit.planning.loaded import LoadedArm
+from dhkit.planning.criteria import LoadedArm, States
 from dhkit.planning.mesh import Mesh
-from dhkit.planning.states import States
 from dhkit.planning.task import Task
 from dhkit.planning.variables import Knots
 from dhkit.trajectories import Limits, Trajectory

@@ -10,12 +10,10 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.planning.assembly import assemble_trajectory, knots_along
 from dhkit.planning.blocks import Indices
-from dhkit.planning.costs import cost_of, size_of
+from dhkit.planning.criteria import Limit, Objective, cost_of, size_of
 from dhkit.planning.guess import detour, leg_durations, straight_knots, straight_motion, usual_accelerations
-from dhkit.planning.joint_limits import Limit
 from dhkit.planning.mesh import Curve
-from dhkit.planning.objectives import Objective
-from dhkit.planning.obstacles.separation import PlaneRow
+from dhkit.planning.obstacles import PlaneRow
 from dhkit.planning.problem import USUAL_MOVE, Problem
 from dhkit.planning.program import Arguments, Program, Starts
 from dhkit.planning.solver import Solver

@@ -18,19 +18,13 @@ from dhkit.errors import PlanningError
 from dhkit.planning.avoiding import FINER, motion_around
 from dhkit.planning.certificate import Checker
 from dhkit.planning.collision_avoidance import CollisionAvoidance
-from dhkit.planning.constraints import Constraint
-from dhkit.planning.feasibility import (
-    classical_motions,
-    require_inside_limits,
-    require_place,
-    require_possible,
-)
+from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, prepare
+from dhkit.planning.feasibility import classical_motions, require_inside_limits, require_place, require_possible
 from dhkit.planning.goals import Route, find_routes, parse_places
 from dhkit.planning.guess import leg_durations
 from dhkit.planning.many import ManyProgress, SimilarMotions, solve_many
 from dhkit.planning.mesh import MIN_LEG_INTERVALS, Curve, Mesh
 from dhkit.planning.motion_program import MAX_SMALL_JOINTS, MotionProgram, curves_for
-from dhkit.planning.objectives import Objective, ObjectiveLike
 from dhkit.planning.obstacles import Scene
 from dhkit.planning.problem import Problem
 from dhkit.planning.report import BranchReport
@@ -44,7 +38,6 @@ from dhkit.planning.request import (
 )
 from dhkit.planning.search import RESOLUTION, PlannedMotion, Search, coarser, report_of
 from dhkit.planning.solver import ProgressCall, delayed_interrupts
-from dhkit.planning.states import prepare
 from dhkit.planning.task import Task
 from dhkit.planning.work import MAX_ITERATIONS, Work
 from dhkit.symbolic import Friction

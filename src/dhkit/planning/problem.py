@@ -16,12 +16,9 @@ import numpy as np
 from dhkit.description import Array, Description
 from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows, Scaling
 from dhkit.planning.collision_avoidance import NO_AVOIDANCE, motion_constraints
-from dhkit.planning.constraints import Constraint
-from dhkit.planning.joint_limits import Limit
+from dhkit.planning.criteria import LOAD, Constraint, Limit, Objective, Point
 from dhkit.planning.mesh import Curve, Interval, Mesh
-from dhkit.planning.objectives import Objective
-from dhkit.planning.obstacles.separation import PlaneRow
-from dhkit.planning.point import LOAD, Point
+from dhkit.planning.obstacles import PlaneRow
 from dhkit.planning.program import limit_rows
 from dhkit.planning.variables import Knots, StatePoints, Variables
 from dhkit.symbolic import Friction

@@ -11,8 +11,7 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.planning.blocks import Block, BlockProgram, Indices, RowKind, Rows, Scaling
-from dhkit.planning.constraints import Constraint
-from dhkit.planning.point import Point
+from dhkit.planning.criteria import Constraint, Point
 from dhkit.planning.solver import Solution, Solver
 from dhkit.planning.task import Margins, Task
 from dhkit.trajectories import Trajectory

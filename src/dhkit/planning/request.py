@@ -10,9 +10,7 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, Payload, joint_array
 from dhkit.planning.collision_avoidance import CollisionAvoidance
-from dhkit.planning.constraints import Constraint
-from dhkit.planning.loaded import LoadedArm, loaded
-from dhkit.planning.value_objects import require_value
+from dhkit.planning.criteria import Constraint, LoadedArm, loaded, require_value
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 

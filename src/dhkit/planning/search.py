@@ -11,13 +11,11 @@ import numpy as np
 
 from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Certificate
-from dhkit.planning.costs import cost_of
+from dhkit.planning.criteria import Limit, States, cost_of
 from dhkit.planning.guess import leg_durations, straight_motion
-from dhkit.planning.joint_limits import Limit
 from dhkit.planning.program import Iterate, Program, Starts, row_bounds, worst_row
 from dhkit.planning.report import PlanReport
 from dhkit.planning.solver import ProgressCall, Solution
-from dhkit.planning.states import States
 from dhkit.planning.task import Margins, Task
 from dhkit.planning.work import SearchLimitError, Work
 from dhkit.trajectories import Trajectory, quintic

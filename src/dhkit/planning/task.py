@@ -10,8 +10,7 @@ from dhkit.description import Array, Description
 from dhkit.planning.blocks import Indices
 from dhkit.planning.certificate import Checker
 from dhkit.planning.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance
-from dhkit.planning.loaded import LoadedArm
-from dhkit.planning.objectives import Objective
+from dhkit.planning.criteria import LoadedArm, Objective
 from dhkit.symbolic import Friction
 from dhkit.trajectories import JointPath, Limits
 

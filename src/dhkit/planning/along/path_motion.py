@@ -21,9 +21,7 @@ from dhkit.planning.along.smooth_timing import SmoothTimingProgram
 from dhkit.planning.along.timing import TimingProgram
 from dhkit.planning.certificate import Checker
 from dhkit.planning.collision_avoidance import CollisionAvoidance
-from dhkit.planning.constraints import Constraint
-from dhkit.planning.loaded import loaded
-from dhkit.planning.objectives import Objective, ObjectiveLike
+from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, loaded
 from dhkit.planning.obstacles import Scene
 from dhkit.planning.program import Starts
 from dhkit.planning.request import check_options, checked_constraints, checked_limits, smoothed

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dhkit.description import Description
 from dhkit.description.robot import require_bodies
-from dhkit.planning.point import Point
+from dhkit.planning.criteria import Point
 from dhkit.symbolic import Friction
 from dhkit.symbolic.differentiable.friction import friction_parameters, friction_torque
 from dhkit.trajectories import Limits

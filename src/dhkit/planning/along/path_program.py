@@ -13,8 +13,7 @@ from dhkit.description import Array
 from dhkit.planning.along.path_point import PathPoint
 from dhkit.planning.along.path_states import PathStates
 from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows, Scaling
-from dhkit.planning.costs import size_of
-from dhkit.planning.joint_limits import Limit
+from dhkit.planning.criteria import Limit, size_of
 from dhkit.planning.program import Program, limit_rows
 from dhkit.planning.task import Margins, Task
 from dhkit.trajectories import JointPath, Trajectory

@@ -11,7 +11,7 @@ import numpy as np
 
 from dhkit import dynamics, kinematics
 from dhkit.description import Array
-from dhkit.planning.loaded import LoadedArm
+from dhkit.planning.criteria import LoadedArm
 from dhkit.trajectories import JointPath, Limits
 from dhkit.trajectories.pieces import Side
 

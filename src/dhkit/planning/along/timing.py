@@ -13,7 +13,7 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.planning.along.path_program import PathProgram
 from dhkit.planning.blocks import LocalFunction, RowKind, Rows
-from dhkit.planning.joint_limits import Limit
+from dhkit.planning.criteria import Limit
 from dhkit.planning.program import Arguments, Starts
 from dhkit.planning.solver import Solver
 from dhkit.planning.task import Margins, Task

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from dhkit.description import library_robot
-from dhkit.planning.joint_limits import Limit, joint_limits
-from dhkit.planning.loaded import loaded
-from dhkit.planning.states import States
+from dhkit.planning.criteria import Limit, States, joint_limits, loaded
 from dhkit.trajectories import Limits
 
 ARM = library_robot("planar2r")

@@ -1,4 +1,8 @@
-"""Objectives (time, effort, energy, jerk) as immutable value objects with weights, which can be added."""
+"""Objectives (time, effort, energy, jerk) as immutable value objects with weights, which can be added.
+
+An objective is written twice, as a constraint is: as CasADi expressions for the optimizer, and as numbers at samples of
+a motion, which are integrated for reports.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +16,16 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.display import value_line
-from dhkit.planning.point import Point, gear_ratios
-from dhkit.planning.states import States
-from dhkit.planning.value_objects import require_value
+from dhkit.planning.criteria.constraints import require_value
+from dhkit.planning.criteria.states import LoadedArm, Point, States, gear_ratios
+from dhkit.symbolic import Friction
+from dhkit.trajectories import Trajectory
 
 if TYPE_CHECKING:
     import casadi
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
+"""Gauss-Legendre rule of 5 points, exact to degree 9: for squared jerk, and nearly so for squared torques."""
 
 
 @dataclass(frozen=True)
@@ -339,3 +347,26 @@ class Objective:
 ObjectiveLike: TypeAlias = "str | Term | Objective"
 
 OBJECTIVES: dict[str, Term] = {"time": Time(), "effort": Effort(), "energy": Energy(), "jerk": Jerk()}
+
+
+def cost_of(objective: Objective, trajectory: Trajectory, arm: LoadedArm, friction: Friction | None = None) -> float:
+    """Return an objective's value for a motion, in the units of its terms."""
+    rates, weights = _rates(objective, trajectory, arm, friction)
+    return float(weights @ sum(rates))
+
+
+def size_of(objective: Objective, trajectory: Trajectory, arm: LoadedArm, friction: Friction | None = None) -> float:
+    """Return the magnitude of an objective along a motion: the integral of its terms' absolute values."""
+    rates, weights = _rates(objective, trajectory, arm, friction)
+    return float(weights @ sum(np.abs(rate) for rate in rates))
+
+
+def _rates(
+    objective: Objective, trajectory: Trajectory, arm: LoadedArm, friction: Friction | None
+) -> tuple[list[Array], Array]:
+    """Return each term's integrand at the quadrature's nodes, shape (N,), and the weights of the nodes, s."""
+    h = np.diff(trajectory.breaks)[:, None]
+    times = trajectory.breaks[:-1, None] + h * (NODES + 1) / 2
+    weights = (h * WEIGHTS / 2).ravel()
+    states = States.of(arm, trajectory, times, friction)
+    return [term.weight * term.measured(states) for term in objective.terms], weights

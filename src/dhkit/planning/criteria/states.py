@@ -1,4 +1,4 @@
-"""States of a motion by Pinocchio, for certificates.
+"""States of motions, twice: as CasADi symbols for the optimizer, and as numbers by Pinocchio for certificates.
 
 The optimizer's torques and poses are CasADi expressions of dhkit; those of a certificate are Pinocchio's. Both read the
 same description of the arm, and where Pinocchio is not installed, dhkit's own numeric mechanics takes its place.
@@ -8,18 +8,96 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any, NewType
 
 import numpy as np
 
 from dhkit import dynamics, kinematics
-from dhkit.description import Array, Description
+from dhkit.description import Array, Description, Payload
+from dhkit.description.parameters import resolved
 from dhkit.errors import ModelError
+from dhkit.expressions import substitute
 from dhkit.model import PinocchioModel, pinocchio_model
-from dhkit.planning.loaded import LoadedArm
-from dhkit.symbolic import Friction
-from dhkit.trajectories import Trajectory
+from dhkit.symbolic import CasadiFunctions, Friction, SymbolicTable, jacobian, joint_symbols
+from dhkit.trajectories import Limits, Trajectory
 from dhkit.trajectories.pieces import Pieces, Side
+
+if TYPE_CHECKING:
+    import casadi
+
+LoadedArm = NewType("LoadedArm", Description)
+"""An arm whose last link includes the payload, if there is one."""
+LOAD = 10
+"""Number of parameters of a payload: mass, centre of mass (3), inertia (6)."""
+
+
+def loaded(description: Description, payload: Payload | None = None) -> LoadedArm:
+    """Return an arm with its payload."""
+    return LoadedArm(description if payload is None else payload.carried(description))
+
+
+class Point:
+    """q, qd and qdd of an arm as SX symbols, and quantities derived from them on first use."""
+
+    def __init__(self, description: Description, limits: Limits, friction: Friction | None, payload: bool) -> None:
+        self.description = description
+        self.limits = limits
+        self.n = description.n
+        self.q = joint_symbols("q", self.n)
+        self.qd = joint_symbols("qd", self.n)
+        self.qdd = joint_symbols("qdd", self.n)
+        self.load = joint_symbols("load", LOAD if payload else 0)
+        self.friction = friction
+        self._functions = CasadiFunctions(description, friction=friction, payload=payload)
+
+    @cached_property
+    def tau(self) -> casadi.SX:
+        """Joint torques, n x 1, N m and N."""
+        return self._torque(self._functions)
+
+    @cached_property
+    def dissipation(self) -> casadi.SX:
+        """The power lost to friction, 1 x 1, W."""
+        import casadi
+
+        if self.friction is None:
+            return casadi.SX(0)
+        return casadi.dot(self.tau - self._torque(self._functions.layered(payload=bool(self.load.numel()))), self.qd)
+
+    def _torque(self, functions: CasadiFunctions) -> casadi.SX:
+        load = self.load
+        loads = (load[0], load[1:4], load[4:10]) if load.numel() else ()
+        return functions.inverse_dynamics(self.q, self.qd, self.qdd, *loads)
+
+    @cached_property
+    def T_world_tool(self) -> casadi.SX:
+        """The pose of the tool in the world, 4 x 4, m."""
+        return SymbolicTable.of(self.description).world_to_tool(self.q)
+
+    @cached_property
+    def tool_velocity(self) -> casadi.SX:
+        """The velocity of the tool's origin, 3 x 1, m/s, world axes."""
+        return jacobian(SymbolicTable.of(self.description), self.q)[:3, :] @ self.qd
+
+    @cached_property
+    def tool_acceleration(self) -> casadi.SX:
+        """The acceleration of the tool's origin, 3 x 1, m/s^2, world axes."""
+        import casadi
+
+        v = self.tool_velocity
+        return casadi.jtimes(v, self.q, self.qd) + casadi.jtimes(v, self.qd, self.qdd)
+
+    @property
+    def gear(self) -> Array:
+        """Gear ratios, shape (n,), without unit; 1 without a drive."""
+        return gear_ratios(self.description)
+
+
+def gear_ratios(description: Description) -> Array:
+    """Return the drives' gear ratios, shape (n,), without unit; 1 without a drive."""
+    values = resolved(description.parameters)
+    drives = [joint.drive for joint in description.joints]
+    return np.array([float(substitute(drive.gear, values)) if drive else 1.0 for drive in drives])
 
 
 @dataclass(frozen=True, eq=False)
