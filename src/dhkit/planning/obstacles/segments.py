@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dhkit.description import Array
-from dhkit.planning.obstacles.solid_arrays import Solids
+from dhkit.planning.obstacles.scene import Solids
 
 POINTS = 9
 """Number of points of an axis at which its distance from a box is bounded."""
