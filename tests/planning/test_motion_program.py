@@ -5,7 +5,7 @@ import pytest
 
 from dhkit.description import library_robot
 from dhkit.planning import Planner
-from dhkit.planning.collision_avoidance import NO_AVOIDANCE
+from dhkit.planning.certificate import NO_AVOIDANCE
 from dhkit.planning.criteria import Limit
 from dhkit.planning.motion_program import DETOURS
 from dhkit.planning.request import PlanRequest

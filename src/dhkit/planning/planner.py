@@ -16,8 +16,7 @@ from dhkit.description.frames import world_to_tool
 from dhkit.display import repr_line
 from dhkit.errors import PlanningError
 from dhkit.planning.avoiding import FINER, motion_around
-from dhkit.planning.certificate import Checker
-from dhkit.planning.collision_avoidance import CollisionAvoidance
+from dhkit.planning.certificate import Checker, CollisionAvoidance
 from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, prepare
 from dhkit.planning.feasibility import classical_motions, require_inside_limits, require_place, require_possible
 from dhkit.planning.goals import Route, find_routes, parse_places

@@ -15,7 +15,7 @@ import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows, Scaling
-from dhkit.planning.collision_avoidance import NO_AVOIDANCE, motion_constraints
+from dhkit.planning.certificate import NO_AVOIDANCE, motion_constraints
 from dhkit.planning.criteria import LOAD, Constraint, Limit, Objective, Point
 from dhkit.planning.mesh import Curve, Interval, Mesh
 from dhkit.planning.obstacles import PlaneRow

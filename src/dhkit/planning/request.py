@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, Payload, joint_array
-from dhkit.planning.collision_avoidance import CollisionAvoidance
+from dhkit.planning.certificate import CollisionAvoidance
 from dhkit.planning.criteria import Constraint, LoadedArm, loaded, require_value
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory

@@ -8,8 +8,7 @@ import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.planning.blocks import Indices
-from dhkit.planning.certificate import Checker
-from dhkit.planning.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance
+from dhkit.planning.certificate import NO_AVOIDANCE, Checker, CollisionAvoidance
 from dhkit.planning.criteria import LoadedArm, Objective
 from dhkit.symbolic import Friction
 from dhkit.trajectories import JointPath, Limits

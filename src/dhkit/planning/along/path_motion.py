@@ -19,8 +19,7 @@ from dhkit.planning.along.path_program import MAX_INTERVALS, PathProgram, Profil
 from dhkit.planning.along.path_states import PathStates
 from dhkit.planning.along.smooth_timing import SmoothTimingProgram
 from dhkit.planning.along.timing import TimingProgram
-from dhkit.planning.certificate import Checker
-from dhkit.planning.collision_avoidance import CollisionAvoidance
+from dhkit.planning.certificate import Checker, CollisionAvoidance
 from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, loaded
 from dhkit.planning.obstacles import Scene
 from dhkit.planning.program import Starts

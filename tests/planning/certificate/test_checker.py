@@ -12,7 +12,7 @@ from dhkit import Arm, Limits, Trajectory
 from dhkit.description import from_dh
 from dhkit.expressions import exact
 from dhkit.planning import Payload, certify
-from dhkit.planning.certificate import _proved_check
+from dhkit.planning.certificate.checker import _proved_check
 from dhkit.planning.criteria import Limit
 
 

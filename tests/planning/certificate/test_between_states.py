@@ -6,8 +6,8 @@ import pytest
 from dhkit import Arm, Floor, Limits, Obstacle
 from dhkit.description import from_toml
 from dhkit.errors import PlanningError
-from dhkit.planning.between_states import SMALLEST_TRAVEL, smallest_between
 from dhkit.planning.certificate import Checker
+from dhkit.planning.certificate.between_states import SMALLEST_TRAVEL, smallest_between
 from dhkit.planning.criteria import loaded
 from dhkit.planning.obstacles import distance
 from dhkit.trajectories import JointPath, Trajectory

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array, Description
 from dhkit.errors import PlanningError
-from dhkit.planning.between_states import smallest_between
+from dhkit.planning.certificate.between_states import smallest_between
 from dhkit.planning.criteria import Constraint, States, joint_limits
 from dhkit.planning.obstacles import (
     Floor,

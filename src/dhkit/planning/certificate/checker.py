@@ -11,7 +11,7 @@ import numpy as np
 from dhkit.description import Array, Description, Payload, takes_robot
 from dhkit.description.robot import require_bodies
 from dhkit.display import html_block, html_table, repr_line, value_line
-from dhkit.planning.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance, motion_constraints
+from dhkit.planning.certificate.collision_avoidance import NO_AVOIDANCE, CollisionAvoidance, motion_constraints
 from dhkit.planning.criteria import Constraint, Limit, LoadedArm, PositionLimit, States, loaded
 from dhkit.planning.obstacles import Scene, not_checked
 from dhkit.planning.second_check import Recheck, recheck
