@@ -11,12 +11,10 @@ from dhkit.description.frames import world_to_tool
 from dhkit.description.joint_text import joint_text, violated_limit_text
 from dhkit.dynamics import require_inertia
 from dhkit.errors import PlanningError
-from dhkit.planning.criteria import Constraint, LoadedArm, Objective, States, cost_of
+from dhkit.planning.criteria import Constraint, LoadedArm, Objective, States
 from dhkit.planning.goals import Place, Route
-from dhkit.planning.report import ClassicalMotion
 from dhkit.planning.request import PlanRequest
-from dhkit.planning.task import Task
-from dhkit.trajectories import Limits, quintic, trapezoidal
+from dhkit.trajectories import Limits
 
 CONSTRAINT_ROUNDING = 1e-6
 """Excess of a constraint, as a share of it, that counts as rounding."""
@@ -175,36 +173,3 @@ def require_place(description: Description, request: PlanRequest, q: Array, name
     if request.avoidance:
         least = 0.0 if name in ("start", "goal") else request.avoidance.clearance
         request.avoidance.require_gap(description, q, name, least)
-
-
-def classical_motions(task: Task) -> tuple[ClassicalMotion, ...]:
-    """Return the best trapezoid and quintic along the straight joint path, slowed down to the task's duration.
-
-    Empty for motions that they cannot follow: with via points, ends not at rest, obstacles, or friction. Those that
-    take longer than the task's duration are left out.
-    """
-    if (
-        len(task.points) > 2
-        or not task.rests
-        or task.friction is not None
-        or task.avoidance
-        or task.checker.constraints
-    ):
-        return ()
-
-    def torques(q: Array, qd: Array, qdd: Array) -> Array:
-        return States(task.loaded, np.zeros(len(q)), q, qd, qdd).tau
-
-    motions = []
-    for name, make in (("best trapezoid", trapezoidal), ("quintic", quintic)):
-        try:
-            motion = make(task.arm, task.points[0], task.points[1], limits=task.limits, torques=torques)
-        except PlanningError:
-            continue  # the straight path may need more than the torque limits
-        if task.duration is not None:
-            if motion.duration > task.duration:
-                continue
-            motion = motion.slowed(task.duration / motion.duration)
-        cost = cost_of(task.objective, motion, task.loaded)
-        motions.append(ClassicalMotion(name, motion.duration, cost))
-    return tuple(motions)

@@ -15,10 +15,9 @@ from dhkit.description import Array, Payload, Robot, description_of
 from dhkit.description.frames import world_to_tool
 from dhkit.display import repr_line
 from dhkit.errors import PlanningError
-from dhkit.planning.avoiding import FINER, motion_around
 from dhkit.planning.certificate import Checker, CollisionAvoidance
 from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, prepare
-from dhkit.planning.feasibility import classical_motions, require_inside_limits, require_place, require_possible
+from dhkit.planning.feasibility import require_inside_limits, require_place, require_possible
 from dhkit.planning.goals import Route, find_routes, parse_places
 from dhkit.planning.guess import leg_durations
 from dhkit.planning.many import ManyProgress, SimilarMotions, solve_many
@@ -26,7 +25,7 @@ from dhkit.planning.mesh import MIN_LEG_INTERVALS, Curve, Mesh
 from dhkit.planning.motion_program import MAX_SMALL_JOINTS, MotionProgram, curves_for
 from dhkit.planning.obstacles import Scene
 from dhkit.planning.problem import Problem
-from dhkit.planning.report import BranchReport
+from dhkit.planning.report import BranchReport, classical_motions, report_of
 from dhkit.planning.request import (
     PlanRequest,
     check_options,
@@ -35,7 +34,7 @@ from dhkit.planning.request import (
     end_velocity,
     smoothed,
 )
-from dhkit.planning.search import RESOLUTION, PlannedMotion, Search, coarser, report_of
+from dhkit.planning.search import FINER, RESOLUTION, PlannedMotion, Search, coarser, motion_around
 from dhkit.planning.solver import ProgressCall, delayed_interrupts
 from dhkit.planning.task import Task
 from dhkit.planning.work import MAX_ITERATIONS, Work

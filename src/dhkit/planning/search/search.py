@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Generic
@@ -14,7 +13,6 @@ from dhkit.planning.certificate import Certificate
 from dhkit.planning.criteria import Limit, States, cost_of
 from dhkit.planning.guess import leg_durations, straight_motion
 from dhkit.planning.program import Iterate, Program, Starts, row_bounds, worst_row
-from dhkit.planning.report import PlanReport
 from dhkit.planning.solver import ProgressCall, Solution
 from dhkit.planning.task import Margins, Task
 from dhkit.planning.work import SearchLimitError, Work
@@ -312,33 +310,6 @@ class Excess:
     trajectory: Trajectory
     states: States
     certificate: Certificate
-
-
-def report_of(task: Task, best: PlannedMotion, work: Work) -> PlanReport:
-    """Return the report of a task's motion."""
-    arm = task.arm
-    return PlanReport(
-        objective=str(task.objective),
-        cost=best.cost,
-        unit=task.objective.unit(arm.numbers.prismatic),
-        duration=best.trajectory.duration,
-        is_duration_given=task.duration is not None,
-        is_least_time=task.objective.only_time,
-        certificate=best.certificate,
-        joints=tuple(joint.name for joint in arm.joints),
-        intervals=best.intervals,
-        iterations=work.iterations,
-        solves=work.solves,
-        build_seconds=work.build_seconds,
-        solve_seconds=time.perf_counter() - work.began - work.build_seconds,
-        slow_down=best.slow_down,
-        tightened=best.tightened,
-        unlimited=task.limits.unlimited,
-        is_resolved=best.is_resolved,
-        is_converged=best.is_converged,
-        failure=best.failure,
-        **task.avoidance.report(arm, best.certificate.excess_of(Limit.CLEARANCE)),
-    )
 
 
 def coarser(search: Search[Iterate], motion: Trajectory) -> tuple[int, float] | None:

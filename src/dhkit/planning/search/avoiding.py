@@ -19,8 +19,9 @@ from dhkit.planning.assembly import knots_along
 from dhkit.planning.certificate import Certificate
 from dhkit.planning.criteria import Limit
 from dhkit.planning.motion_program import MotionProgram
-from dhkit.planning.obstacles import Gaps, PathSampler, Separation
-from dhkit.planning.search import Excess, PlannedMotion, Search
+from dhkit.planning.obstacles import Gaps, Separation
+from dhkit.planning.search.sampling import PathSampler
+from dhkit.planning.search.search import Excess, PlannedMotion, Search
 from dhkit.planning.task import Margins, Task
 from dhkit.planning.variables import Knots
 from dhkit.planning.work import SearchLimitError

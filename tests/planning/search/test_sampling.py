@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from dhkit.planning.obstacles import PathSampler
+from dhkit.planning.search.sampling import PathSampler
 from dhkit.planning.work import STATES_PER_ITERATION, SearchLimitError, Work
 
 LOWER, UPPER = -np.ones(2), np.ones(2)
