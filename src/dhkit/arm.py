@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from dhkit.model import PinocchioModel
     from dhkit.model.urdf_chain import Side
     from dhkit.planning import Certificate, Constraint, Distances, ObjectiveLike, Planner, Scene
-    from dhkit.planning.solver import ProgressCall
+    from dhkit.planning.program import ProgressCall
     from dhkit.symbolic import BaseParameters, CasadiFunctions, Friction, Lagrangian, SymbolicKinematics, Symbols
     from dhkit.trajectories import JointPath, Limits, Torques, Trajectory
     from dhkit.verification import VerificationReport

@@ -28,8 +28,8 @@ from dhkit.cli.units import joint_entry
 from dhkit.description import Array
 from dhkit.errors import DescriptionError, PlanningError
 from dhkit.planning import PlanReport, Progress, ToolSpeed
+from dhkit.planning.program import MAX_ITERATIONS
 from dhkit.planning.report import more_text, seconds_text
-from dhkit.planning.work import MAX_ITERATIONS
 from dhkit.trajectories import Limits, Trajectory, joint_path, tool_line
 from dhkit.trajectories.archives import ARCHIVES
 from dhkit.trajectories.files import TABLES

@@ -20,8 +20,8 @@ from dhkit.planning.criteria import (
 )
 from dhkit.planning.obstacles import Distances, Floor, Obstacle, Scene, distance
 from dhkit.planning.planner import Planner
+from dhkit.planning.program import Progress
 from dhkit.planning.report import BranchReport, PlanReport
-from dhkit.planning.solver import Progress
 
 __all__ = [
     "BranchReport",

@@ -19,12 +19,23 @@ from dhkit.planning.certificate import Checker, CollisionAvoidance
 from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, prepare
 from dhkit.planning.feasibility import require_inside_limits, require_place, require_possible
 from dhkit.planning.goals import Route, find_routes, parse_places
-from dhkit.planning.guess import leg_durations
 from dhkit.planning.many import ManyProgress, SimilarMotions, solve_many
-from dhkit.planning.mesh import MIN_LEG_INTERVALS, Curve, Mesh
-from dhkit.planning.motion_program import MAX_SMALL_JOINTS, MotionProgram, curves_for
 from dhkit.planning.obstacles import Scene
-from dhkit.planning.problem import Problem
+from dhkit.planning.program import (
+    MAX_ITERATIONS,
+    MAX_SMALL_JOINTS,
+    MIN_LEG_INTERVALS,
+    Curve,
+    Mesh,
+    MotionProgram,
+    Problem,
+    ProgressCall,
+    Task,
+    Work,
+    curves_for,
+    delayed_interrupts,
+    leg_durations,
+)
 from dhkit.planning.report import BranchReport, classical_motions, report_of
 from dhkit.planning.request import (
     PlanRequest,
@@ -35,9 +46,6 @@ from dhkit.planning.request import (
     smoothed,
 )
 from dhkit.planning.search import FINER, RESOLUTION, PlannedMotion, Search, coarser, motion_around
-from dhkit.planning.solver import ProgressCall, delayed_interrupts
-from dhkit.planning.task import Task
-from dhkit.planning.work import MAX_ITERATIONS, Work
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 from dhkit.trajectories.timing import check_duration

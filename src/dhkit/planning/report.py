@@ -13,9 +13,8 @@ from dhkit.display import html_block, html_lines, html_table, repr_line
 from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Certificate
 from dhkit.planning.criteria import Limit, States, cost_of
+from dhkit.planning.program import Task, Work
 from dhkit.planning.search import PlannedMotion
-from dhkit.planning.task import Task
-from dhkit.planning.work import Work
 from dhkit.trajectories import quintic, trapezoidal
 
 MAX_LISTED_LIMITS = 3

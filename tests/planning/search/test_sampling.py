@@ -5,8 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from dhkit.planning.program import SearchLimitError, Work
+from dhkit.planning.program.work import STATES_PER_ITERATION
 from dhkit.planning.search.sampling import PathSampler
-from dhkit.planning.work import STATES_PER_ITERATION, SearchLimitError, Work
 
 LOWER, UPPER = -np.ones(2), np.ones(2)
 

@@ -22,13 +22,10 @@ from dhkit.planning.along.timing import TimingProgram
 from dhkit.planning.certificate import Checker, CollisionAvoidance
 from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, loaded
 from dhkit.planning.obstacles import Scene
-from dhkit.planning.program import Starts
+from dhkit.planning.program import MAX_ITERATIONS, ProgressCall, Starts, Task, Work
 from dhkit.planning.report import report_of
 from dhkit.planning.request import check_options, checked_constraints, checked_limits, smoothed
 from dhkit.planning.search import TIME_SCALING_MARGIN, PlannedMotion, Search
-from dhkit.planning.solver import ProgressCall
-from dhkit.planning.task import Task
-from dhkit.planning.work import MAX_ITERATIONS, Work
 from dhkit.symbolic import Friction
 from dhkit.trajectories import JointPath, Limits, Trajectory
 from dhkit.trajectories.timing import check_duration, default_limits

@@ -12,10 +12,20 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.planning.along.path_point import PathPoint
 from dhkit.planning.along.path_states import PathStates
-from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows, Scaling
 from dhkit.planning.criteria import Limit, size_of
-from dhkit.planning.program import Program, limit_rows
-from dhkit.planning.task import Margins, Task
+from dhkit.planning.program import (
+    Block,
+    BlockProgram,
+    Indices,
+    LocalFunction,
+    Margins,
+    Program,
+    RowKind,
+    Rows,
+    Scaling,
+    Task,
+    limit_rows,
+)
 from dhkit.trajectories import JointPath, Trajectory
 
 if TYPE_CHECKING:

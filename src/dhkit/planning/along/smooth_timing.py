@@ -11,14 +11,20 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.planning.along.path_program import PathProgram
-from dhkit.planning.assembly import corrected
-from dhkit.planning.blocks import LocalFunction, RowKind, Rows
 from dhkit.planning.criteria import Limit
-from dhkit.planning.mesh import Curve
-from dhkit.planning.program import Arguments, Starts
-from dhkit.planning.solver import Solver
-from dhkit.planning.task import Margins, Task
-from dhkit.planning.variables import Knots
+from dhkit.planning.program import (
+    Arguments,
+    Curve,
+    Knots,
+    LocalFunction,
+    Margins,
+    RowKind,
+    Rows,
+    Solver,
+    Starts,
+    Task,
+    corrected,
+)
 from dhkit.trajectories import Trajectory
 
 TOLERANCE = 1e-8

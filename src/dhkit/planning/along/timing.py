@@ -12,11 +12,8 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.planning.along.path_program import PathProgram
-from dhkit.planning.blocks import LocalFunction, RowKind, Rows
 from dhkit.planning.criteria import Limit
-from dhkit.planning.program import Arguments, Starts
-from dhkit.planning.solver import Solver
-from dhkit.planning.task import Margins, Task
+from dhkit.planning.program import Arguments, LocalFunction, Margins, RowKind, Rows, Solver, Starts, Task
 from dhkit.trajectories import Trajectory
 
 END_SHARE = 0.01

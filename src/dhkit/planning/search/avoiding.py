@@ -15,16 +15,12 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.errors import PlanningError
-from dhkit.planning.assembly import knots_along
 from dhkit.planning.certificate import Certificate
 from dhkit.planning.criteria import Limit
-from dhkit.planning.motion_program import MotionProgram
 from dhkit.planning.obstacles import Gaps, Separation
+from dhkit.planning.program import Knots, Margins, MotionProgram, SearchLimitError, Task, knots_along
 from dhkit.planning.search.sampling import PathSampler
 from dhkit.planning.search.search import Excess, PlannedMotion, Search
-from dhkit.planning.task import Margins, Task
-from dhkit.planning.variables import Knots
-from dhkit.planning.work import SearchLimitError
 from dhkit.trajectories import Trajectory
 
 POINTS = 9

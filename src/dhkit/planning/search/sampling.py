@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
-from dhkit.planning.work import Work
+from dhkit.planning.program import Work
 
 REACH = 1.0
 """Largest step towards a sample, as a share of the mean range of a joint."""

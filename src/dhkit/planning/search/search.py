@@ -11,11 +11,21 @@ import numpy as np
 from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Certificate
 from dhkit.planning.criteria import Limit, States, cost_of
-from dhkit.planning.guess import leg_durations, straight_motion
-from dhkit.planning.program import Iterate, Program, Starts, row_bounds, worst_row
-from dhkit.planning.solver import ProgressCall, Solution
-from dhkit.planning.task import Margins, Task
-from dhkit.planning.work import SearchLimitError, Work
+from dhkit.planning.program import (
+    Iterate,
+    Margins,
+    Program,
+    ProgressCall,
+    SearchLimitError,
+    Solution,
+    Starts,
+    Task,
+    Work,
+    leg_durations,
+    row_bounds,
+    straight_motion,
+    worst_row,
+)
 from dhkit.trajectories import Trajectory, quintic
 
 FEASIBILITY_TOLERANCE = 1e-5

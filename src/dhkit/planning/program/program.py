@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 import numpy as np
 
 from dhkit.description import Array
-from dhkit.planning.blocks import Block, BlockProgram, Indices, RowKind, Rows, Scaling
 from dhkit.planning.criteria import Constraint, Point
-from dhkit.planning.solver import Solution, Solver
-from dhkit.planning.task import Margins, Task
+from dhkit.planning.program.blocks import Block, BlockProgram, Indices, RowKind, Rows, Scaling
+from dhkit.planning.program.solver import Solution, Solver
+from dhkit.planning.program.task import Margins, Task
 from dhkit.trajectories import Trajectory
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from dhkit.description import library_robot
 from dhkit.planning import Planner
 from dhkit.planning.certificate import NO_AVOIDANCE
 from dhkit.planning.criteria import Limit
-from dhkit.planning.motion_program import DETOURS
+from dhkit.planning.program import Margins
+from dhkit.planning.program.motion_program import DETOURS
 from dhkit.planning.request import PlanRequest
-from dhkit.planning.task import Margins
 from dhkit.trajectories import Limits
 
 

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dhkit.description import Array, Description
-from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows, Scaling
 from dhkit.planning.certificate import NO_AVOIDANCE, motion_constraints
 from dhkit.planning.criteria import LOAD, Constraint, Limit, Objective, Point
-from dhkit.planning.mesh import Curve, Interval, Mesh
 from dhkit.planning.obstacles import PlaneRow
-from dhkit.planning.program import limit_rows
-from dhkit.planning.variables import Knots, StatePoints, Variables
+from dhkit.planning.program.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows, Scaling
+from dhkit.planning.program.mesh import Curve, Interval, Knots, Mesh
+from dhkit.planning.program.program import limit_rows
+from dhkit.planning.program.variables import StatePoints, Variables
 from dhkit.symbolic import Friction
 from dhkit.symbolic.differentiable.frames import SymbolicTable
 from dhkit.trajectories import Limits

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dhkit.description import Array, Description
-from dhkit.planning.blocks import Indices
 from dhkit.planning.certificate import NO_AVOIDANCE, Checker, CollisionAvoidance
 from dhkit.planning.criteria import LoadedArm, Objective
+from dhkit.planning.program.blocks import Indices
 from dhkit.symbolic import Friction
 from dhkit.trajectories import JointPath, Limits
 

@@ -8,27 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
-from dhkit.planning.blocks import Indices
-from dhkit.planning.mesh import Curve, Interval, Mesh
-
-
-@dataclass(frozen=True, eq=False)
-class Knots:
-    """A motion on a mesh."""
-
-    durations: Array
-    """Durations of the legs, shape (legs,), s."""
-    q: Array
-    """Joint values at the knots, shape (intervals + 1, n), rad and m."""
-    qd: Array
-    """Joint rates at the knots, shape (intervals + 1, n), rad/s and m/s."""
-    qdd: Array
-    """Accelerations, shape (columns, n), rad/s^2 and m/s^2; see :class:`Curve`."""
-
-    def intervals(self, mesh: Mesh) -> Interval:
-        """Return all intervals at once, arrays of shape (intervals, n)."""
-        h = (mesh.shares * self.durations[mesh.leg])[:, None]
-        return Interval(h, self.q[:-1], self.qd[:-1], *mesh.curve.values(self.qdd))
+from dhkit.planning.program.blocks import Indices
+from dhkit.planning.program.mesh import Curve, Mesh
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ import casadi
 import numpy as np
 import pytest
 
-from dhkit.planning.blocks import Block, BlockProgram, LocalFunction, Scaling
+from dhkit.planning.program import Block, BlockProgram, LocalFunction, Scaling
 
 
 @pytest.fixture

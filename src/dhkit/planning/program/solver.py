@@ -16,8 +16,8 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.display import value_line
-from dhkit.planning.blocks import BlockProgram, Scaling
-from dhkit.planning.work import Work
+from dhkit.planning.program.blocks import BlockProgram, Scaling
+from dhkit.planning.program.work import Work
 
 if TYPE_CHECKING:
     import casadi
