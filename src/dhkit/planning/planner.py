@@ -17,8 +17,6 @@ from dhkit.display import repr_line
 from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Checker, CollisionAvoidance
 from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, prepare
-from dhkit.planning.feasibility import require_inside_limits, require_place, require_possible
-from dhkit.planning.goals import Route, find_routes, parse_places
 from dhkit.planning.many import ManyProgress, SimilarMotions, solve_many
 from dhkit.planning.obstacles import Scene
 from dhkit.planning.program import (
@@ -39,10 +37,16 @@ from dhkit.planning.program import (
 from dhkit.planning.report import BranchReport, classical_motions, report_of
 from dhkit.planning.request import (
     PlanRequest,
+    Route,
     check_options,
     checked_constraints,
     checked_limits,
     end_velocity,
+    find_routes,
+    parse_places,
+    require_inside_limits,
+    require_place,
+    require_possible,
     smoothed,
 )
 from dhkit.planning.search import FINER, RESOLUTION, PlannedMotion, Search, coarser, motion_around

@@ -1,4 +1,4 @@
-"""Poses as goals: every configuration of the arm that has its tool there, and which ways to try first."""
+"""Places of a motion and routes through them: all configurations with the tool at a pose, and which to try first."""
 
 from __future__ import annotations
 

@@ -1,0 +1,35 @@
+"""Requests: the places to pass, the routes through them, the options of a motion, and reasons why there can be none."""
+
+from dhkit.planning.request.feasibility import (
+    CONSTRAINT_ROUNDING,
+    require_holdable,
+    require_inside_limits,
+    require_place,
+    require_possible,
+)
+from dhkit.planning.request.options import (
+    PlanRequest,
+    check_options,
+    checked_constraints,
+    checked_limits,
+    end_velocity,
+    smoothed,
+)
+from dhkit.planning.request.places import Route, find_routes, parse_places
+
+__all__ = [
+    "CONSTRAINT_ROUNDING",
+    "PlanRequest",
+    "Route",
+    "check_options",
+    "checked_constraints",
+    "checked_limits",
+    "end_velocity",
+    "find_routes",
+    "parse_places",
+    "require_holdable",
+    "require_inside_limits",
+    "require_place",
+    "require_possible",
+    "smoothed",
+]
