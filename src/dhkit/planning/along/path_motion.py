@@ -14,11 +14,9 @@ from dhkit.description.frames import world_to_tool
 from dhkit.errors import PlanningError
 from dhkit.kernels import check_whole
 from dhkit.planning.along.checks import require_holdable_along, require_kept, require_path
-from dhkit.planning.along.grid import knots_of
 from dhkit.planning.along.path_program import MAX_INTERVALS, PathProgram, Profile
-from dhkit.planning.along.path_states import PathStates
-from dhkit.planning.along.smooth_timing import SmoothTimingProgram
-from dhkit.planning.along.timing import TimingProgram
+from dhkit.planning.along.path_states import PathStates, knots_of
+from dhkit.planning.along.timing import SmoothTimingProgram, TimingProgram
 from dhkit.planning.certificate import Checker, CollisionAvoidance
 from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, loaded
 from dhkit.planning.obstacles import Scene

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Protocol, Self, TypeVar, cast
 import numpy as np
 
 from dhkit.description import Array
-from dhkit.planning.along.path_point import PathPoint
-from dhkit.planning.along.path_states import PathStates
+from dhkit.planning.along.path_states import PathPoint, PathStates
 from dhkit.planning.criteria import Limit, size_of
 from dhkit.planning.program import (
     Block,
