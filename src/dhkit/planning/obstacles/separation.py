@@ -22,7 +22,7 @@ from dhkit.description import Array, Box, Description, world_to_frames
 from dhkit.planning.obstacles.capsules import link_capsules, world_axes
 from dhkit.planning.obstacles.pairs import Pair, capsules_beside, ends_above, link_pairs
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Solids
-from dhkit.planning.obstacles.segments import nearest_on_box, nearest_points
+from dhkit.planning.obstacles.solids import nearest_on_box, nearest_points
 
 Indices = NDArray[np.int_]
 

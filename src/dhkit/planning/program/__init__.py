@@ -10,9 +10,18 @@ from dhkit.planning.program.motion_program import (
     straight_motion,
 )
 from dhkit.planning.program.problem import Problem
-from dhkit.planning.program.program import Arguments, Iterate, Program, Starts, limit_rows, row_bounds, worst_row
+from dhkit.planning.program.program import (
+    Arguments,
+    Iterate,
+    Margins,
+    Program,
+    Starts,
+    Task,
+    limit_rows,
+    row_bounds,
+    worst_row,
+)
 from dhkit.planning.program.solver import Progress, ProgressCall, Solution, Solver, delayed_interrupts
-from dhkit.planning.program.task import Margins, Task
 from dhkit.planning.program.work import MAX_ITERATIONS, SearchLimitError, Work
 
 __all__ = [

@@ -14,9 +14,8 @@ from dhkit.planning.obstacles import PlaneRow
 from dhkit.planning.program.blocks import Indices
 from dhkit.planning.program.mesh import Curve, Knots, Mesh, assemble_trajectory, knots_along
 from dhkit.planning.program.problem import USUAL_MOVE, Problem
-from dhkit.planning.program.program import Arguments, Program, Starts
+from dhkit.planning.program.program import Arguments, Margins, Program, Starts, Task
 from dhkit.planning.program.solver import Solver
-from dhkit.planning.program.task import Margins, Task
 from dhkit.trajectories import Limits, Trajectory
 
 SAMPLES = 17
