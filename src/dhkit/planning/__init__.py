@@ -6,7 +6,7 @@ The way from a request to a motion, through rooms (folders) and files::
           │ start, goal, via, options                     │ path, options
           └───────────────────────┬───────────────────────┘
                                   v
-    request/         places and the routes through them, checked options, ─────> PlanningError:
+    request/         places and the routes through them, checked arguments, ───> PlanningError:
                      reasons why no motion can exist                             which limit or place
                                   │ task: the configurations of one route, with
                                   │       objective, limits, constraints, obstacles

@@ -1,4 +1,4 @@
-"""Requests: the places to pass, the routes through them, the options of a motion, and reasons why there can be none."""
+"""Requests: the places to pass, the routes through them, checked arguments, and reasons why there can be no motion."""
 
 from dhkit.planning.request.feasibility import (
     CONSTRAINT_ROUNDING,
@@ -7,7 +7,8 @@ from dhkit.planning.request.feasibility import (
     require_place,
     require_possible,
 )
-from dhkit.planning.request.options import (
+from dhkit.planning.request.places import Route, find_routes, parse_places
+from dhkit.planning.request.request import (
     PlanRequest,
     check_options,
     checked_constraints,
@@ -15,7 +16,6 @@ from dhkit.planning.request.options import (
     end_velocity,
     smoothed,
 )
-from dhkit.planning.request.places import Route, find_routes, parse_places
 
 __all__ = [
     "CONSTRAINT_ROUNDING",

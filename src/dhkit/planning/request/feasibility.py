@@ -12,8 +12,8 @@ from dhkit.description.joint_text import joint_text, violated_limit_text
 from dhkit.dynamics import require_inertia
 from dhkit.errors import PlanningError
 from dhkit.planning.criteria import Constraint, LoadedArm, Objective, States
-from dhkit.planning.request.options import PlanRequest
 from dhkit.planning.request.places import Place, Route
+from dhkit.planning.request.request import PlanRequest
 from dhkit.trajectories import Limits
 
 CONSTRAINT_ROUNDING = 1e-6
