@@ -6,6 +6,7 @@ from dhkit.planning.certificate import Certificate, certify
 from dhkit.planning.constraints import Constraint, MotorPower, TorqueSpeedLine
 from dhkit.planning.objectives import Effort, Energy, Jerk, Objective, ObjectiveLike, Time
 from dhkit.planning.obstacles import Distances, Floor, Obstacle, Scene, distance
+from dhkit.planning.options import PathOptions, PlanOptions
 from dhkit.planning.planner import Planner
 from dhkit.planning.report import BranchReport, PlanReport
 from dhkit.planning.solver import Progress
@@ -24,7 +25,9 @@ __all__ = [
     "Objective",
     "ObjectiveLike",
     "Obstacle",
+    "PathOptions",
     "Payload",
+    "PlanOptions",
     "PlanReport",
     "Planner",
     "Progress",
