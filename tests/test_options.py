@@ -9,6 +9,7 @@ import pytest
 import dhkit
 from dhkit import Arm
 from dhkit.control.options import BatchKeywords, BatchOptions, SimulationKeywords, SimulationOptions
+from dhkit.grading.options import GradeKeywords, GradeOptions
 from dhkit.planning import PathOptions, PlanOptions
 from dhkit.planning.options import PathKeywords, PlanKeywords
 
@@ -17,6 +18,7 @@ KINDS = {
     BatchOptions: BatchKeywords,
     PathOptions: PathKeywords,
     PlanOptions: PlanKeywords,
+    GradeOptions: GradeKeywords,
 }
 ARM = Arm.load("planar2r")
 
@@ -84,6 +86,8 @@ def test_what_a_motion_along_a_path_cannot_have_is_refused():
         (lambda: PathOptions(clearance=-1.0), "clearance"),
         (lambda: PathOptions(limits=3), "limits is 3"),
         (lambda: PlanOptions(warm="motion"), "warm is str"),
+        (lambda: GradeOptions(task="task.toml"), "task is str"),
+        (lambda: GradeOptions(isolation=True), "isolation is bool"),
         (lambda: replace(PlanOptions(), duration=float("nan")), "duration"),
     ],
 )

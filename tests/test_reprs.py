@@ -344,6 +344,7 @@ VALUES = {
     grading.Credit: grading.Credit,
     grading.Diagnosis: lambda: grade().diagnosis[0],
     grading.Entry: lambda: grade().entries[1],
+    grading.GradeOptions: lambda: grading.GradeOptions(seed=3, explain=False),
     grading.GradeReport: grade,
     grading.Mark: lambda: grading.Mark("g2", 0.0, 100 / 3, "wrong by a mistake that has a long name " * 5),
     grading.Marks: lambda: grading.marks(grade(), grading.Rubric()),

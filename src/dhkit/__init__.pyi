@@ -52,7 +52,7 @@ from .errors import (
     SimulationError as SimulationError,
     UnreachableError as UnreachableError,
 )
-from .grading import GradeReport as GradeReport, grade as grade
+from .grading import GradeOptions as GradeOptions, GradeReport as GradeReport, grade as grade
 from .kinematics import (
     Classification as Classification,
     IKFlag as IKFlag,
