@@ -35,8 +35,7 @@ KINDS: dict[str, tuple[str, dict[str, set[str]]]] = {
             "description": {"Description", "Robot"},
             "robot": {"Robot", "Robot | None"},
             "arm": {"Robot"},
-            "plant": {"Robot", "Robot | None", "Robot | Sequence[Robot] | None"},
-            "arms": {"Sequence[Robot]"},
+            "plant": {"Robot | Plant | None", "Robot | Sequence[Robot] | None"},
         },
     ),
     "joint values": (
@@ -80,7 +79,6 @@ KINDS: dict[str, tuple[str, dict[str, set[str]]]] = {
 OTHER_MEANINGS = {
     "seed": {"int", "int | None"},  # of random numbers
     "points": {"int", "float"},  # how many; of a mark
-    "plant": {"Plant | None", "Plant"},  # an arm with its friction, stops and pushes
     "path": {"JointPath"},  # of the joints
     "angle": {"str"},  # the unit of a table's angles
     "source": {"str"},  # whose a robot is

@@ -18,6 +18,7 @@ from .control import (
     LQR as LQR,
     PID as PID,
     Adaptive as Adaptive,
+    BatchOptions as BatchOptions,
     BatchResult as BatchResult,
     Comparison as Comparison,
     ComputedTorque as ComputedTorque,
@@ -27,6 +28,7 @@ from .control import (
     PDGravity as PDGravity,
     Push as Push,
     Sensors as Sensors,
+    SimulationOptions as SimulationOptions,
     SimulationResult as SimulationResult,
     Sine as Sine,
     Step as Step,
@@ -50,7 +52,7 @@ from .errors import (
     SimulationError as SimulationError,
     UnreachableError as UnreachableError,
 )
-from .grading import GradeReport as GradeReport, grade as grade
+from .grading import GradeOptions as GradeOptions, GradeReport as GradeReport, grade as grade
 from .kinematics import (
     Classification as Classification,
     IKFlag as IKFlag,
@@ -69,8 +71,10 @@ from .planning import (
     Jerk as Jerk,
     MotorPower as MotorPower,
     Obstacle as Obstacle,
+    PathOptions as PathOptions,
     Payload as Payload,
     Planner as Planner,
+    PlanOptions as PlanOptions,
     Time as Time,
     ToolAcceleration as ToolAcceleration,
     ToolDirection as ToolDirection,

@@ -5,26 +5,44 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Unpack
 
 from numpy.typing import ArrayLike
 
 from dhkit import description as describe
 from dhkit.cached_property import cached_property
-from dhkit.description import Array, Description, DHTable, Named, Robot
+from dhkit.description import Array, Description, DHTable, Named
 from dhkit.display import repr_line
 from dhkit.errors import DescriptionError
 
 if TYPE_CHECKING:
-    from dhkit.control import BatchResult, Comparison, Controller, Push, Reference, Sensors, SimulationResult
+    from dhkit.control import (
+        BatchOptions,
+        BatchResult,
+        Comparison,
+        Controller,
+        Reference,
+        SimulationOptions,
+        SimulationResult,
+    )
+    from dhkit.control.options import BatchKeywords, SimulationKeywords
     from dhkit.description import Body, Payload
     from dhkit.description.table_rows import Quantity
     from dhkit.grading import GradeReport, Rubric
     from dhkit.kinematics import Classification, IKPath, IKSolutions, Motion, ReferenceAxes, Singularities, Workspace
     from dhkit.model import PinocchioModel
     from dhkit.model.urdf_chain import Side
-    from dhkit.planning import Certificate, Constraint, Distances, ObjectiveLike, Planner, Scene
-    from dhkit.planning.program import ProgressCall
+    from dhkit.planning import (
+        Certificate,
+        Constraint,
+        Distances,
+        ObjectiveLike,
+        PathOptions,
+        Planner,
+        PlanOptions,
+        Scene,
+    )
+    from dhkit.planning.request import PathKeywords, PlanKeywords
     from dhkit.symbolic import BaseParameters, CasadiFunctions, Friction, Lagrangian, SymbolicKinematics, Symbols
     from dhkit.trajectories import JointPath, Limits, Torques, Trajectory
     from dhkit.verification import VerificationReport
@@ -534,52 +552,14 @@ class Arm:
         duration: float | None = None,
         q0: ArrayLike | None = None,
         qd0: ArrayLike | None = None,
-        rate: float | None = 1000.0,
-        plant: Robot | None = None,
-        plant_rate: float | None = None,
         *,
-        friction: bool | Friction = False,
-        restitution: float | None = 0.0,
-        pushes: Sequence[Push] = (),
-        sensors: Sensors | None = None,
-        saturation: bool = True,
-        tolerance: float = 1e-13,
-        progress: Callable[[int, int], None] | None = None,
+        options: SimulationOptions | None = None,
+        **keywords: Unpack[SimulationKeywords],
     ) -> SimulationResult:
-        """Simulate the arm under a controller; see :func:`dhkit.control.simulate`.
+        """Simulate the arm under a controller; see :func:`dhkit.control.simulate`."""
+        from dhkit.control import simulate
 
-        Parameters
-        ----------
-        controller, reference, duration, q0, qd0, rate, plant_rate, sensors, saturation, tolerance, progress
-            As for that function.
-        plant
-            The arm that moves, if it differs from this one: another payload, other parameters, the same joints.
-        friction
-            Friction of the joints: True for a step with stiction, or a smooth :class:`Friction`.
-        restitution
-            Coefficient of restitution of the joint stops, 0 to 1; None for no stops.
-        pushes
-            Wrenches on the tool or on links.
-        """
-        from dhkit.control import Plant, simulate
-        from dhkit.dynamics import Friction
-
-        moved = Plant(self._moving(plant), Friction.chosen(friction), restitution, _listed(pushes))
-        return simulate(
-            self._description,
-            controller,
-            reference,
-            duration,
-            q0,
-            qd0,
-            rate,
-            moved,
-            plant_rate,
-            sensors=sensors,
-            saturation=saturation,
-            tolerance=tolerance,
-            progress=progress,
-        )
+        return simulate(self._description, controller, reference, duration, q0, qd0, options=options, **keywords)
 
     def simulate_batch(
         self,
@@ -588,50 +568,14 @@ class Arm:
         duration: float | None = None,
         q0: ArrayLike | None = None,
         qd0: ArrayLike | None = None,
-        rate: float = 1000.0,
-        plant: Robot | Sequence[Robot] | None = None,
-        plant_rate: float | None = None,
         *,
-        friction: bool | Friction | None = None,
-        keep: str = "errors",
-        sensors: Sensors | None = None,
-        saturation: bool = True,
-        threads: int = 1,
-        progress: Callable[[int, int], None] | None = None,
+        options: BatchOptions | None = None,
+        **keywords: Unpack[BatchKeywords],
     ) -> BatchResult:
-        """Simulate a batch of arms, with their states advanced together; see :func:`dhkit.control.simulate_batch`.
-
-        Parameters
-        ----------
-        plant
-            The arm that moves, or one for each run: other payloads, other parameters, the same joints.
-        controller, reference, duration, q0, qd0, rate, plant_rate, friction, keep, sensors, saturation
-            As for that function.
-        threads, progress
-            As for that function.
-        """
+        """Simulate a batch of arms, with their states advanced together; see :func:`dhkit.control.simulate_batch`."""
         from dhkit.control import simulate_batch
 
-        arms: Sequence[Robot] = ()
-        if plant is not None:
-            arms = plant if isinstance(plant, Sequence) else [plant]
-        return simulate_batch(
-            self._description,
-            controller,
-            reference,
-            duration,
-            q0,
-            qd0,
-            rate,
-            [describe.description_of(arm) for arm in arms],
-            plant_rate,
-            friction=friction,
-            keep=keep,
-            sensors=sensors,
-            saturation=saturation,
-            threads=threads,
-            progress=progress,
-        )
+        return simulate_batch(self._description, controller, reference, duration, q0, qd0, options=options, **keywords)
 
     def compare(
         self,
@@ -639,19 +583,12 @@ class Arm:
         controllers: Sequence[str] | Mapping[str, str | Controller] | None = None,
         bandwidth: float = 20.0,
         damping: float = 1.0,
-        plant: Robot | None = None,
         *,
-        friction: bool | Friction = False,
-        restitution: float | None = 0.0,
-        pushes: Sequence[Push] = (),
         duration: float | None = None,
         q0: ArrayLike | None = None,
         qd0: ArrayLike | None = None,
-        rate: float | None = 1000.0,
-        plant_rate: float | None = None,
-        sensors: Sensors | None = None,
-        saturation: bool = True,
-        tolerance: float = 1e-13,
+        options: SimulationOptions | None = None,
+        **keywords: Unpack[SimulationKeywords],
     ) -> Comparison:
         """Return how controllers follow a motion, all of dhkit's or chosen ones; see :func:`dhkit.control.compare`.
 
@@ -662,31 +599,20 @@ class Arm:
         >>> print(arm.compare(motion, ("pid", "computed-torque"), plant=arm.with_payload(0.2)))  # doctest: +ELLIPSIS
         controller       largest error [rad] ...
         """
-        from dhkit.control import CONTROLLERS, Plant, compare
-        from dhkit.dynamics import Friction
+        from dhkit.control import compare
 
-        moved = Plant(self._moving(plant), Friction.chosen(friction), restitution, _listed(pushes))
-        chosen = tuple(CONTROLLERS) if controllers is None else controllers
         return compare(
             self._description,
             reference,
-            chosen,
+            controllers,
             bandwidth,
             damping,
-            plant=moved,
             duration=duration,
             q0=q0,
             qd0=qd0,
-            rate=rate,
-            plant_rate=plant_rate,
-            sensors=sensors,
-            saturation=saturation,
-            tolerance=tolerance,
+            options=options,
+            **keywords,
         )
-
-    def _moving(self, plant: Robot | None) -> Description:
-        """Return the description of the arm that moves: a plant's, an arm's, or by default this arm's."""
-        return self._description if plant is None else describe.description_of(plant)
 
     def linearize(self, q: ArrayLike, qd: ArrayLike | None = None) -> tuple[Array, Array]:
         """Return A (2n, 2n) and B (2n, n), SI units, of the arm near a state; see :func:`dhkit.control.linearize`."""
@@ -814,25 +740,13 @@ class Arm:
         constraints: Constraint | Sequence[Constraint] = (),
         intervals: int | None = None,
         friction: bool | Friction = False,
-        via: Sequence[ArrayLike | str] = (),
-        coordinates: Sequence[str] | None = None,
-        duration: float | None = None,
-        start_velocity: ArrayLike | None = None,
-        goal_velocity: ArrayLike | None = None,
-        limits: Limits | None = None,
-        payload: Payload | None = None,
-        obstacles: Scene = (),
-        clearance: float = 0.01,
-        self_collision: bool = False,
-        warm: Trajectory | None = None,
-        max_iterations: int = 1000,
-        time_limit: float | None = None,
-        progress: ProgressCall | None = None,
-        compare: bool = True,
+        options: PlanOptions | None = None,
+        **keywords: Unpack[PlanKeywords],
     ) -> Trajectory:
         """Return the best motion between two configurations, or to a pose of the tool; planners are cached.
 
         Arguments are those of :class:`dhkit.planning.Planner` and of its :meth:`~dhkit.planning.Planner.solve`.
+        Unless options are given, the report compares the motion with classical ones.
 
         Examples
         --------
@@ -841,33 +755,26 @@ class Arm:
         >>> motion.report.certificate.ok, motion.duration < arm.quintic([0, 0], [1.0, 0.5]).duration
         (True, True)
         """
+        from dhkit.planning import PlanOptions
+
+        chosen = PlanOptions.of(options or PlanOptions(compare=True), keywords)
+        return self._planner(objective, constraints, intervals, friction).solve(start, goal, options=chosen)
+
+    def _planner(
+        self,
+        objective: ObjectiveLike,
+        constraints: Constraint | Sequence[Constraint],
+        intervals: int | None,
+        friction: bool | Friction,
+    ) -> Planner:
+        """Return the planner of an objective and constraints; each is made once."""
         from dhkit.planning import Objective
         from dhkit.planning.request import checked_constraints
 
-        constraints = checked_constraints(constraints)
-        key = (Objective.of(objective), constraints, intervals, friction)
-        planner = self._planners.get(key)
-        if planner is None:
-            planner = self._planners.setdefault(key, self.planner(key[0], None, constraints, intervals, friction))
-        return planner.solve(
-            start,
-            goal,
-            via=via,
-            coordinates=coordinates,
-            duration=duration,
-            start_velocity=start_velocity,
-            goal_velocity=goal_velocity,
-            limits=limits,
-            payload=payload,
-            obstacles=obstacles,
-            clearance=clearance,
-            self_collision=self_collision,
-            warm=warm,
-            max_iterations=max_iterations,
-            time_limit=time_limit,
-            progress=progress,
-            compare=compare,
-        )
+        key = (Objective.of(objective), checked_constraints(constraints), intervals, friction)
+        if key not in self._planners:
+            self._planners.setdefault(key, self.planner(key[0], None, *key[1:]))
+        return self._planners[key]
 
     @cached_property
     def _planners(self) -> dict[object, Planner]:
@@ -878,18 +785,11 @@ class Arm:
         path: JointPath,
         objective: ObjectiveLike = "time",
         *,
-        duration: float | None = None,
-        limits: Limits | None = None,
         constraints: Constraint | Sequence[Constraint] = (),
         intervals: int = 200,
-        max_iterations: int = 1000,
-        time_limit: float | None = None,
-        progress: ProgressCall | None = None,
-        payload: Payload | None = None,
         friction: bool | Friction = False,
-        obstacles: Scene = (),
-        clearance: float = 0.01,
-        self_collision: bool = False,
+        options: PathOptions | None = None,
+        **keywords: Unpack[PathKeywords],
     ) -> Trajectory:
         """Return the best timing of a given path; see :func:`dhkit.planning.along_path`."""
         from dhkit.planning import along_path
@@ -898,18 +798,11 @@ class Arm:
             self._description,
             path,
             objective=objective,
-            duration=duration,
-            limits=limits,
             constraints=constraints,
             intervals=intervals,
-            max_iterations=max_iterations,
-            time_limit=time_limit,
-            progress=progress,
-            payload=payload,
             friction=friction,
-            obstacles=obstacles,
-            clearance=clearance,
-            self_collision=self_collision,
+            options=options,
+            **keywords,
         )
 
     def certify(
@@ -1080,10 +973,3 @@ class Arm:
 
     def _repr_html_(self) -> str:
         return self._description._repr_html_()
-
-
-def _listed(pushes: Sequence[Push]) -> tuple[Push, ...]:
-    """Return pushes as a tuple, also for a single push."""
-    from dhkit.control import Push
-
-    return (pushes,) if isinstance(pushes, Push) else tuple(pushes)

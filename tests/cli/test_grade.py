@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 
 from dhkit.cli import grade
-from dhkit.cli.grade_output import check_output
+from dhkit.cli.grade_output import Delivery
 from dhkit.errors import AnswerError
 from dhkit.grading.report import Entry, GradeReport, Verdict
 from dhkit.grading.rubric import Credit, Rubric
@@ -41,8 +41,10 @@ def folder(tmp_path, monkeypatch):
 def dhkit(capsys):
     """Grade; return the status, stdout and stderr."""
 
-    def run(*sheets, rubric=None, **options):
-        status = grade.run(sheets, judge=judge, rubric=rubric or Rubric(), **options)
+    def run(*sheets, rubric=None, jobs=None, seconds=60.0, **delivery):
+        if delivery.pop("json", False):
+            delivery["form"] = "json"
+        status = grade.run(sheets, judge, rubric or Rubric(), Delivery(**delivery), jobs=jobs, seconds=seconds)
         return status, *capsys.readouterr()
 
     return run
@@ -125,7 +127,7 @@ def test_an_output_folder(dhkit, folder, tmp_path):
 def test_marking_again_without_judging(dhkit, folder, tmp_path, capsys):
     dhkit(folder, output=tmp_path / "out", feedback="verdict")
     kinder = Rubric(points=10, credit=Credit(mistakes={"gravity_sign": 1}, follow_on=1))
-    assert grade.mark_again([tmp_path / "out"], kinder, json=True) == 2
+    assert grade.mark_again([tmp_path / "out"], kinder, Delivery("json")) == 2
     ada, bob, cleo = map(json.loads, capsys.readouterr().out.splitlines())
     assert (ada["points"], bob["points"], cleo["points"]) == (10, 10, 0)
     assert ada["verdict"] == "wrong"
@@ -196,9 +198,9 @@ def test_a_sheet_alone_may_bring_its_rubric(tmp_path, capsys):
 
 def test_an_output_that_cannot_be_meant_is_refused_before_anything_is_judged(tmp_path):
     (tmp_path / "report").write_text("")
-    check_output(tmp_path, "text", several=True)
-    check_output(tmp_path / "report.html", "html", several=True)
-    check_output(tmp_path / "report.txt", "text", several=False)
+    Delivery(output=tmp_path).check(several=True)
+    Delivery("html", output=tmp_path / "report.html").check(several=True)
+    Delivery(output=tmp_path / "report.txt").check(several=False)
     for name, form, several in (("report", "text", True), ("a.txt", "text", True), ("ada.tex", "html", False)):
         with pytest.raises(AnswerError, match="expected"):
-            check_output(tmp_path / name, form, several)
+            Delivery(form, output=tmp_path / name).check(several)

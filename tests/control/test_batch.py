@@ -34,7 +34,7 @@ def same_as_alone(arm, law, controller, reference, q, qd, singles=None, friction
     """Compare a batch with its runs one by one."""
     plant = options.get("plant")
     batch = arm.simulate_batch(
-        controller, reference, 0.05, q, qd, 1000.0, plant, PLANT_RATE, keep="all", friction=friction or None
+        controller, reference, 0.05, q, qd, plant=plant, plant_rate=PLANT_RATE, keep="all", friction=friction or None
     )
     for i in range(len(batch)):
         alone = (singles or [controller] * len(batch))[i]

@@ -7,13 +7,13 @@ import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, cast, get_args
+from typing import Annotated, Any
 
 import typer
 
 from dhkit.arm import Arm
 from dhkit.cli.exit_status import ExitStatus
-from dhkit.cli.grade_output import FORMS, Graded, check_output, deliver
+from dhkit.cli.grade_output import Delivery
 from dhkit.cli.isolating import Isolated, isolation_for
 from dhkit.cli.options import Json, read_arm
 from dhkit.cli.output import say
@@ -25,14 +25,15 @@ from dhkit.grading.answers.sheet import read_sheet, read_task
 from dhkit.grading.batch import GIGABYTE, Judge, grade_all
 from dhkit.grading.entry_points import prepare, robot_of
 from dhkit.grading.explanation import explanation_html, explanation_text
-from dhkit.grading.marks import marks
+from dhkit.grading.options import GradeOptions
 from dhkit.grading.report import GradeReport, Verdict
 from dhkit.grading.reports import read_reports
-from dhkit.grading.rubric import Feedback, Rubric
+from dhkit.grading.rubric import Rubric
 from dhkit.grading.schema import template as empty_sheet
 from dhkit.grading.sheets import find_sheets
 
 app = typer.Typer(rich_markup_mode=None)
+PRINTED = Delivery()
 
 
 @app.command()
@@ -84,11 +85,21 @@ def grade(
         return _write_explanation(read_arm(explain), form, output)
     if not sheets:
         raise DescriptionError("no answer sheet; expected files or folders, --template NAME or --explain NAME")
-    options: dict[str, Any] = {"form": form, "feedback": feedback, "output": output, "json": json}
+    delivery = Delivery("json" if json else form, feedback, output, read)
     if remark:
-        return mark_again(sheets, rubric_of(rubric), **options)
-    options |= {"execute": execute, "isolated": isolated}
-    return grade_files(sheets, robot, rubric, task, seed, jobs=jobs, seconds=seconds, read=read, **options)
+        return mark_again(sheets, rubric_of(rubric), delivery)
+    return grade_files(
+        sheets,
+        robot,
+        rubric,
+        task,
+        seed,
+        delivery,
+        execute=execute,
+        isolated=isolated,
+        jobs=jobs,
+        seconds=seconds,
+    )
 
 
 def rubric_of(path: Path | None) -> Rubric:
@@ -122,12 +133,14 @@ def grade_files(
     rubric: Path | None,
     task: Path | None = None,
     seed: int | None = None,
+    delivery: Delivery = PRINTED,
     *,
     execute: bool = False,
     isolated: bool = False,
-    **options: Any,
+    jobs: int | None = None,
+    seconds: float = 60.0,
 ) -> ExitStatus:
-    """Judge sheets about their own robots, or all about one robot; see :func:`run` for the options.
+    """Judge sheets about their own robots, or all about one robot.
 
     Parameters
     ----------
@@ -145,6 +158,8 @@ def grade_files(
         Whether programs are executed: those of several sheets, which are other people's, only isolated.
     isolated
         Whether a single program too is executed only where it can be isolated.
+    delivery, jobs, seconds
+        As in :func:`run`.
 
     Raises
     ------
@@ -173,15 +188,16 @@ def grade_files(
         packages = read.task.packages if read is not None else ()
         name = sheets[0].name if not are_several else "the sheets' programs"
         isolation = isolation_for(name, isolated or are_several, [*own_files, *sheets], packages)
+    options = GradeOptions(task=read, seed=seed, execute=isolation is not None, isolation=isolation)
     return run(
         sheets,
-        judge=lambda path: judge_sheet(
-            path, about, chosen, task=read, seed=seed, execute=isolation is not None, isolation=isolation
-        ),
-        rubric=chosen,
+        lambda path: judge_sheet(path, about, chosen, options=options),
+        chosen,
+        delivery,
         exclude=own_files,
         prepare=lambda report: prepare(about, report),
-        **options,
+        jobs=jobs,
+        seconds=seconds,
     )
 
 
@@ -193,15 +209,11 @@ def _rubric_from(data: Mapping[str, Any], path: Path | None) -> Rubric:
 
 def run(
     sheets: Sequence[Path],
-    *,
     judge: Judge,
     rubric: Rubric,
-    form: str = "text",
-    feedback: str | None = None,
+    delivery: Delivery = PRINTED,
+    *,
     jobs: int | None = None,
-    output: Path | None = None,
-    json: bool = False,
-    read: bool = False,
     seconds: float = 60.0,
     memory: int = 2 * GIGABYTE,
     exclude: Collection[Path] = (),
@@ -219,17 +231,8 @@ def run(
         Number of processes at a time; by default one for each core.
     rubric
         The rubric of all sheets.
-    form
-        text, json, gradescope, junit or html.
-    feedback
-        full, hint or verdict; by default the rubric's.
-    output
-        A file; for several sheets as text a folder, in which ``students`` has the pages for students, with the
-        feedback, and everything else is for the teacher, without omissions.
-    json
-        As ``form="json"``.
-    read
-        Whether reports as text show how each entry was read.
+    delivery
+        Form and place of the reports.
     exclude
         Files in the folders that are no sheets.
 
@@ -240,8 +243,7 @@ def run(
     """
     paths = find_sheets(sheets, exclude)
     several = len(paths) > 1 or any(path.is_dir() for path in sheets)
-    form, level = _form("json" if json else form, several), _level(feedback, rubric)
-    check_output(output, form, several)
+    delivery.check(several)
     with _progress(len(paths)) as progress:
         judged = grade_all(
             paths,
@@ -253,19 +255,11 @@ def run(
             progress=progress,
         )
         reports = list(judged)
-    deliver([Graded(report, marks(report, rubric)) for report in reports], form, level, output, several, read)
+    delivery(reports, rubric, several)
     return _status(reports)
 
 
-def mark_again(
-    files: Sequence[Path],
-    rubric: Rubric,
-    *,
-    form: str = "text",
-    feedback: str | None = None,
-    output: Path | None = None,
-    json: bool = False,
-) -> ExitStatus:
+def mark_again(files: Sequence[Path], rubric: Rubric, delivery: Delivery = PRINTED) -> ExitStatus:
     """Mark earlier reports again, without judging, and deliver them as :func:`run` does.
 
     Parameters
@@ -281,10 +275,9 @@ def mark_again(
     reports = [report for path in _records(files) for report in read_reports(path)]
     if not reports:
         raise AnswerError(f"{', '.join(map(str, files))}: no reports")
-    form, level = _form("json" if json else form, len(reports) > 1), _level(feedback, rubric)
-    check_output(output, form, len(reports) > 1)
-    graded = [Graded(report, marks(report, rubric)) for report in reports]
-    deliver(graded, form, level, output, len(reports) > 1)
+    several = len(reports) > 1
+    delivery.check(several)
+    delivery(reports, rubric, several)
     return _status(reports)
 
 
@@ -292,21 +285,6 @@ def _records(files: Sequence[Path]) -> Iterator[Path]:
     for path in files:
         folder = path / "records" if (path / "records").is_dir() else path
         yield from sorted(folder.glob("*.json")) if folder.is_dir() else [path]
-
-
-def _form(form: str, several: bool) -> str:
-    if form not in FORMS:
-        raise AnswerError(f"--format: found {form!r}; expected {', '.join(FORMS)}")
-    if form == "gradescope" and several:
-        raise AnswerError("--format gradescope: found several sheets; expected one, which is what Gradescope hands in")
-    return form
-
-
-def _level(feedback: str | None, rubric: Rubric) -> Feedback:
-    for level in get_args(Feedback):
-        if level == (feedback or rubric.feedback):
-            return cast(Feedback, level)
-    raise AnswerError(f"--feedback: found {feedback!r}; expected {', '.join(get_args(Feedback))}")
 
 
 def _status(reports: Sequence[GradeReport]) -> ExitStatus:

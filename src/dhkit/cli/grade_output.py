@@ -9,6 +9,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import cast, get_args
 
 from rich.console import Console
 
@@ -17,7 +18,7 @@ from dhkit.description import write_atomically
 from dhkit.description.files import check_place
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.sources import SHEET_SUFFIXES
-from dhkit.grading.marks import Marks
+from dhkit.grading.marks import Marks, marks
 from dhkit.grading.report import GradeReport
 from dhkit.grading.reports import (
     gradescope,
@@ -31,7 +32,7 @@ from dhkit.grading.reports import (
     with_feedback,
 )
 from dhkit.grading.reports.sentences import fault_of
-from dhkit.grading.rubric import Feedback
+from dhkit.grading.rubric import Feedback, Rubric
 
 FORMS = ("text", "json", "gradescope", "junit", "html")
 FILE_WIDTH = 120
@@ -54,45 +55,69 @@ class Graded:
         return replace(self, report=with_feedback(self.report, level), marks=marks)
 
 
-def check_output(output: Path | None, form: str, several: bool) -> None:
-    """Refuse an output that cannot be meant, before anything is judged.
+@dataclass(frozen=True)
+class Delivery:
+    """In which form reports are handed over, and where."""
 
-    Raises
-    ------
-    AnswerError
-        The output would overwrite a sheet, or is a file where a folder is needed.
-    """
-    if output is None or output.is_dir():
-        return
-    if output.suffix.lower() in SHEET_SUFFIXES:
-        raise AnswerError(f"{output}: a report would overwrite an answer sheet; expected another name")
-    if _is_folder(output, form, several):
-        if output.exists() or output.suffix:
-            raise AnswerError(f"{output}: found a file's name; expected a folder for the reports of several sheets")
-    else:
-        try:
-            check_place(output)
-        except DescriptionError as error:
-            raise AnswerError(str(error)) from None
+    form: str = "text"
+    """text, json, gradescope, junit or html."""
+    feedback: str | None = None
+    """full, hint or verdict; by default the rubric's."""
+    output: Path | None = None
+    """A file; for several sheets as text a folder, in which ``students`` has the pages for students, with the
+    feedback, and everything else is for the teacher, without omissions. Printed unless given."""
+    read: bool = False
+    """Whether reports as text show how each entry was read."""
 
+    def check(self, several: bool) -> None:
+        """Refuse what cannot be meant, before anything is judged.
 
-def deliver(
-    graded: Sequence[Graded], form: str, level: Feedback, output: Path | None, several: bool, read: bool = False
-) -> None:
-    """Print reports, or write them; reports in a folder are printed as well."""
-    shown = [one.with_feedback(level) for one in graded]
-    if output is not None and _is_folder(output, form, several):
-        _write_folder(graded, shown, output)
-    elif output is not None:
-        write_atomically(output, _document(shown, form, level, several))
-    if form == "json" and (output is None or output.is_dir()):
-        sys.stdout.write(_document(shown, form, level, several))
-    elif form == "text":
-        _print(shown, several, read)
-    elif output is None:
-        sys.stdout.write(_document(shown, form, level, several))
-    if output is not None and form != "json":
-        say(f"wrote {output}")
+        Raises
+        ------
+        AnswerError
+            No such form or feedback; a form for one sheet; an output that would overwrite a sheet, or that is a file
+            where a folder is needed.
+        """
+        if self.form not in FORMS:
+            raise AnswerError(f"--format: found {self.form!r}; expected {', '.join(FORMS)}")
+        if self.feedback is not None and self.feedback not in get_args(Feedback):
+            raise AnswerError(f"--feedback: found {self.feedback!r}; expected {', '.join(get_args(Feedback))}")
+        if self.form == "gradescope" and several:
+            raise AnswerError(
+                "--format gradescope: found several sheets; expected one, which is what Gradescope hands in"
+            )
+        output = self.output
+        if output is None or output.is_dir():
+            return
+        if output.suffix.lower() in SHEET_SUFFIXES:
+            raise AnswerError(f"{output}: a report would overwrite an answer sheet; expected another name")
+        if _is_folder(output, self.form, several):
+            if output.exists() or output.suffix:
+                raise AnswerError(f"{output}: found a file's name; expected a folder for the reports of several sheets")
+        else:
+            try:
+                check_place(output)
+            except DescriptionError as error:
+                raise AnswerError(str(error)) from None
+
+    def __call__(self, reports: Sequence[GradeReport], rubric: Rubric, several: bool) -> None:
+        """Mark reports, and print or write them; reports in a folder are printed as well."""
+        graded = [Graded(report, marks(report, rubric)) for report in reports]
+        level = cast("Feedback", self.feedback or rubric.feedback)
+        form, output = self.form, self.output
+        shown = [one.with_feedback(level) for one in graded]
+        if output is not None and _is_folder(output, form, several):
+            _write_folder(graded, shown, output)
+        elif output is not None:
+            write_atomically(output, _document(shown, form, level, several))
+        if form == "json" and (output is None or output.is_dir()):
+            sys.stdout.write(_document(shown, form, level, several))
+        elif form == "text":
+            _print(shown, several, self.read)
+        elif output is None:
+            sys.stdout.write(_document(shown, form, level, several))
+        if output is not None and form != "json":
+            say(f"wrote {output}")
 
 
 def _is_folder(output: Path, form: str, several: bool) -> bool:

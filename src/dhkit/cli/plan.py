@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -27,10 +27,11 @@ from dhkit.cli.progress import ProgressBar
 from dhkit.cli.units import joint_entry
 from dhkit.description import Array
 from dhkit.errors import DescriptionError, PlanningError
-from dhkit.planning import PlanReport, Progress, ToolSpeed
+from dhkit.planning import PlanOptions, PlanReport, Progress, ToolSpeed
+from dhkit.planning.along.path_motion import DEFAULT_INTERVALS as PATH_INTERVALS
 from dhkit.planning.program import MAX_ITERATIONS
 from dhkit.planning.report import more_text, seconds_text
-from dhkit.trajectories import Limits, Trajectory, joint_path, tool_line
+from dhkit.trajectories import JointPath, Limits, Trajectory, joint_path, tool_line
 from dhkit.trajectories.archives import ARCHIVES
 from dhkit.trajectories.files import TABLES
 
@@ -155,23 +156,23 @@ def plan(
         goal = target(arm, **pose, euler=euler, order=order, degrees=degrees)
     else:
         goal = option_values(arm, to, "--to", degrees)
-    between: dict[str, Any] = {"via": [option_values(arm, place, "--via", degrees) for place in via or ()]}
     given = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk, "torque": torque}
     limits, sought = joint_limits(arm, given, degrees, speed), parse_objective(wanted)
-    options: dict[str, Any] = {
-        "objective": sought,
-        "constraints": () if tool_speed is None else (ToolSpeed(tool_speed),),
-        "duration": duration,
-        "limits": limits,
-        "payload": parse_payload(load),
-        "max_iterations": max_iterations,
-        "time_limit": time_limit,
-    }
-    if intervals is not None:
-        options["intervals"] = intervals
+    constraints = () if tool_speed is None else (ToolSpeed(tool_speed),)
     scene = obstacles(box or (), sphere or (), floor)
-    counted = None if coordinates is None else tuple(name.strip() for name in coordinates.split(","))
-    between |= {"coordinates": counted, "obstacles": scene, "clearance": clearance, "self_collision": self_collision}
+    options = PlanOptions(
+        via=tuple(option_values(arm, place, "--via", degrees) for place in via or ()),
+        coordinates=None if coordinates is None else tuple(name.strip() for name in coordinates.split(",")),
+        duration=duration,
+        limits=limits,
+        payload=parse_payload(load),
+        obstacles=scene,
+        clearance=clearance,
+        self_collision=self_collision,
+        max_iterations=max_iterations,
+        time_limit=time_limit,
+        compare=not line,
+    )
     files = MotionFiles(output, html, figure)
     files.check(SUFFIXES)
     try:
@@ -181,10 +182,13 @@ def plan(
                 state = f"iteration {now.iteration}: {now.duration:.4f} s, limits missed by {now.infeasibility:.1e}"
                 bar.show(now.spent, 1.0, f"{state}; {100 * now.spent:.0f} % of the search's limit")
 
+            options = replace(options, progress=report)
             if line:
-                motion = _plan_along_line(arm, begin_q, goal, between, progress=report, **options)
+                path = _line(arm, begin_q, goal, options)
+                fineness = PATH_INTERVALS if intervals is None else intervals
+                motion = arm.plan_path(path, sought, constraints=constraints, intervals=fineness, options=options)
             else:
-                motion = arm.plan(begin_q, goal, progress=report, **between, **options)
+                motion = arm.plan(begin_q, goal, sought, constraints=constraints, intervals=intervals, options=options)
     except PlanningError as error:
         if json:
             print_json({"robot": arm.name, "found": False, "reason": str(error), "files": []})
@@ -206,8 +210,8 @@ def plan(
     return ExitStatus.FINE
 
 
-def _plan_along_line(arm: Arm, start: Array, goal: Array, between: Mapping[str, Any], **options: Any) -> Trajectory:
-    """Return the best motion with the tool on a straight line.
+def _line(arm: Arm, start: Array, goal: Array, options: PlanOptions) -> JointPath:
+    """Return the path whose tool moves along a straight line.
 
     Parameters
     ----------
@@ -217,26 +221,22 @@ def _plan_along_line(arm: Arm, start: Array, goal: Array, between: Mapping[str, 
         Joint values, shape (n,), rad and m.
     goal
         Joint values, shape (n,), rad and m, or a pose of the tool, shape (4, 4), m, world.
-    between
-        Options of motions between configurations, which must not be given.
-    **options
-        Options of :meth:`dhkit.Arm.plan_path`.
+    options
+        Options of the motion along it.
 
     Raises
     ------
     DescriptionError
         An option that such motions do not have is given.
     PlanningError
-        There is no such motion.
+        There is no such path.
     """
-    if between["via"]:
+    if options.via:
         raise DescriptionError("--line: found --via too; expected a motion straight from start to goal, without")
-    if between["coordinates"] is not None:
+    if options.coordinates is not None:
         raise DescriptionError("--line: found --coordinates too; expected a line, on which all coordinates count")
-    around = {name: value for name, value in between.items() if name not in ("via", "coordinates")}
     T_goal = goal if goal.shape == (4, 4) else arm.fk(goal)
-    path = joint_path(arm.description, tool_line(arm.fk(start), T_goal), start, options["limits"])
-    return arm.plan_path(path, **around, **options)
+    return joint_path(arm.description, tool_line(arm.fk(start), T_goal), start, options.limits)
 
 
 def _caption(report: PlanReport) -> str:

@@ -26,10 +26,9 @@ from dhkit.cli.output import (
     write_figure,
 )
 from dhkit.cli.progress import ProgressBar
-from dhkit.cli.simulation_settings import chosen_motion, known_and_moving_arm, plant_options, tuned_controller
+from dhkit.cli.simulation_settings import chosen_motion, known_and_moving_arm, simulation_options, tuned_controller
 from dhkit.cli.units import joint_entry
-from dhkit.control import CONTROLLERS, Plant, Sensors, SimulationResult, compare as compare_controllers
-from dhkit.dynamics import Friction
+from dhkit.control import CONTROLLERS, Sensors, SimulationResult, compare as compare_controllers
 from dhkit.errors import SimulationError
 from dhkit.trajectories import Trajectory
 
@@ -147,7 +146,8 @@ def simulate(
     sensors = Sensors(noise=noise, resolution=resolution) if noise or resolution else None
     trajectory, text = chosen_motion(bare, motion, start, to, duration, degrees, columns)
     arm, plant = known_and_moving_arm(bare, payload(load) or trajectory.payload, unmodelled)
-    options = plant_options(plant_rate, friction, restitution, no_stops, push or ())
+    stops = None if no_stops else restitution
+    options = simulation_options(plant, None if continuous else rate, plant_rate, friction, stops, push or ())
     files = MotionFiles(output, html, figure)
     files.check(SUFFIXES)
     tuned = tuned_controller(controller, arm, trajectory, bandwidth, damping, compensate)
@@ -155,15 +155,7 @@ def simulate(
     failure, result = "", None
     try:
         with ProgressBar("simulating") as bar:
-            result = arm.simulate(
-                tuned,
-                trajectory,
-                plant=plant,
-                rate=None if continuous else rate,
-                sensors=sensors,
-                progress=bar.show,
-                **options,
-            )
+            result = arm.simulate(tuned, trajectory, options=options, sensors=sensors, progress=bar.show)
     except SimulationError as error:
         failure, result = str(error), error.result
     seconds = time.perf_counter() - begin
@@ -278,7 +270,7 @@ def compare(
     bare = load_arm(robot, uniform)
     trajectory, text = chosen_motion(bare, motion, start, to, duration, degrees, columns)
     arm, plant = known_and_moving_arm(bare, payload(load) or trajectory.payload, unmodelled)
-    options = plant_options(plant_rate, friction, restitution, no_stops, push or ())
+    options = simulation_options(plant, rate, plant_rate, friction, None if no_stops else restitution, push or ())
     about = f"{_about(text, trajectory, arm, plant)}, {rate:g} Hz"
     check_outputs(((figure, FIGURES),))
     names = [name.strip() for name in controllers.split(",")] if controllers else list(CONTROLLERS)
@@ -290,14 +282,7 @@ def compare(
             bandwidth,
             damping,
             lambda name: bar.show(names.index(name) + 1, len(names), f"simulated {name}"),
-            plant=Plant(
-                plant.description,
-                Friction.chosen(options["friction"]),
-                options["restitution"],
-                tuple(options["pushes"]),
-            ),
-            rate=rate,
-            plant_rate=plant_rate,
+            options=options,
         )
     if figure is not None and comparison.results:
         from dhkit.viewer import plot_comparison

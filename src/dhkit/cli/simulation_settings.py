@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.cli.arguments import columns, numbers, option_values, split_at
 from dhkit.cli.demo_motions import moved_configurations
-from dhkit.control import CONTROLLERS, Controller, FrictionCompensation, Push, make_controller
+from dhkit.control import CONTROLLERS, Controller, FrictionCompensation, Push, SimulationOptions, make_controller
 from dhkit.description import Array, Payload
 from dhkit.description.joint_text import joint_text
 from dhkit.dynamics import Friction
@@ -146,13 +145,20 @@ def pushes(texts: Sequence[str]) -> list[Push]:
     return parsed
 
 
-def plant_options(
-    plant_rate: float | None, friction: str, restitution: float, no_stops: bool, push: Sequence[str]
-) -> dict[str, Any]:
-    """Return the options of :meth:`dhkit.Arm.simulate` about the plant: its steps, friction, stops and pushes."""
-    return {
-        "plant_rate": plant_rate,
-        "friction": _friction_of(friction),
-        "restitution": None if no_stops else restitution,
-        "pushes": pushes(push),
-    }
+def simulation_options(
+    plant: Arm,
+    rate: float | None,
+    plant_rate: float | None,
+    friction: str,
+    restitution: float | None,
+    push: Sequence[str],
+) -> SimulationOptions:
+    """Return the options of a simulation; texts are those of `--friction` and `--push`."""
+    return SimulationOptions(
+        plant=plant,
+        rate=rate,
+        plant_rate=plant_rate,
+        friction=_friction_of(friction),
+        restitution=restitution,
+        pushes=pushes(push),
+    )

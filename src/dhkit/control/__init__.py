@@ -9,6 +9,7 @@ from dhkit.control.joint_controllers import PID
 from dhkit.control.linear import LQR, linearize
 from dhkit.control.model_controllers import ComputedTorque, FeedForward, FrictionCompensation, PDGravity
 from dhkit.control.operational_space import OperationalSpace
+from dhkit.control.options import BatchOptions, SimulationOptions
 from dhkit.control.plant import Plant
 from dhkit.control.pushes import Push
 from dhkit.control.references import Held, Reference, Setpoint, Sine, Step
@@ -23,6 +24,7 @@ __all__ = [
     "LQR",
     "PID",
     "Adaptive",
+    "BatchOptions",
     "BatchResult",
     "Comparison",
     "ComputedTorque",
@@ -40,6 +42,7 @@ __all__ = [
     "Reference",
     "Sensors",
     "Setpoint",
+    "SimulationOptions",
     "SimulationResult",
     "Sine",
     "Step",

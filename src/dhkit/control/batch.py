@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,18 +11,15 @@ from dhkit.control.batch_result import BatchResult, History
 from dhkit.control.batch_run import BatchRun, Record, closed_step
 from dhkit.control.controller import Controller, require_fits, reset
 from dhkit.control.law import law_of
+from dhkit.control.options import BatchKeywords, BatchOptions
 from dhkit.control.plant import Plant
 from dhkit.control.references import Reference, reference_of
-from dhkit.control.runs import Progress
-from dhkit.control.sensors import Sensors
 from dhkit.control.step_kernel import StepKernel
 from dhkit.control.timing import require_positive, row_times, sampled_reference, steps_a_period, substeps
-from dhkit.description import Array, Description, Robot, description_of, joint_array, takes_robot
+from dhkit.description import Array, Description, joint_array, takes_robot
 from dhkit.dynamics import Friction
-from dhkit.kernels import check_whole
 from dhkit.trajectories import Trajectory
 
-KEEP = ("final", "errors", "all")
 MAX_STORED_BYTES = 4_000_000_000
 """Largest size of the states that a batch stores with ``keep="all"``, bytes."""
 
@@ -35,20 +32,13 @@ def simulate_batch(
     duration: float | None = None,
     q0: ArrayLike | None = None,
     qd0: ArrayLike | None = None,
-    rate: float = 1000.0,
-    arms: Sequence[Robot] = (),
-    plant_rate: float | None = None,
     *,
-    friction: bool | Friction | None = None,
-    keep: str = "errors",
-    sensors: Sensors | None = None,
-    saturation: bool = True,
-    threads: int = 1,
-    progress: Progress | None = None,
+    options: BatchOptions | None = None,
+    **keywords: Unpack[BatchKeywords],
 ) -> BatchResult:
     """Return how a batch of arms moves under a controller that is called for all of them at once.
 
-    The size B of the batch is that of ``q0``, ``qd0``, ``arms``, ``reference`` or the gains, which broadcast. All arms
+    The size B of the batch is that of ``q0``, ``qd0``, ``plant``, ``reference`` or the gains, which broadcast. All arms
     take the same steps of the classical Runge-Kutta method, as :func:`simulate` does. There are no joint stops, no
     pushes and no stiction: dry friction has to be smooth.
 
@@ -64,19 +54,11 @@ def simulate_batch(
         As for :func:`simulate`, one for all; or joint values (B, n) to hold. None holds ``q0``.
     q0, qd0
         Joint values and rates at the start, shape (n,) or (B, n), rad, m and per second.
-    arms
-        The arms that move: one for all runs, or one for each run (payloads, parameters); the robot unless given.
-    duration, rate, plant_rate, sensors, saturation
+    duration
         As for :func:`simulate`.
-    friction
-        Friction model of all arms, of a width above 0 (smooth); None or False for none.
-    keep
-        What is stored. ``"final"``: the last states; ``"errors"``: norms of the errors as well; ``"all"``: all
-        states as well, at most 4 GB.
-    threads
-        Number of threads that share a large batch.
-    progress
-        Called after every thousand steps; an exception in it ends the run.
+    options, **keywords
+        Fields of :class:`BatchOptions`, as one value or one by one: ``plant``, ``friction``, ``rate``, ``plant_rate``,
+        ``keep``, ``sensors``, ``saturation``, ``threads``, ``progress``.
 
     Raises
     ------
@@ -87,23 +69,14 @@ def simulate_batch(
     ValueError, TypeError
         An argument that does not fit: says which, and what is expected.
     """
-    if keep not in KEEP:
-        raise ValueError(f"keep is {keep!r}; expected one of {', '.join(KEEP)}")
-    friction = Friction.chosen(friction)
-    if friction is not None and friction.width == 0:
-        raise ValueError("a batch has no stiction; expected friction that is smooth, such as Friction(0.01)")
+    chosen = BatchOptions.of(options, keywords)
+    friction, rate, keep, sensors = Friction.chosen(chosen.friction), chosen.rate, chosen.keep, chosen.sensors
     if not getattr(controller, "batches", True):
         name = type(controller).__name__
         raise ValueError(f"{name} controls one arm at a time; expected another controller, or runs one by one")
     require_fits(controller, description)
-    if rate is None:
-        raise ValueError("rate is None; expected Hz: a batch is sampled")
-    require_positive(rate=rate, plant_rate=plant_rate, duration=duration)
-    check_whole("threads", threads, 1)
-    moving = tuple(map(description_of, arms)) or (description,)
-    for arm in moving:
-        if arm.kinds != description.kinds:
-            raise ValueError(f"a plant has joints {arm.kinds}; expected {description.kinds}")
+    require_positive(duration=duration)
+    moving = chosen.moving(description)
     n = description.n
     if isinstance(reference, Trajectory | Reference):
         followed = reference_of(description, reference)
@@ -124,13 +97,13 @@ def simulate_batch(
     if keep == "all" and (needed := 4 * 8 * size * len(t) * n) > MAX_STORED_BYTES:
         raise ValueError(f"all states are {needed / 1e9:.3g} GB; expected at most {MAX_STORED_BYTES / 1e9:g} GB")
     stiffness = max(Plant(arm, friction, None).stiffness for arm in {id(arm): arm for arm in moving}.values())
-    steps = substeps(stiffness, 1 / rate, steps_a_period(rate, plant_rate, len(t)))
+    steps = substeps(stiffness, 1 / rate, steps_a_period(rate, chosen.plant_rate, len(t)))
     effort = np.stack([arm.numbers.effort for arm in moving])
     if len(setpoints[0]) == 1:
         setpoints = _rows(setpoints[0][0], size)[None], np.zeros((1, size, n)), np.zeros((1, size, n))
     for array in setpoints:
         array.flags.writeable = False
-    effort_limits = effort if saturation else np.full((1, n), np.inf)
+    effort_limits = effort if chosen.saturation else np.full((1, n), np.inf)
     law = law_of(controller) if sensors is None else None
     run = BatchRun(
         description=description,
@@ -148,7 +121,7 @@ def simulate_batch(
     )
     record = Record.empty(_rows(q, size), _rows(qd, size), len(t) if keep == "all" else 0)
     reset(controller)
-    run(record, threads, progress)
+    run(record, chosen.threads, chosen.progress)
     return _result(run, record, moving, friction, keep)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,10 +15,9 @@ from dhkit.control.joint_controllers import PID
 from dhkit.control.linear import LQR
 from dhkit.control.model_controllers import ComputedTorque, FeedForward, PDGravity
 from dhkit.control.operational_space import OperationalSpace
-from dhkit.control.plant import Plant
+from dhkit.control.options import SimulationKeywords, SimulationOptions
 from dhkit.control.references import Reference, reference_of
 from dhkit.control.result import SimulationResult
-from dhkit.control.sensors import Sensors
 from dhkit.control.simulation import simulate
 from dhkit.description import Array, Description, takes_robot
 from dhkit.description.joint_text import joint_unit
@@ -159,20 +158,16 @@ def _row(result: SimulationResult, degrees: bool) -> tuple[str, ...]:
 def compare(
     description: Description,
     reference: Reference | Trajectory,
-    controllers: Sequence[str] | Mapping[str, str | Controller] = tuple(CONTROLLERS),
+    controllers: Sequence[str] | Mapping[str, str | Controller] | None = None,
     bandwidth: float = 20.0,
     damping: float = 1.0,
     done: Callable[[str], None] | None = None,
     *,
-    plant: Plant | None = None,
     duration: float | None = None,
     q0: ArrayLike | None = None,
     qd0: ArrayLike | None = None,
-    rate: float | None = 1000.0,
-    plant_rate: float | None = None,
-    sensors: Sensors | None = None,
-    saturation: bool = True,
-    tolerance: float = 1e-13,
+    options: SimulationOptions | None = None,
+    **keywords: Unpack[SimulationKeywords],
 ) -> Comparison:
     """Simulate several controllers on one motion, each starting on it.
 
@@ -183,15 +178,13 @@ def compare(
     reference
         The motion.
     controllers
-        Names from ``CONTROLLERS``, tuned alike; or a mapping of names of your own to controllers or such names:
-        ``{"mine": my_controller, "pid": "pid"}``.
+        Names from ``CONTROLLERS``, tuned alike, all of them unless given; or a mapping of names of your own to
+        controllers or such names: ``{"mine": my_controller, "pid": "pid"}``.
     bandwidth, damping
         As for :func:`make_controller`, for controllers given by name.
     done
         Called with each controller's name when its run ends.
-    plant
-        The arm that moves; the robot unless given.
-    duration, q0, qd0, rate, plant_rate, sensors, saturation, tolerance
+    duration, q0, qd0, options, **keywords
         As for :func:`simulate`.
 
     Raises
@@ -199,7 +192,12 @@ def compare(
     ValueError
         No such controller.
     """
-    chosen: Mapping[str, Any] = controllers if isinstance(controllers, Mapping) else {x: x for x in controllers}
+    checked = SimulationOptions.of(options, keywords)
+    chosen: Mapping[str, Any]
+    if isinstance(controllers, Mapping):
+        chosen = controllers
+    else:
+        chosen = {name: name for name in (CONTROLLERS if controllers is None else controllers)}
     for given in chosen.values():
         if isinstance(given, str):
             _require_known(given)
@@ -208,22 +206,10 @@ def compare(
     results, failures = {}, {}
     for name, given in chosen.items():
         try:
-            named = isinstance(given, str)
-            controller = make_controller(given, description, bandwidth, damping, middle) if named else given
-            results[name] = simulate(
-                description,
-                controller,
-                wanted,
-                duration,
-                q0,
-                qd0,
-                rate,
-                plant,
-                plant_rate,
-                sensors=sensors,
-                saturation=saturation,
-                tolerance=tolerance,
-            )
+            controller: Any = given
+            if isinstance(given, str):
+                controller = make_controller(given, description, bandwidth, damping, middle)
+            results[name] = simulate(description, controller, wanted, duration, q0, qd0, options=checked)
         except DhkitError as error:
             failures[name] = str(error)
         if done is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -79,6 +79,15 @@ Measure = Callable[[State], float]
 """Function of a state that is positive until an event and negative after it."""
 
 
+@dataclass(frozen=True)
+class Event:
+    """Something that may happen to an arm between two times."""
+
+    measure: Measure
+    change: Callable[[State], State]
+    """Returns the state right after it, of the state at its time."""
+
+
 def _first_event(plant: Plant, integrator: Integrator, state: State, later: State, phase: Phase) -> State | None:
     """Return the state right after the first sudden change before ``later``, or None if there is none."""
     if not phase.contact.holds.any() and not _may_have_event(plant, later, phase.contact):
@@ -97,18 +106,18 @@ def _first_event(plant: Plant, integrator: Integrator, state: State, later: Stat
             between = integrator.step(between, phase, t)
         return between
 
-    first: tuple[float, Callable[[State], State]] | None = None
-    for measure, change in _measures(plant, integrator, state, phase):
-        if measure(later) >= 0:
+    times: dict[Event, float] = {}
+    for event in _possible_events(plant, integrator, state, phase):
+        if event.measure(later) >= 0:
             continue
         # A measure may be 0 at the start, as for a joint that has just broken away: it is positive right after.
-        time = state.t if measure(state) < 0 else _crossing(measure, at, state.t, later.t)
-        if first is None or time < first[0]:
-            first = (time, change)
-    if first is None:
+        is_over = event.measure(state) < 0
+        times[event] = state.t if is_over else _crossing(event.measure, at, state.t, later.t)
+    if not times:
         return None
-    time, change = first
-    return change(at(time) if time > state.t else state)
+    first = min(times, key=times.__getitem__)
+    at_event = at(times[first]) if times[first] > state.t else state
+    return first.change(at_event)
 
 
 def _may_have_event(plant: Plant, later: State, contact: Contact) -> bool:
@@ -119,15 +128,24 @@ def _may_have_event(plant: Plant, later: State, contact: Contact) -> bool:
 
 
 def _beyond_between(plant: Plant, state: State, later: State) -> float | None:
-    """Return a time (s) at which a joint that turns back within a step is beyond its stop, or None, by cubics."""
+    """Return a time (s) at which a joint that turns back within a step is beyond its stop, or None.
+
+    In the step of length h a joint is taken for Hermite's cubic of s = (t - t0) / h:
+
+        q(s) = (2 (q0 - q1) + v0 + v1) s^3 + (3 (q1 - q0) - 2 v0 - v1) s^2 + v0 s + q0,    v = h qd.
+    """
     lower, upper = plant.limits
-    turning = (state.qd * later.qd < 0) & (np.isfinite(lower) | np.isfinite(upper))
-    for i in np.flatnonzero(turning):
-        h, q0, q1 = later.t - state.t, state.q[i], later.q[i]
+    h = later.t - state.t
+    turns_back = (state.qd * later.qd < 0) & (np.isfinite(lower) | np.isfinite(upper))
+    for i in np.flatnonzero(turns_back):
+        q0, q1 = state.q[i], later.q[i]
         v0, v1 = h * state.qd[i], h * later.qd[i]
         cubic = np.array([2 * (q0 - q1) + v0 + v1, 3 * (q1 - q0) - 2 * v0 - v1, v0, q0])
+
+        # The joint is farthest where its rate is 0.
         for s in np.roots(np.polyder(cubic)):
-            if np.isreal(s) and 0 < s.real < 1 and not lower[i] <= np.polyval(cubic, s.real) <= upper[i]:
+            is_inside = np.isreal(s) and 0 < s.real < 1
+            if is_inside and not lower[i] <= np.polyval(cubic, s.real) <= upper[i]:
                 return float(state.t + s.real * h)
     return None
 
@@ -145,23 +163,21 @@ def _crossing(measure: Measure, at: Callable[[float], State], begin: float, end:
     return end
 
 
-def _measures(
-    plant: Plant, integrator: Integrator, state: State, phase: Phase
-) -> list[tuple[Measure, Callable[[State], State]]]:
-    """Return the possible events of a contact: each a measure that crosses 0, and the change of state it causes."""
-    found: list[tuple[Measure, Callable[[State], State]]] = []
+def _possible_events(plant: Plant, integrator: Integrator, state: State, phase: Phase) -> list[Event]:
+    """Return the possible events of a contact: joints that come to rest, hit a stop, or break away."""
+    found: list[Event] = []
     contact = phase.contact
     lower, upper = plant.limits
-    for i in range(plant.n):
-        if contact.holds[i]:
-            continue
+    for i in np.flatnonzero(~contact.holds).tolist():
         if plant.has_stiction[i] and contact.directions[i]:
-            found.append((_rate(i, int(contact.directions[i])), partial(_with_joint_at_rest, i)))
+            rate = _rate(i, int(contact.directions[i]))
+            found.append(Event(rate, partial(_with_joint_at_rest, i)))
         for limit, side in ((lower[i], 1.0), (upper[i], -1.0)):
             if np.isfinite(limit):
-                found.append((_room(i, limit, side), partial(_after_impact, plant, i, limit)))
+                found.append(Event(_room(i, limit, side), partial(_after_impact, plant, i, limit)))
     if contact.holds.any():
-        found.append((_margin(plant, integrator, state, phase), lambda s: s))
+        breakaway = _margin(plant, integrator, state, phase)
+        found.append(Event(breakaway, lambda state: state))
     return found
 
 
@@ -176,13 +192,14 @@ def _room(i: int, limit: float, side: float) -> Measure:
 def _margin(plant: Plant, integrator: Integrator, state: State, phase: Phase) -> Measure:
     """Return the measure of breakaway: the distance of the holding torques from their bounds, N m and N."""
     holds = phase.contact.holds
-    least, most = (bound[holds] for bound in plant.holding_bounds(state.q))
+    least, most = plant.holding_bounds(state.q)
 
     def measure(state: State) -> float:
         tau = integrator.torque(state)
-        needed = plant.holding_torques(state.q, state.qd, tau, phase.contact, phase.pushes)[holds]
-        rounding = EXCEEDED * max(1.0, float(np.abs(needed).max()))
-        return float(min((most - needed).min(), (needed - least).min())) + rounding
+        f = plant.holding_torques(state.q, state.qd, tau, phase.contact, phase.pushes)[holds]
+        margin = np.minimum(most[holds] - f, f - least[holds]).min()
+        rounding = EXCEEDED * max(1.0, float(np.abs(f).max()))
+        return float(margin) + rounding
 
     return measure
 
@@ -196,17 +213,23 @@ def _with_joint_at_rest(joint: int, state: State) -> State:
 
 def _after_impact(plant: Plant, joint: int, limit: float, state: State) -> State:
     """Return the state after a joint has hit its stop, and after the impacts of other joints that this causes."""
-    q, qd = state.q.copy(), state.qd
+    qd = state.qd
+    q = state.q.copy()
     q[joint] = limit
     lower, upper = plant.limits
     before = plant.kinetic_energy(q, qd)
+
+    # The fastest joint that moves into its stop is stopped first; its impact may throw others against theirs.
     for _ in range(MAX_EVENTS_PER_STEP):
-        into = ((q <= lower) & (qd < 0)) | ((q >= upper) & (qd > 0))
-        if not into.any():
+        moves_into = ((q <= lower) & (qd < 0)) | ((q >= upper) & (qd > 0))
+        if not moves_into.any():
             break
-        i = int(np.argmax(np.where(into, np.abs(qd), -1.0)))
-        qd = plant.after_impact(q, qd, i, rebounds=abs(qd[i]) * (plant.restitution or 0.0) > SLOWEST_REBOUND)
+        i = int(np.argmax(np.where(moves_into, np.abs(qd), -1.0)))
+        rebound = abs(qd[i]) * (plant.restitution or 0.0)
+        qd = plant.after_impact(q, qd, i, rebounds=rebound > SLOWEST_REBOUND)
+
     # Joints that leave a stop slower than that are at rest there: the contact decides for all together which leave.
-    qd = np.where(((q == lower) | (q == upper)) & (np.abs(qd) < SLOWEST_REBOUND), 0.0, qd)
+    is_at_stop = (q == lower) | (q == upper)
+    qd = np.where(is_at_stop & (np.abs(qd) < SLOWEST_REBOUND), 0.0, qd)
     loss = before - plant.kinetic_energy(q, qd)
     return replace(state, q=q, qd=qd, impact_loss=state.impact_loss + loss)

@@ -95,24 +95,39 @@ class RungeKutta:
 
     def _stages(self, state: State, phase: Phase, end: float) -> State:
         """Return the state at ``end`` from accelerations of the plant under an unchanged contact."""
-        plant, tau, h = self.plant, self.tau, end - state.t
-        q, qd, a1 = state.q, state.qd, phase.qdd
-        q2, v2 = q + h / 2 * qd, qd + h / 2 * a1
-        a2 = plant.constrained_accelerations(q2, v2, tau, phase.contact, phase.pushes)
-        q3, v3 = q + h / 2 * v2, qd + h / 2 * a2
-        a3 = plant.constrained_accelerations(q3, v3, tau, phase.contact, phase.pushes)
-        q4, v4 = q + h * v3, qd + h * a3
-        a4 = plant.constrained_accelerations(q4, v4, tau, phase.contact, phase.pushes)
-        stages = ((q, qd), (q2, v2), (q3, v3), (q4, v4))
-        friction, push = state.friction_work, state.push_work
+        plant, tau = self.plant, self.tau
+        h = end - state.t
+
+        def acceleration(q: Array, v: Array) -> Array:
+            return plant.constrained_accelerations(q, v, tau, phase.contact, phase.pushes)
+
+        # Stages k = 1 ... 4 of the state (q, qd), with rates v_k and accelerations a_k.
+        q1, v1 = state.q, state.qd
+        a1 = phase.qdd
+
+        q2, v2 = q1 + h / 2 * v1, v1 + h / 2 * a1
+        a2 = acceleration(q2, v2)
+
+        q3, v3 = q1 + h / 2 * v2, v1 + h / 2 * a2
+        a3 = acceleration(q3, v3)
+
+        q4, v4 = q1 + h * v3, v1 + h * a3
+        a4 = acceleration(q4, v4)
+
+        q_next = q1 + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
+        qd_next = v1 + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+        _hold(phase, q1, q_next, qd_next)
+
+        # Works are integrals of powers, by the same weights; torques of the drives are constant.
+        drives = state.drive_work + float(tau @ (q_next - q1))
+        friction = state.friction_work
         if plant.friction is not None:
-            friction += h * _weighted([float(v @ plant.resistance(v, phase.contact.directions)) for _, v in stages])
+            powers = [float(v @ plant.resistance(v, phase.contact.directions)) for v in (v1, v2, v3, v4)]
+            friction += h * _weighted(powers)
+        push = state.push_work
         if phase.pushes:
-            push += h * _weighted([float(v @ plant.push_torques(phase.pushes, x)) for x, v in stages])
-        q_next = q + h / 6 * (qd + 2 * v2 + 2 * v3 + v4)
-        qd_next = qd + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
-        _hold(phase, q, q_next, qd_next)
-        drives = state.drive_work + float(tau @ (q_next - q))
+            stages = ((q1, v1), (q2, v2), (q3, v3), (q4, v4))
+            push += h * _weighted([float(v @ plant.push_torques(phase.pushes, q)) for q, v in stages])
         return State(end, q_next, qd_next, state.memory, drives, friction, push, state.impact_loss)
 
 

@@ -117,26 +117,38 @@ class OperationalSpace:
 
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
         """Return the torques, shape (n,), N m and N."""
-        description, units, rank = self.description, self._joint_scale, self._rank
+        description = self.description
+        scale = self._joint_scale
         # Displacements of prismatic joints are divided by the reach as well, so that singular values have no unit.
         J_full = jacobian(description, q)
         J = self._scaled(J_full)
-        M = mass_matrix(description, q) * np.outer(units, units)
-        e = pose_error(forward_kinematics(description, q), setpoint.T)
-        de = setpoint.twist - J_full @ qd
-        acceleration = setpoint.acceleration + self.kd * de + self.kp * e - jacobian_dot(description, q, qd) @ qd
-        a = self._row_scale * acceleration[self._rows]
-        a_0 = setpoint.qdd + self.posture_kd * (setpoint.qd - qd) + self.posture_kp * (setpoint.q - q)
-        a_0 = a_0 / units
+        M = mass_matrix(description, q) * np.outer(scale, scale)
 
+        # Acceleration of the tool: J qdd = a = x_d'' + kd (x_d' - x') + kp (x_d - x) - J' qd.
+        error = pose_error(forward_kinematics(description, q), setpoint.T)
+        error_rate = setpoint.twist - J_full @ qd
+        wanted = setpoint.acceleration + self.kd * error_rate + self.kp * error
+        a = self._row_scale * (wanted - jacobian_dot(description, q, qd) @ qd)[self._rows]
+
+        # Acceleration of the joints where the tool leaves them free.
+        a_0 = setpoint.qdd + self.posture_kd * (setpoint.qd - qd) + self.posture_kp * (setpoint.q - q)
+        a_0 = a_0 / scale
+
+        # With J = U S V^T the inverse of Lambda = (J M^-1 J^T)^-1 is U (S V^T M^-1 V S) U^T. Near a singular direction,
+        # where sigma < threshold, its diagonal is what it would be at the threshold, so that forces stay finite.
+        rank = self._rank
         U, sigma, Vt = np.linalg.svd(J, full_matrices=False)
-        U, sigma, Vt = U[:, :rank], sigma[:rank], Vt[:rank]
+        U = U[:, :rank]
+        sigma = sigma[:rank]
+        Vt = Vt[:rank]
         mobility = Vt @ np.linalg.solve(M, Vt.T)
-        inverse = sigma[:, None] * mobility * sigma
-        inverse[np.diag_indices(rank)] += np.maximum(self.threshold**2 - sigma**2, 0.0) * np.diagonal(mobility)
-        # J^T Lambda (a - J a_0) + M a_0 equals J^T Lambda a + N^T M a_0.
-        force = np.linalg.solve(inverse, U.T @ a - sigma * (Vt @ a_0))
-        tau: Array = (Vt.T @ (sigma * force) + M @ a_0) / units + bias(description, q, qd)
+        Lambda_inverse = sigma[:, None] * mobility * sigma
+        lacking = np.maximum(self.threshold**2 - sigma**2, 0.0)
+        Lambda_inverse[np.diag_indices(rank)] += lacking * np.diagonal(mobility)
+
+        # tau = J^T Lambda (a - J a_0) + M a_0 + C qd + g, which equals J^T Lambda a + N^T M a_0 + C qd + g.
+        force = np.linalg.solve(Lambda_inverse, U.T @ a - sigma * (Vt @ a_0))
+        tau: Array = (Vt.T @ (sigma * force) + M @ a_0) / scale + bias(description, q, qd)
         return tau
 
     def __repr__(self) -> str:

@@ -107,18 +107,23 @@ class Plant:
     def stiffness(self) -> float:
         """Rate at which friction decelerates the joints near rest, 1/s, maximum over random configurations.
 
-        It is the largest eigenvalue of M^-1 D, D being the slope of friction over the rate where that is steepest.
+        Near rest M qdd = -D qd with D the diagonal matrix of the steepest slopes of friction over the rate, so that
+        rates decay with the eigenvalues of M^-1 D. Those of the symmetric D^(1/2) M^-1 D^(1/2) are the same.
         """
         if self.friction is None:
             return 0.0
         numbers = self.description.numbers
-        slope = numbers.viscous.copy()
+
+        # Smooth dry friction, coulomb * qd / sqrt(qd^2 + width^2), is steepest at rest: coulomb / width.
+        D = numbers.viscous.copy()
         if self.friction.width:
-            slope += np.abs(numbers.coulomb).max(axis=1) / self.friction.width
-        root = np.sqrt(slope)
+            D += np.abs(numbers.coulomb).max(axis=1) / self.friction.width
+        root_D = np.sqrt(D)
+
         q = random_motions(self.description, RANDOM_CONFIGURATIONS).q
-        inverse = np.linalg.pinv(mass_matrix(self.description, q), hermitian=True)
-        return float(np.linalg.eigvalsh(root[:, None] * inverse * root).max())
+        M_inverse = np.linalg.pinv(mass_matrix(self.description, q), hermitian=True)
+        symmetric = root_D[:, None] * M_inverse * root_D
+        return float(np.linalg.eigvalsh(symmetric).max())
 
     @cached_property
     def step_kernel(self) -> StepKernel | None:
@@ -140,7 +145,9 @@ class Plant:
         """Return the bounds of the torques that hold joints at rest, shape (n,) each, N m and N; infinite at stops."""
         lower, upper = self.limits
         coulomb = np.where(self.has_stiction[:, None], self.description.numbers.coulomb, 0.0)
-        return np.where(q <= lower, -np.inf, coulomb[:, 1]), np.where(q >= upper, np.inf, coulomb[:, 0])
+        least = np.where(q <= lower, -np.inf, coulomb[:, 1])
+        most = np.where(q >= upper, np.inf, coulomb[:, 0])
+        return least, most
 
     def accelerations(self, q: Array, qd: Array, tau: Array) -> Array:
         """Return the accelerations of a state under net torques, shape (n,), rad/s^2 and m/s^2.
@@ -167,7 +174,10 @@ class Plant:
         if not self.has_stiction.any():
             return friction_torque(self.description, qd, self.friction)
         numbers = self.description.numbers
-        dry = np.where(directions > 0, numbers.coulomb[:, 0], np.where(directions < 0, numbers.coulomb[:, 1], 0.0))
+        dry = np.zeros(self.n)
+        forwards, backwards = directions > 0, directions < 0
+        dry[forwards] = numbers.coulomb[forwards, 0]
+        dry[backwards] = numbers.coulomb[backwards, 1]
         return numbers.viscous * qd + dry
 
     def push_torques(self, pushes: Sequence[Push], q: Array) -> Array:
@@ -180,7 +190,10 @@ class Plant:
         q, qd and tau are of shape (n,), in rad, m, per second, N m and N.
 
         Joints whose rate is exactly 0 hold if the holding torques are within the bounds of their friction; a stop bears
-        any torque towards it. All joints are decided together, since each loads the others through the mass matrix.
+        any torque towards it. All joints are decided together, since each loads the others through the mass matrix:
+        with holding torques f of the joints R at rest,
+
+            M qdd = tau + J' w - r(qd) - C qd - g - f,    so that    qdd_R = (M^-1 drive)_R - (M^-1)_RR f_R.
         """
         if self.has_no_events:
             return self.nothing_holds
@@ -189,10 +202,14 @@ class Plant:
         at_rest = (qd == 0) & (self.has_stiction | (q <= lower) | (q >= upper))
         if not at_rest.any():
             return Contact(directions, at_rest)
-        least, most = (bound[at_rest] for bound in self.holding_bounds(q))
+
         drive = tau + self.push_torques(pushes, q) - self.resistance(qd, directions) - bias(self.description, q, qd)
-        inverse = np.linalg.inv(mass_matrix(self.description, q)).astype(float)
-        _, side = bounded_forces(inverse[np.ix_(at_rest, at_rest)], (inverse @ drive)[at_rest], least, most)
+        M_inverse = np.linalg.inv(mass_matrix(self.description, q)).astype(float)
+        block = M_inverse[np.ix_(at_rest, at_rest)]
+        unresisted = (M_inverse @ drive)[at_rest]
+        least, most = self.holding_bounds(q)
+        _, side = bounded_forces(block, unresisted, least[at_rest], most[at_rest])
+
         holds = at_rest.copy()
         holds[at_rest] = side == 0
         directions[at_rest] = side
@@ -201,17 +218,22 @@ class Plant:
     def constrained_accelerations(
         self, q: Array, qd: Array, tau: Array, contact: Contact, pushes: Sequence[Push] = ()
     ) -> Array:
-        """Return the accelerations under a contact, shape (n,), rad/s^2 and m/s^2: exactly 0 for holding joints."""
+        """Return the accelerations under a contact, shape (n,), rad/s^2 and m/s^2: exactly 0 for holding joints.
+
+        The rows and columns of the free joints F are those of the arm whose other joints are fixed:
+        M_FF qdd_F = (net - C qd - g)_F.
+        """
         net = tau - self.resistance(qd, contact.directions)
         if pushes:
             net += self.push_torques(pushes, q)
         if not contact.holds.any():
             return self.accelerations(q, qd, net)
-        free = ~contact.holds
         qdd = np.zeros(self.n)
+        free = ~contact.holds
         if free.any():
-            M = mass_matrix(self.description, q)
-            qdd[free] = np.linalg.solve(M[np.ix_(free, free)], (net - bias(self.description, q, qd))[free])
+            M_free = mass_matrix(self.description, q)[np.ix_(free, free)]
+            torque = net - bias(self.description, q, qd)
+            qdd[free] = np.linalg.solve(M_free, torque[free])
         return qdd
 
     def phase(self, q: Array, qd: Array, tau: Array, pushes: tuple[Push, ...] = ()) -> Phase:
@@ -220,18 +242,28 @@ class Plant:
         return Phase(contact, pushes, self.constrained_accelerations(q, qd, tau, contact, pushes))
 
     def holding_torques(self, q: Array, qd: Array, tau: Array, contact: Contact, pushes: Sequence[Push] = ()) -> Array:
-        """Return the resisting torques of holding joints, shape (n,), N m and N; 0 for the others."""
+        """Return the resisting torques of holding joints, shape (n,), N m and N; 0 for the others.
+
+        They are what the equation of motion leaves over: f = net - M qdd - C qd - g.
+        """
         qdd = self.constrained_accelerations(q, qd, tau, contact, pushes)
         net = tau + self.push_torques(pushes, q) - self.resistance(qd, contact.directions)
         needed = net - mass_matrix(self.description, q) @ qdd - bias(self.description, q, qd)
         return np.where(contact.holds, needed, 0.0)
 
     def after_impact(self, q: Array, qd: Array, joint: int, *, rebounds: bool) -> Array:
-        """Return the rates after the impact of a joint at its stop, shape (n,), rad/s and m/s."""
-        column = np.linalg.solve(mass_matrix(self.description, q), np.eye(self.n)[joint])
-        restitution = (self.restitution or 0.0) if rebounds else 0.0
-        after: Array = qd - column * ((1 + restitution) * qd[joint] / column[joint])
-        after[joint] = -restitution * qd[joint] + 0.0
+        """Return the rates after the impact of a joint at its stop, shape (n,), rad/s and m/s.
+
+        The stop's impulse p acts along joint i alone, and Newton's law of restitution gives its size:
+
+            M (qd' - qd) = e_i p,    qd'_i = -r qd_i,    so that    p = -(1 + r) qd_i / (M^-1)_ii.
+        """
+        e_i = np.eye(self.n)[joint]
+        column = np.linalg.solve(mass_matrix(self.description, q), e_i)
+        r = (self.restitution or 0.0) if rebounds else 0.0
+        impulse = -(1 + r) * qd[joint] / column[joint]
+        after: Array = qd + column * impulse
+        after[joint] = -r * qd[joint] + 0.0  # exactly, and 0 without a sign
         return after
 
     def kinetic_energy(self, q: Array, qd: Array) -> float:
@@ -297,21 +329,32 @@ def bounded_forces(A: Array, b: Array, lower: Array, upper: Array) -> tuple[Arra
         f, shape (m,); and 0 where a joint holds, 1 at the upper bound, -1 at the lower one, shape (m,).
     """
     side = np.zeros(len(b), dtype=np.int8)
-    fewest, patience = len(b) + 1, MAX_STALLED_ROUNDS
+    fewest_violations = len(b) + 1
+    patience = MAX_STALLED_ROUNDS
     while True:
         held = side == 0
-        f = np.where(side > 0, upper, np.where(side < 0, lower, 0.0))
+        moving = ~held
+
+        # Moving joints resist with their bounds; of the held ones, 0 = b_h - A_hh f_h - A_hm f_m.
+        f = np.select([side > 0, side < 0], [upper, lower], 0.0)
         if held.any():
-            f[held] = np.linalg.solve(A[np.ix_(held, held)], b[held] - A[np.ix_(held, ~held)] @ f[~held])
+            of_moving = A[np.ix_(held, moving)] @ f[moving]
+            f[held] = np.linalg.solve(A[np.ix_(held, held)], b[held] - of_moving)
         w = b - A @ f
-        # The mode of a joint whose present mode is violated: over a bound, or moving against its direction.
-        wanted = np.where(held, (f > upper).astype(np.int8) - (f < lower), np.where(side * w < 0, 0, side))
-        wrong = np.flatnonzero(wanted != side)
-        if not len(wrong):
+
+        # A held joint whose torque is over a bound breaks away; one that would move against its direction holds.
+        wanted = side.copy()
+        wanted[held & (f > upper)] = 1
+        wanted[held & (f < lower)] = -1
+        wanted[moving & (side * w < 0)] = 0
+        violated = np.flatnonzero(wanted != side)
+        if not len(violated):
             return f, side
-        if len(wrong) < fewest:
-            fewest, patience = len(wrong), MAX_STALLED_ROUNDS
+
+        if len(violated) < fewest_violations:
+            fewest_violations = len(violated)
+            patience = MAX_STALLED_ROUNDS
         else:
             patience -= 1
-        changed = wrong if patience > 0 else wrong[-1:]
-        side[changed] = wanted[changed]
+        exchanged = violated if patience > 0 else violated[-1:]
+        side[exchanged] = wanted[exchanged]

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import logging
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.control.controller import NO_STATE, Controller, require_fits
 from dhkit.control.integrators import State
+from dhkit.control.options import SimulationKeywords, SimulationOptions
 from dhkit.control.plant import Plant
 from dhkit.control.references import Held, Reference, reference_of
 from dhkit.control.result import SimulationResult
-from dhkit.control.runs import ContinuousRun, Progress, SampledRun
-from dhkit.control.sensors import Sensors
+from dhkit.control.runs import ContinuousRun, SampledRun
 from dhkit.control.timing import MAX_STEPS, require_positive, row_times, sampled_reference, steps_a_period, substeps
 from dhkit.description import Array, Description, joint_vector, takes_robot
 from dhkit.description.joint_text import joint_text, violated_limit_text
@@ -26,8 +26,6 @@ LIMIT_TOLERANCE = 1e-9
 
 ROWS_RATE = 1000.0
 """Rows of a continuous run's result, Hz."""
-TOLERANCES = (3e-14, 1e-3)
-"""Range of tolerances: below, DOP853 cannot meet it in doubles; above, the result is not accurate."""
 
 
 @takes_robot
@@ -38,14 +36,9 @@ def simulate(
     duration: float | None = None,
     q0: ArrayLike | None = None,
     qd0: ArrayLike | None = None,
-    rate: float | None = 1000.0,
-    plant: Plant | None = None,
-    plant_rate: float | None = None,
     *,
-    sensors: Sensors | None = None,
-    saturation: bool = True,
-    tolerance: float = 1e-13,
-    progress: Progress | None = None,
+    options: SimulationOptions | None = None,
+    **keywords: Unpack[SimulationKeywords],
 ) -> SimulationResult:
     """Simulate an arm under a controller, called at a rate with its torques held between calls, or continuous.
 
@@ -67,22 +60,9 @@ def simulate(
     q0, qd0
         Joint values and rates at the start, shape (n,), rad, m and per second; the reference's first joint values and
         zero rates unless given.
-    rate
-        Calls of the controller, Hz; None for a continuous controller.
-    plant
-        The arm that moves, if it differs from the robot: see :class:`Plant`. Unless given, the robot without friction
-        and with inelastic stops.
-    plant_rate
-        Steps of the integration, Hz, a multiple of ``rate``; ``rate`` unless given. Of a continuous run, rows of its
-        result a second; 1000 unless given.
-    sensors
-        The sensors whose values the controller gets; the true state unless given. Sampled runs only.
-    saturation
-        Whether torques are cut off at the drives' limits.
-    tolerance
-        Tolerance of a step of DOP853, relative and absolute.
-    progress
-        Called after every thousand rows; an exception in it ends the run.
+    options, **keywords
+        Fields of :class:`SimulationOptions`, as one value or one by one: ``plant``, ``friction``, ``restitution``,
+        ``pushes``, ``rate``, ``plant_rate``, ``sensors``, ``saturation``, ``tolerance``, ``progress``.
 
     Returns
     -------
@@ -99,47 +79,34 @@ def simulate(
     ValueError, TypeError
         An argument that does not fit: says which, and what is expected.
     """
-    _require_types(plant=(plant, Plant), sensors=(sensors, Sensors))
-    if not isinstance(saturation, bool | np.bool_):
-        raise TypeError(f"saturation is {saturation!r}; expected True or False")
+    chosen = SimulationOptions.of(options, keywords)
     require_fits(controller, description)
-    moved = Plant(description) if plant is None else plant
-    if moved.description.kinds != description.kinds:
-        raise ValueError(f"the plant has joints {moved.description.kinds}; expected {description.kinds}")
+    moved = chosen.moving(description)
+    rate, plant_rate = chosen.rate, chosen.plant_rate
     followed = _reference_or_hold(description, reference, q0)
-    require_positive(rate=rate, plant_rate=plant_rate, duration=duration)
+    require_positive(duration=duration)
     t = row_times(followed.duration, duration, (plant_rate or ROWS_RATE) if rate is None else rate)
     setpoints = sampled_reference(description, followed, t)
-    effort_limits = moved.description.numbers.effort if saturation else np.full(moved.n, np.inf)
+    effort_limits = moved.description.numbers.effort if chosen.saturation else np.full(moved.n, np.inf)
     q, qd = _state(description, q0, setpoints[0][0], "q0"), _state(description, qd0, setpoints[1][0], "qd0")
     _warn_beyond_stops(moved, setpoints[0])
     q = _moved_to_stops(moved, q, "q0" if q0 is not None else "the reference's first state")
     run_arguments = (description, moved, controller, t, setpoints, effort_limits)
     if rate is None:
-        if sensors is not None:
-            raise ValueError("sensors measure samples; expected a rate in Hz, or no sensors")
-        if not TOLERANCES[0] <= tolerance <= TOLERANCES[1]:
-            raise ValueError(f"tolerance is {tolerance!r}; expected {TOLERANCES[0]:g} to {TOLERANCES[1]:g}")
         # DOP853's steps in stiff friction are about as long as those of a fixed step.
         substeps(moved.stiffness, t[-1] / MAX_STEPS)
-        continuous = ContinuousRun(*run_arguments, continuous_reference=followed, q0=q, tolerance=tolerance)
-        return continuous(State(0.0, q, qd, continuous.memory), progress)
+        continuous = ContinuousRun(*run_arguments, continuous_reference=followed, q0=q, tolerance=chosen.tolerance)
+        return continuous(State(0.0, q, qd, continuous.memory), chosen.progress)
     steps = substeps(moved.stiffness, 1 / rate, steps_a_period(rate, plant_rate, len(t)))
-    measuring = None if sensors is None else sensors.start(moved.n, 1 / rate)
+    measuring = None if chosen.sensors is None else chosen.sensors.start(moved.n, 1 / rate)
     sampled = SampledRun(*run_arguments, substeps=steps, measuring=measuring)
-    return sampled(State(0.0, q, qd, NO_STATE), progress)
+    return sampled(State(0.0, q, qd, NO_STATE), chosen.progress)
 
 
 def _reference_or_hold(description: Description, reference: Any, q0: ArrayLike | None) -> Reference:
     if reference is not None:
         return reference_of(description, reference, q0)
     return Held(_state(description, q0, np.zeros(description.n), "q0"))
-
-
-def _require_types(**arguments: tuple[object, type]) -> None:
-    for name, (value, kind) in arguments.items():
-        if value is not None and not isinstance(value, kind):
-            raise TypeError(f"{name} is {type(value).__name__}; expected a {kind.__name__}, or None")
 
 
 def _warn_beyond_stops(plant: Plant, q: Array) -> None:

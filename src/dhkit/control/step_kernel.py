@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -164,48 +164,76 @@ def _graph(arms: Sequence[Description], law: Law | None, sizes: Mapping[str, int
     n = arms[0].n
     symbols = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
     table, symbols["arm"] = InertialTable.parametric(*arms)
-    q, qd, tau = (joint_symbols(name, n) for name in ("q", "qd", "tau"))
+    q = joint_symbols("q", n)
+    qd = joint_symbols("qd", n)
+    tau = joint_symbols("tau", n)
     works = casadi.SX.sym("works", len(WORKS))
-    given, asked = tau, {}
+
+    applied = tau
+    asked = {}
     if law is not None:
         known = table
         if "model" in sizes:
             known, symbols["model"] = InertialTable.parametric(law.description)
-        setpoint, effort_limits = symbols["setpoint"], symbols["effort_limits"]
-        torques = law.torques(
-            known, Symbols(q, qd, setpoint[:n], setpoint[n : 2 * n], setpoint[2 * n :]), symbols["gains"]
-        )
-        given = casadi.fmin(casadi.fmax(torques, -effort_limits), effort_limits)
+        q_d, qd_d, qdd_d = casadi.vertsplit(symbols["setpoint"], n)
+        torques = law.torques(known, Symbols(q, qd, q_d, qd_d, qdd_d), symbols["gains"])
+        # The drives saturate.
+        limit = symbols["effort_limits"]
+        applied = casadi.fmin(casadi.fmax(torques, -limit), limit)
         asked = {"asked": torques}
-    later = _runge_kutta_step(table, q, qd, given, symbols["step"], symbols.get("friction"))
+
+    later = _runge_kutta_step(table, q, qd, applied, symbols["step"], symbols.get("friction"))
     shared = [symbol for name, symbol in symbols.items() if name not in own]
     inputs = {"shared": casadi.vertcat(*shared), "q": q, "qd": qd, "works": works}
     if law is None:
         inputs["tau"] = tau
     if own:
         inputs["own"] = casadi.vertcat(*(symbols[name] for name in sizes if name in own))
-    outputs = {"q": later[0], "qd": later[1], "works": works + later[2], **asked}
+    outputs = {"q": later.q, "qd": later.qd, "works": works + later.works, **asked}
     return Graph.of("runge_kutta_step", inputs, outputs)
+
+
+class _After(NamedTuple):
+    """State after a step, and the energies of ``WORKS`` that were integrated in it."""
+
+    q: casadi.SX
+    qd: casadi.SX
+    works: casadi.SX
 
 
 def _runge_kutta_step(
     table: InertialTable, q: casadi.SX, qd: casadi.SX, tau: casadi.SX, h: casadi.SX, friction: casadi.SX | None
-) -> tuple[casadi.SX, casadi.SX, casadi.SX]:
-    """Return joint values and rates after a step under constant torques, and the works of ``WORKS`` in it."""
+) -> _After:
+    """Return the state after a step of length h under constant torques.
+
+    The classical method of order 4 (Kutta 1901) for the state (q, qd) with qdd = M^-1 (tau - r(qd) - C qd - g), where
+    the stages k = 1 ... 4 have rates v_k, accelerations a_k and powers p_k = v_k . r(v_k) that friction takes.
+    """
     import casadi
 
-    def rate(x: casadi.SX, v: casadi.SX) -> tuple[casadi.SX, casadi.SX]:
-        lost = casadi.SX.zeros(table.n) if friction is None else friction_torque(v, friction, smooth=True)
-        return recursive_forward_dynamics(table, x, v, tau - lost), casadi.dot(v, lost)
+    def derivative(x: casadi.SX, v: casadi.SX) -> tuple[casadi.SX, casadi.SX]:
+        """Return the acceleration at a state, and the power that friction takes there."""
+        resistance = casadi.SX.zeros(table.n) if friction is None else friction_torque(v, friction, smooth=True)
+        return recursive_forward_dynamics(table, x, v, tau - resistance), casadi.dot(v, resistance)
 
-    a1, p1 = rate(q, qd)
+    v1 = qd
+    a1, p1 = derivative(q, v1)
+
     v2 = qd + h / 2 * a1
-    a2, p2 = rate(q + h / 2 * qd, v2)
+    a2, p2 = derivative(q + h / 2 * v1, v2)
+
     v3 = qd + h / 2 * a2
-    a3, p3 = rate(q + h / 2 * v2, v3)
+    a3, p3 = derivative(q + h / 2 * v2, v3)
+
     v4 = qd + h * a3
-    a4, p4 = rate(q + h * v3, v4)
-    moved = h / 6 * (qd + 2 * (v2 + v3) + v4)
-    work = tau * moved
-    works = casadi.vertcat(casadi.sum1(work), casadi.sum1(casadi.fabs(work)), h / 6 * (p1 + 2 * (p2 + p3) + p4))
-    return q + moved, qd + h / 6 * (a1 + 2 * (a2 + a3) + a4), works
+    a4, p4 = derivative(q + h * v3, v4)
+
+    # Simpson's weights: x(t + h) = x + h/6 (k_1 + 2 k_2 + 2 k_3 + k_4).
+    displacement = h / 6 * (v1 + 2 * (v2 + v3) + v4)
+    change_of_rate = h / 6 * (a1 + 2 * (a2 + a3) + a4)
+    friction_loss = h / 6 * (p1 + 2 * (p2 + p3) + p4)
+
+    # Torques are constant, so that the work of each drive is tau_i (q_i(t + h) - q_i(t)).
+    work = tau * displacement
+    works = casadi.vertcat(casadi.sum1(work), casadi.sum1(casadi.fabs(work)), friction_loss)
+    return _After(q + displacement, qd + change_of_rate, works)

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Unpack
 
 from dhkit.description import Description, Robot, library_robot, read_robot, robots
 from dhkit.description.robot import description_of, takes_robot
 from dhkit.errors import AnswerError, DescriptionError
-from dhkit.execution import Isolation, find_isolation
+from dhkit.execution import find_isolation
 from dhkit.grading.answers.objects import entries_of
 from dhkit.grading.answers.sheet import quantity_names, read_sheet, sheet_of
 from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Names
 from dhkit.grading.answers.sources import SHEET_SUFFIXES, executed_source, read_source
 from dhkit.grading.judging.truth import truth_of
 from dhkit.grading.mistakes.diagnosis import variants_of
+from dhkit.grading.options import GradeKeywords, GradeOptions
 from dhkit.grading.report import GradeReport
 from dhkit.grading.rubric import Rubric
 from dhkit.grading.sheet_judge import judge_sheet
@@ -32,11 +34,8 @@ def grade(
     robot: Robot | None = None,
     rubric: Rubric | None = None,
     *,
-    task: AnswerSheet | None = None,
-    seed: int | None = None,
-    explain: bool = True,
-    execute: bool = False,
-    isolation: Isolation | None = None,
+    options: GradeOptions | None = None,
+    **keywords: Unpack[GradeKeywords],
 ) -> GradeReport:
     """Judge an answer sheet, or the answers that a program or a paper assigns.
 
@@ -52,20 +51,9 @@ def grade(
         Arm or description that the answers concern; by default the robot that the sheet names.
     rubric
         Its ``digits`` say which decimals may be rounded.
-    task
-        Task from :func:`dhkit.grading.answers.sheet.read_task`. It takes precedence over the sheet's own [task]; its
-        [names] count if the sheet has none.
-    seed
-        Seed of the random states at which answers outside the exact ring are tried; by default from the system's
-        entropy.
-    explain
-        Whether to look for mistakes; verdicts do not depend on it.
-    execute
-        Whether a program (.py, .m, .ipynb) is executed in a process of its own in place of being read. Its answers are
-        then the formulas that its names stand for. Functions that cannot be called with symbols are called with
-        numbers, and agree at sampled states at best.
-    isolation
-        What an executed program can see and reach; by default the best that works on this system, or none.
+    options, **keywords
+        Fields of :class:`GradeOptions`, as one value or one by one: ``task``, ``seed``, ``explain``, ``execute``,
+        ``isolation``.
 
     Raises
     ------
@@ -74,6 +62,7 @@ def grade(
     DescriptionError
         The robot file describes no robot.
     """
+    chosen = GradeOptions.of(options, keywords)
     path = Path(path)
     digits = (rubric or Rubric()).digits
     given = None if robot is None else description_of(robot)
@@ -85,26 +74,24 @@ def grade(
     else:
         if given is None:
             raise AnswerError(f"{path}: a program does not say which robot it is about; give one (--robot)")
+        task = chosen.task
         names = NO_NAMES if task is None else task.names
-        if execute and suffix != ".tex":
+        if chosen.execute and suffix != ".tex":
             _require_permission(path, task)
-            found = isolation
+            found = chosen.isolation
             if found is None:
                 found = find_isolation(packages=task.task.packages if task is not None else ())
             with executed_source(path, given, names, isolation=found) as sheet:
-                return _judged(sheet, given, task, digits, seed, explain)
+                return _judged(sheet, given, digits, chosen)
         sheet = read_source(path, given, names)
     description = given or robot_of(sheet, path.parent)
-    report = _judged(sheet, description, task, digits, seed, explain)
-    return replace(report, own_robot=given is None)
+    return replace(_judged(sheet, description, digits, chosen), own_robot=given is None)
 
 
-def _judged(
-    sheet: AnswerSheet, description: Description, task: AnswerSheet | None, digits: int, seed: int | None, explain: bool
-) -> GradeReport:
-    if task is not None:
+def _judged(sheet: AnswerSheet, description: Description, digits: int, options: GradeOptions) -> GradeReport:
+    if (task := options.task) is not None:
         sheet = replace(sheet, task=task.task, names=_merge_names(sheet.names, task.names))
-    return judge_sheet(description, sheet, digits, seed=seed, explain=explain)
+    return judge_sheet(description, sheet, digits, seed=options.seed, explain=options.explain)
 
 
 def _require_permission(path: Path, task: AnswerSheet | None) -> None:

@@ -6,7 +6,7 @@ The way from a request to a motion, through rooms (folders) and files::
           │ start, goal, via, options                     │ path, options
           └───────────────────────┬───────────────────────┘
                                   v
-    request/         places and the routes through them, checked arguments, ───> PlanningError:
+    request/         places and the routes through them, options, ─────────────> PlanningError:
                      reasons why no motion can exist                             which limit or place
                                   │ task: the configurations of one route, with
                                   │       objective, limits, constraints, obstacles
@@ -32,7 +32,7 @@ The way from a request to a motion, through rooms (folders) and files::
     obstacles/       scenes, capsules around links, exact distances, separating planes
     second_check/    other code, which searches a certified motion for what the certificate overlooked
 
-A room imports only rooms below it: planner and along > report > search > program and request > certificate >
+A room imports only rooms below it: planner and along > report > search and request > program > certificate >
 second_check > criteria and obstacles.
 """
 
@@ -58,6 +58,7 @@ from dhkit.planning.obstacles import Distances, Floor, Obstacle, Scene, distance
 from dhkit.planning.planner import Planner
 from dhkit.planning.program import Progress
 from dhkit.planning.report import BranchReport, PlanReport
+from dhkit.planning.request import PathOptions, PlanOptions
 
 __all__ = [
     "BranchReport",
@@ -72,7 +73,9 @@ __all__ = [
     "Objective",
     "ObjectiveLike",
     "Obstacle",
+    "PathOptions",
     "Payload",
+    "PlanOptions",
     "PlanReport",
     "Planner",
     "Progress",

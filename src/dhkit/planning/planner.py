@@ -6,21 +6,19 @@ import threading
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dhkit.description import Array, Payload, Robot, description_of
+from dhkit.description import Array, Robot, description_of
 from dhkit.description.frames import world_to_tool
 from dhkit.display import repr_line
 from dhkit.errors import PlanningError
-from dhkit.planning.certificate import Checker, CollisionAvoidance
+from dhkit.planning.certificate import Checker
 from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, prepare
 from dhkit.planning.many import ManyProgress, SimilarMotions, solve_many
-from dhkit.planning.obstacles import Scene
 from dhkit.planning.program import (
-    MAX_ITERATIONS,
     MAX_SMALL_JOINTS,
     MIN_LEG_INTERVALS,
     Curve,
@@ -36,9 +34,10 @@ from dhkit.planning.program import (
 )
 from dhkit.planning.report import BranchReport, classical_motions, report_of
 from dhkit.planning.request import (
+    PlanKeywords,
+    PlanOptions,
     PlanRequest,
     Route,
-    check_options,
     checked_constraints,
     checked_limits,
     end_velocity,
@@ -52,7 +51,6 @@ from dhkit.planning.request import (
 from dhkit.planning.search import FINER, RESOLUTION, PlannedMotion, Search, coarser, motion_around
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
-from dhkit.trajectories.timing import check_duration
 
 DEFAULT_INTERVALS = 48
 """Default number of intervals for arms of six joints; more for fewer joints, since they cost less."""
@@ -149,21 +147,8 @@ class Planner:
         start: ArrayLike | str,
         goal: ArrayLike | str,
         *,
-        via: Sequence[ArrayLike | str] = (),
-        coordinates: Sequence[str] | None = None,
-        duration: float | None = None,
-        start_velocity: ArrayLike | None = None,
-        goal_velocity: ArrayLike | None = None,
-        limits: Limits | None = None,
-        payload: Payload | None = None,
-        obstacles: Scene = (),
-        clearance: float = 0.01,
-        self_collision: bool = False,
-        warm: Trajectory | None = None,
-        max_iterations: int = MAX_ITERATIONS,
-        time_limit: float | None = None,
-        progress: ProgressCall | None = None,
-        compare: bool = False,
+        options: PlanOptions | None = None,
+        **keywords: Unpack[PlanKeywords],
     ) -> Trajectory:
         """Return the best motion, certified; its ``report`` says how good it is.
 
@@ -173,37 +158,10 @@ class Planner:
             Joint values (n,), rad and m, or the name of a configuration.
         goal
             The same, or a pose (4, 4) of the tool in the world, of which all branches of inverse kinematics are tried.
-        via
-            Places to pass in order, likewise, at times that are optimized.
-        coordinates
-            Names of the coordinates of poses that count, ``arm.ik(T).met``, for arms that meet no more of them; all six
-            unless given.
-        duration
-            Duration, s. For objectives without time, by default twice that of cubics along the straight path.
-        start_velocity, goal_velocity
-            Shape (n,), rad/s and m/s; at rest unless given.
-        limits
-            Limits in place of the planner's.
-        payload
-            Payload of the tool.
-        obstacles
-            Obstacles to avoid: ``Obstacle.box(...)`` and the like, ``Floor()``.
-        clearance
-            Smallest distance from obstacles, m.
-        self_collision
-            Whether links keep the clearance from each other too.
-        warm
-            A similar motion, as the initial guess.
-        max_iterations
-            Limit of the search, iterations of the optimizer in all solutions for all branches. When it is reached, the
-            search raises, or returns the best motion found so far. 250 states that are tested for collisions while
-            paths are sampled count as one iteration.
-        time_limit
-            A limit of time, s, besides. With it the result depends on the speed and the load of the machine.
-        progress
-            Called once in each iteration; an exception in it ends the search.
-        compare
-            Whether the report includes classical motions and the cost on a coarser mesh.
+        options, **keywords
+            Fields of :class:`PlanOptions`, as one value or one by one: ``via``, ``coordinates``, ``duration``,
+            ``start_velocity``, ``goal_velocity``, ``limits``, ``payload``, ``obstacles``, ``clearance``,
+            ``self_collision``, ``warm``, ``max_iterations``, ``time_limit``, ``progress``, ``compare``.
 
         Raises
         ------
@@ -212,33 +170,33 @@ class Planner:
         ValueError, TypeError
             Arguments of another shape or type.
         """
-        work = Work.limited(max_iterations, time_limit)
-        description = self.description
-        check_options(description, payload, warm, progress)
-        check_duration(duration)
-        places = parse_places(description, start, via, goal)
+        chosen = PlanOptions.of(options, keywords)
+        description, work = self.description, chosen.work()
+        if chosen.warm is not None:
+            chosen.warm.require(description)
+        places = parse_places(description, start, chosen.via, goal)
         request = PlanRequest(
-            checked_limits(description, self.limits if limits is None else limits),
-            duration,
-            end_velocity(description, start_velocity, "start"),
-            end_velocity(description, goal_velocity, "goal"),
-            payload,
-            CollisionAvoidance.of(obstacles, clearance, self_collision),
+            checked_limits(description, self.limits if chosen.limits is None else chosen.limits),
+            chosen.duration,
+            end_velocity(description, chosen.start_velocity, "start"),
+            end_velocity(description, chosen.goal_velocity, "goal"),
+            chosen.payload,
+            chosen.avoidance(),
         )
         for place in places:
             if place.q is not None:
                 require_inside_limits(description, request.limits, place.q, place.name)
-        routes = find_routes(description, request.limits, places, coordinates)
+        routes = find_routes(description, request.limits, places, chosen.coordinates)
         require_possible(description, self.objective, self.constraints, request, places, routes)
         try:
-            task, best, branches = self._best(request, routes, warm, work, progress)
+            task, best, branches = self._best(request, routes, chosen.warm, work, chosen.progress)
         except PlanningError as error:
             raise self._with_reason(error, request, routes, work) from None
-        report = replace(report_of(task, best, work), branches=branches, coordinates=tuple(coordinates or ()))
+        report = replace(report_of(task, best, work), branches=branches, coordinates=tuple(chosen.coordinates or ()))
         is_choice = task.duration is None or not self.objective.only_time
-        if compare and best.is_resolved and is_choice:
+        if chosen.compare and best.is_resolved and is_choice:
             report = replace(report, classical=classical_motions(task), coarse=self._coarse(task, best, work))
-        return replace(best.trajectory, report=report, payload=payload, friction=self.friction)
+        return replace(best.trajectory, report=report, payload=chosen.payload, friction=self.friction)
 
     def solve_many(
         self,

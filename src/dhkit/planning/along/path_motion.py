@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import cast
+from typing import Unpack, cast
 
 import numpy as np
 
-from dhkit.description import Array, Description, Payload, takes_robot
+from dhkit.description import Array, Description, takes_robot
 from dhkit.description.frames import world_to_tool
 from dhkit.errors import PlanningError
 from dhkit.kernels import check_whole
@@ -17,19 +17,18 @@ from dhkit.planning.along.checks import require_holdable_along, require_kept, re
 from dhkit.planning.along.path_program import MAX_INTERVALS, PathProgram, Profile
 from dhkit.planning.along.path_states import PathStates, knots_of
 from dhkit.planning.along.timing import SmoothTimingProgram, TimingProgram
-from dhkit.planning.certificate import Checker, CollisionAvoidance
+from dhkit.planning.certificate import Checker
 from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, loaded
-from dhkit.planning.obstacles import Scene
-from dhkit.planning.program import MAX_ITERATIONS, ProgressCall, Starts, Task, Work
+from dhkit.planning.program import ProgressCall, Starts, Task, Work
 from dhkit.planning.report import report_of
-from dhkit.planning.request import check_options, checked_constraints, checked_limits, smoothed
+from dhkit.planning.request import PathKeywords, PathOptions, checked_constraints, checked_limits, smoothed
 from dhkit.planning.search import TIME_SCALING_MARGIN, PlannedMotion, Search
 from dhkit.symbolic import Friction
-from dhkit.trajectories import JointPath, Limits, Trajectory
+from dhkit.trajectories import JointPath, Trajectory
 from dhkit.trajectories.timing import check_duration, default_limits
 
-MIN_INTERVALS = 6
-"""Smallest number of intervals."""
+MIN_INTERVALS, DEFAULT_INTERVALS = 6, 200
+"""Smallest number of intervals, and the usual one."""
 QUICKEST = Objective.of("time")
 POINTS = 8
 """Number of states in an interval for the certificate; few, because there are many intervals."""
@@ -43,18 +42,11 @@ def along_path(
     path: JointPath,
     *,
     objective: ObjectiveLike = "time",
-    duration: float | None = None,
-    limits: Limits | None = None,
     constraints: Constraint | Sequence[Constraint] = (),
-    intervals: int = 200,
-    max_iterations: int = MAX_ITERATIONS,
-    time_limit: float | None = None,
-    progress: ProgressCall | None = None,
-    payload: Payload | None = None,
+    intervals: int = DEFAULT_INTERVALS,
     friction: bool | Friction = False,
-    obstacles: Scene = (),
-    clearance: float = 0.01,
-    self_collision: bool = False,
+    options: PathOptions | None = None,
+    **keywords: Unpack[PathKeywords],
 ) -> Trajectory:
     """Return the best motion along a path, from rest to rest, which stays exactly on the path.
 
@@ -71,30 +63,15 @@ def along_path(
         A path without corners, such as one of :func:`dhkit.trajectories.joint_path`.
     objective
         ``"time"``, ``"effort"``, ``"energy"``, or a sum such as ``Time() + 0.01 * Effort()``.
-    duration
-        Duration, s; required for objectives without time.
-    limits
-        Limits; the robot's own if not given. Under limits of jerk the path must not have jumps of curvature.
     constraints
         Further constraints, such as :class:`dhkit.planning.ToolSpeed`.
     intervals
         Initial number of intervals of s, which take about the same time each.
-    max_iterations
-        Limit of the search, iterations of the optimizer in all solutions together.
-    time_limit
-        A limit of time, s, besides. With it the result depends on the speed and the load of the machine.
-    progress
-        Called once in each iteration.
-    payload
-        Payload of the tool.
     friction
         Friction of the joints, as for inverse dynamics; a step is smoothed over 0.01 rad/s.
-    obstacles
-        Obstacles from which the path must keep the clearance.
-    clearance
-        Smallest distance from obstacles, m.
-    self_collision
-        Whether links keep the clearance from each other too.
+    options, **keywords
+        Fields of :class:`PathOptions`, as one value or one by one: ``duration``, ``limits``, ``payload``,
+        ``obstacles``, ``clearance``, ``self_collision``, ``max_iterations``, ``time_limit``, ``progress``.
 
     Returns
     -------
@@ -121,32 +98,33 @@ def along_path(
     >>> bool(abs(slow.q(slow.duration) - [0.7, 0.2]).max() < 1e-9)
     True
     """
-    work = Work.limited(max_iterations, time_limit)
+    chosen = PathOptions.of(options, keywords)
+    work = chosen.work()
     check_whole("intervals", intervals, MIN_INTERVALS)
     if intervals > MAX_INTERVALS:
         raise ValueError(f"intervals is {intervals!r}; expected a whole number from {MIN_INTERVALS} to {MAX_INTERVALS}")
-    check_options(description, payload, None, progress)
     if path.description.n != description.n:
         raise ValueError(
             f"the path has {path.description.n} joints; expected {description.n}, those of {description.name}"
         )
     wanted = Objective.of(objective)
-    _require_objective(wanted, duration)
-    arm, limits = loaded(description, payload), checked_limits(description, limits or default_limits(description))
+    _require_objective(wanted, chosen.duration)
+    arm = loaded(description, chosen.payload)
+    limits = checked_limits(description, chosen.limits or default_limits(description))
     require_path(arm, path, limits)
     constraints = checked_constraints(constraints)
-    avoidance = CollisionAvoidance.of(obstacles, clearance, self_collision)
+    avoidance = chosen.avoidance()
     if avoidance:
         avoidance = avoidance.between(description, path.q(0.0), path.q(1.0))
     T_start = world_to_tool(description, path.q(0.0))
     parameters = tuple(constraint.values(description, T_start) for constraint in constraints)
-    chosen = smoothed(Friction.chosen(friction))
+    smooth = smoothed(Friction.chosen(friction))
     still = np.zeros(description.n)
-    checker = Checker(arm, limits, constraints, parameters, chosen, avoidance, points=POINTS)
-    task = Task(description, arm, wanted, path.q([0.0, 1.0]), still, still, duration, checker, path=path)
-    found = _best_timing(task, intervals, work, progress)
+    checker = Checker(arm, limits, constraints, parameters, smooth, avoidance, points=POINTS)
+    task = Task(description, arm, wanted, path.q([0.0, 1.0]), still, still, chosen.duration, checker, path=path)
+    found = _best_timing(task, intervals, work, chosen.progress)
     report = report_of(task, found, work)
-    return replace(found.trajectory, description=description, report=report, payload=payload, friction=chosen)
+    return replace(found.trajectory, description=description, report=report, payload=chosen.payload, friction=smooth)
 
 
 def _best_timing(task: Task, intervals: int, work: Work, progress: ProgressCall | None) -> PlannedMotion:

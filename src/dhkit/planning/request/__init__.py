@@ -1,4 +1,4 @@
-"""Requests: the places to pass, the routes through them, checked arguments, and reasons why there can be no motion."""
+"""Requests: the places to pass, the routes through them, options, and reasons why there can be no motion."""
 
 from dhkit.planning.request.feasibility import (
     CONSTRAINT_ROUNDING,
@@ -7,10 +7,10 @@ from dhkit.planning.request.feasibility import (
     require_place,
     require_possible,
 )
+from dhkit.planning.request.options import PathKeywords, PathOptions, PlanKeywords, PlanOptions
 from dhkit.planning.request.places import Route, find_routes, parse_places
 from dhkit.planning.request.request import (
     PlanRequest,
-    check_options,
     checked_constraints,
     checked_limits,
     end_velocity,
@@ -19,9 +19,12 @@ from dhkit.planning.request.request import (
 
 __all__ = [
     "CONSTRAINT_ROUNDING",
+    "PathKeywords",
+    "PathOptions",
+    "PlanKeywords",
+    "PlanOptions",
     "PlanRequest",
     "Route",
-    "check_options",
     "checked_constraints",
     "checked_limits",
     "end_velocity",

@@ -12,7 +12,7 @@ from dhkit.description import Array, Description, Payload, joint_array
 from dhkit.planning.certificate import CollisionAvoidance
 from dhkit.planning.criteria import Constraint, LoadedArm, loaded, require_value
 from dhkit.symbolic import Friction
-from dhkit.trajectories import Limits, Trajectory
+from dhkit.trajectories import Limits
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,26 +33,6 @@ class PlanRequest:
     def rests_at(self, name: str) -> bool:
         """Whether the arm is at rest at a place, given by its name."""
         return not {"start": self.start_velocity, "goal": self.goal_velocity}.get(name, np.ones(1)).any()
-
-
-def check_options(description: Description, payload: object, warm: object, progress: object) -> None:
-    """Check the types of arguments of a search.
-
-    Raises
-    ------
-    TypeError
-        Says which is not as expected.
-    DescriptionError
-        ``warm`` is a motion of another robot.
-    """
-    if payload is not None and not isinstance(payload, Payload):
-        raise TypeError(f"payload is {payload!r}; expected Payload(mass, com, inertia)")
-    if progress is not None and not callable(progress):
-        raise TypeError(f"progress is {progress!r}; expected a function")
-    if warm is not None:
-        if not isinstance(warm, Trajectory):
-            raise TypeError(f"warm is {type(warm).__name__}; expected a Trajectory")
-        warm.require(description)
 
 
 def checked_limits(description: Description, limits: Limits | None) -> Limits:
