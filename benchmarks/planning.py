@@ -29,9 +29,7 @@ from dhkit.dynamics import gravity_torque
 from dhkit.errors import PlanningError
 from dhkit.planning import Planner
 from dhkit.planning.certificate import Checker
-from dhkit.planning.joint_limits import Limit
-from dhkit.planning.loaded import loaded
-from dhkit.planning.states import States
+from dhkit.planning.criteria import Limit, States, loaded
 from dhkit.trajectories import Limits, Trajectory, quintic, trapezoidal
 
 RESULT = Path(__file__).parent / "results" / "planning"

@@ -25,9 +25,7 @@ from dhkit.dynamics import gravity_torque
 from dhkit.errors import PlanningError
 from dhkit.planning import Obstacle, Planner, distance
 from dhkit.planning.certificate import Checker
-from dhkit.planning.joint_limits import Limit
-from dhkit.planning.loaded import loaded
-from dhkit.planning.states import States
+from dhkit.planning.criteria import Limit, States, loaded
 from dhkit.trajectories import Trajectory
 
 RESULT = Path(__file__).parent / "results" / "scenes"

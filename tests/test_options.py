@@ -11,7 +11,7 @@ from dhkit import Arm
 from dhkit.control.options import BatchKeywords, BatchOptions, SimulationKeywords, SimulationOptions
 from dhkit.grading.options import GradeKeywords, GradeOptions
 from dhkit.planning import PathOptions, PlanOptions
-from dhkit.planning.options import PathKeywords, PlanKeywords
+from dhkit.planning.request import PathKeywords, PlanKeywords
 
 KINDS = {
     SimulationOptions: SimulationKeywords,

@@ -39,7 +39,7 @@ from dhkit.expressions import Atom, Budget, Expression, parse
 from dhkit.kernels import Kernel
 from dhkit.kinematics.programs import kinematic_kernels
 from dhkit.lab.assignment import Goal, JointsAt, MotionBetween, OwnScore, Step, ToolAt
-from dhkit.planning.certificate import Check
+from dhkit.planning.certificate.checker import Check
 from dhkit.symbolic.exact.regressor import regressor
 from dhkit.symbolic.textbook_kinematics import TextbookKinematics
 from dhkit.trajectories.pieces import Pieces

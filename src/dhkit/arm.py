@@ -42,7 +42,7 @@ if TYPE_CHECKING:
         PlanOptions,
         Scene,
     )
-    from dhkit.planning.options import PathKeywords, PlanKeywords
+    from dhkit.planning.request import PathKeywords, PlanKeywords
     from dhkit.symbolic import BaseParameters, CasadiFunctions, Friction, Lagrangian, SymbolicKinematics, Symbols
     from dhkit.trajectories import JointPath, Limits, Torques, Trajectory
     from dhkit.verification import VerificationReport

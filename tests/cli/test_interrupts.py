@@ -14,7 +14,7 @@ import pytest
 
 from acceptance import ACCEPTING
 from dhkit.cli import _reliable_interrupts
-from dhkit.planning.solver import delayed_interrupts
+from dhkit.planning.program import delayed_interrupts
 from dhkit.programs import find_isolation
 from waiting import HANGS, wait_for
 

@@ -6,8 +6,7 @@ import pytest
 from dhkit.description import library_robot
 from dhkit.planning import Effort, Energy, Jerk, Planner, Time
 from dhkit.planning.along import along_path
-from dhkit.planning.costs import cost_of, size_of
-from dhkit.planning.objectives import Objective
+from dhkit.planning.criteria import Objective, cost_of, size_of
 from dhkit.trajectories import JointPath, Limits, cubic, quintic, trapezoidal
 from planning_reference import luus, pendulum, slide, two_slides
 

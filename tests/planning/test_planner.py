@@ -31,9 +31,7 @@ from dhkit.planning import (
     TorqueSpeedLine,
 )
 from dhkit.planning.certificate import Checker
-from dhkit.planning.constraints import Constraint
-from dhkit.planning.costs import cost_of
-from dhkit.planning.objectives import Objective
+from dhkit.planning.criteria import Constraint, Objective, cost_of
 from dhkit.trajectories import Limits
 from planning_reference import grids, slide, worst_excess
 
@@ -484,7 +482,7 @@ def test_an_arm_keeps_its_planners():
 
 
 def test_without_pinocchio_our_own_dynamics_certify(monkeypatch):
-    from dhkit.planning import states
+    from dhkit.planning.criteria import states
 
     monkeypatch.setattr(states, "_model", lambda description: None)
     arm = library_robot("planar2r")

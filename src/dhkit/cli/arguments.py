@@ -177,7 +177,7 @@ def objective(text: str) -> Objective:
     >>> str(objective("time + 1e-4 effort"))
     '1 time + 0.0001 effort'
     """
-    from dhkit.planning.objectives import OBJECTIVES, Objective
+    from dhkit.planning.criteria import OBJECTIVES, Objective
 
     terms = []
     for term in PLUS.split(text):

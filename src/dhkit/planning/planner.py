@@ -15,36 +15,40 @@ from dhkit.description import Array, Robot, description_of
 from dhkit.description.frames import world_to_tool
 from dhkit.display import repr_line
 from dhkit.errors import PlanningError
-from dhkit.planning.avoiding import FINER, motion_around
 from dhkit.planning.certificate import Checker
-from dhkit.planning.constraints import Constraint
-from dhkit.planning.feasibility import (
-    classical_motions,
-    require_inside_limits,
-    require_place,
-    require_possible,
-)
-from dhkit.planning.goals import Route, find_routes, parse_places
-from dhkit.planning.guess import leg_durations
+from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, prepare
 from dhkit.planning.many import ManyProgress, SimilarMotions, solve_many
-from dhkit.planning.mesh import MIN_LEG_INTERVALS, Curve, Mesh
-from dhkit.planning.motion_program import MAX_SMALL_JOINTS, MotionProgram, curves_for
-from dhkit.planning.objectives import Objective, ObjectiveLike
-from dhkit.planning.options import PlanKeywords, PlanOptions
-from dhkit.planning.problem import Problem
-from dhkit.planning.report import BranchReport
+from dhkit.planning.program import (
+    MAX_SMALL_JOINTS,
+    MIN_LEG_INTERVALS,
+    Curve,
+    Mesh,
+    MotionProgram,
+    Problem,
+    ProgressCall,
+    Task,
+    Work,
+    curves_for,
+    delayed_interrupts,
+    leg_durations,
+)
+from dhkit.planning.report import BranchReport, classical_motions, report_of
 from dhkit.planning.request import (
+    PlanKeywords,
+    PlanOptions,
     PlanRequest,
+    Route,
     checked_constraints,
     checked_limits,
     end_velocity,
+    find_routes,
+    parse_places,
+    require_inside_limits,
+    require_place,
+    require_possible,
     smoothed,
 )
-from dhkit.planning.search import RESOLUTION, PlannedMotion, Search, coarser, report_of
-from dhkit.planning.solver import ProgressCall, delayed_interrupts
-from dhkit.planning.states import prepare
-from dhkit.planning.task import Task
-from dhkit.planning.work import Work
+from dhkit.planning.search import FINER, RESOLUTION, PlannedMotion, Search, coarser, motion_around
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 

@@ -1,12 +1,21 @@
-"""Reports of planned motions: cost, certificate, branches and counts."""
+"""Reports of planned motions: cost, certificate, branches, counts, and classical motions to compare with."""
 
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass
 
+import numpy as np
+
+from dhkit.description import Array
 from dhkit.display import html_block, html_lines, html_table, repr_line
+from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Certificate
+from dhkit.planning.criteria import Limit, States, cost_of
+from dhkit.planning.program import Task, Work
+from dhkit.planning.search import PlannedMotion
+from dhkit.trajectories import quintic, trapezoidal
 
 MAX_LISTED_LIMITS = 3
 """Largest number of active limits that are listed as text."""
@@ -312,3 +321,63 @@ def more_text(share: float) -> str:
 def _duration_text(branch: BranchReport) -> str:
     """Return a branch's duration as text, or the reason why it has none."""
     return branch.reason or f"{'' if branch.solved else 'not tried, at least '}{seconds_text(branch.duration)}"
+
+
+def report_of(task: Task, best: PlannedMotion, work: Work) -> PlanReport:
+    """Return the report of a task's motion."""
+    arm = task.arm
+    return PlanReport(
+        objective=str(task.objective),
+        cost=best.cost,
+        unit=task.objective.unit(arm.numbers.prismatic),
+        duration=best.trajectory.duration,
+        is_duration_given=task.duration is not None,
+        is_least_time=task.objective.only_time,
+        certificate=best.certificate,
+        joints=tuple(joint.name for joint in arm.joints),
+        intervals=best.intervals,
+        iterations=work.iterations,
+        solves=work.solves,
+        build_seconds=work.build_seconds,
+        solve_seconds=time.perf_counter() - work.began - work.build_seconds,
+        slow_down=best.slow_down,
+        tightened=best.tightened,
+        unlimited=task.limits.unlimited,
+        is_resolved=best.is_resolved,
+        is_converged=best.is_converged,
+        failure=best.failure,
+        **task.avoidance.report(arm, best.certificate.excess_of(Limit.CLEARANCE)),
+    )
+
+
+def classical_motions(task: Task) -> tuple[ClassicalMotion, ...]:
+    """Return the best trapezoid and quintic along the straight joint path, slowed down to the task's duration.
+
+    Empty for motions that they cannot follow: with via points, ends not at rest, obstacles, or friction. Those that
+    take longer than the task's duration are left out.
+    """
+    if (
+        len(task.points) > 2
+        or not task.rests
+        or task.friction is not None
+        or task.avoidance
+        or task.checker.constraints
+    ):
+        return ()
+
+    def torques(q: Array, qd: Array, qdd: Array) -> Array:
+        return States(task.loaded, np.zeros(len(q)), q, qd, qdd).tau
+
+    motions = []
+    for name, make in (("best trapezoid", trapezoidal), ("quintic", quintic)):
+        try:
+            motion = make(task.arm, task.points[0], task.points[1], limits=task.limits, torques=torques)
+        except PlanningError:
+            continue  # the straight path may need more than the torque limits
+        if task.duration is not None:
+            if motion.duration > task.duration:
+                continue
+            motion = motion.slowed(task.duration / motion.duration)
+        cost = cost_of(task.objective, motion, task.loaded)
+        motions.append(ClassicalMotion(name, motion.duration, cost))
+    return tuple(motions)

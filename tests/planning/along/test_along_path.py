@@ -25,7 +25,7 @@ from dhkit.planning import (
     TorqueSpeedLine,
     along_path,
 )
-from dhkit.planning.point import gear_ratios
+from dhkit.planning.criteria.states import gear_ratios
 from dhkit.trajectories import JointPath, Limits, joint_path, tool_line
 from trajectories_reference import reference_torques
 

@@ -13,7 +13,7 @@ from dhkit.description import Box, Capsule, Cylinder, Sphere, library_robot, rob
 from dhkit.description.table_rows import from_dh
 from dhkit.model.shapes import link_parts
 from dhkit.planning.obstacles import checked_pairs, link_capsules, link_pairs, world_axes
-from dhkit.planning.obstacles.enclosing import Balls, enclose, refine
+from dhkit.planning.obstacles.capsules import Balls, enclose, refine
 from dhkit.planning.obstacles.solids import capsule_distances
 
 OUTSIDE = 1e-9

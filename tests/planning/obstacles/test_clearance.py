@@ -19,9 +19,8 @@ from dhkit.planning.obstacles import (
     shape_distances,
     world_axes,
 )
-from dhkit.planning.obstacles.segments import axis_bounds, segment_distances
-from dhkit.planning.obstacles.solid_arrays import Solids
-from dhkit.planning.obstacles.solids import capsule_distances, obstacle_distances
+from dhkit.planning.obstacles.scene import Solids
+from dhkit.planning.obstacles.solids import axis_bounds, capsule_distances, obstacle_distances, segment_distances
 
 COAL = 1e-7
 """m: coal's iterations stop at 1e-9 of a bound, not of the distance."""

@@ -17,7 +17,7 @@ from dhkit.planning.obstacles import (
     smallest_distances,
     world_axes,
 )
-from dhkit.planning.obstacles.segments import nearest_on_box
+from dhkit.planning.obstacles.solids import nearest_on_box
 
 TILTED = np.eye(4)
 TILTED[:3, :3] = Rotation.from_rotvec([0.3, 0.5, -0.7]).as_matrix()

@@ -7,7 +7,7 @@ import pytest
 
 from dhkit import Arm, Friction, Limits, Obstacle, Payload, Trajectory
 from dhkit.errors import PlanningError
-from dhkit.planning.collision_avoidance import CollisionAvoidance
+from dhkit.planning.certificate import CollisionAvoidance
 from dhkit.planning.obstacles import Floor
 from dhkit.planning.second_check import Claim, recheck
 from planning.second_check.random_motions import KINDS, has_bodies, random_arm, random_case, random_scene, ranges

@@ -7,12 +7,10 @@ from typing import cast
 import numpy as np
 
 from dhkit.errors import PlanningError
-from dhkit.planning.along.grid import JUMP_ROUNDING, jumps
 from dhkit.planning.along.path_program import PathProgram, Profile
-from dhkit.planning.feasibility import CONSTRAINT_ROUNDING, require_holdable, require_inside_limits
-from dhkit.planning.joint_limits import Limit
-from dhkit.planning.loaded import LoadedArm
-from dhkit.planning.states import States
+from dhkit.planning.along.path_states import JUMP_ROUNDING, jumps
+from dhkit.planning.criteria import Limit, LoadedArm, States
+from dhkit.planning.request import CONSTRAINT_ROUNDING, require_holdable, require_inside_limits
 from dhkit.trajectories import JointPath, Limits
 from dhkit.trajectories.limits import farthest_outside
 

@@ -14,22 +14,15 @@ from dhkit.description.frames import world_to_tool
 from dhkit.errors import PlanningError
 from dhkit.kernels import check_whole
 from dhkit.planning.along.checks import require_holdable_along, require_kept, require_path
-from dhkit.planning.along.grid import knots_of
 from dhkit.planning.along.path_program import MAX_INTERVALS, PathProgram, Profile
-from dhkit.planning.along.path_states import PathStates
-from dhkit.planning.along.smooth_timing import SmoothTimingProgram
-from dhkit.planning.along.timing import TimingProgram
+from dhkit.planning.along.path_states import PathStates, knots_of
+from dhkit.planning.along.timing import SmoothTimingProgram, TimingProgram
 from dhkit.planning.certificate import Checker
-from dhkit.planning.constraints import Constraint
-from dhkit.planning.loaded import loaded
-from dhkit.planning.objectives import Objective, ObjectiveLike
-from dhkit.planning.options import PathKeywords, PathOptions
-from dhkit.planning.program import Starts
-from dhkit.planning.request import checked_constraints, checked_limits, smoothed
-from dhkit.planning.search import TIME_SCALING_MARGIN, PlannedMotion, Search, report_of
-from dhkit.planning.solver import ProgressCall
-from dhkit.planning.task import Task
-from dhkit.planning.work import Work
+from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, loaded
+from dhkit.planning.program import ProgressCall, Starts, Task, Work
+from dhkit.planning.report import report_of
+from dhkit.planning.request import PathKeywords, PathOptions, checked_constraints, checked_limits, smoothed
+from dhkit.planning.search import TIME_SCALING_MARGIN, PlannedMotion, Search
 from dhkit.symbolic import Friction
 from dhkit.trajectories import JointPath, Trajectory
 from dhkit.trajectories.timing import check_duration, default_limits

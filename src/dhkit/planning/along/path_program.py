@@ -10,13 +10,21 @@ from typing import TYPE_CHECKING, Protocol, Self, TypeVar, cast
 import numpy as np
 
 from dhkit.description import Array
-from dhkit.planning.along.path_point import PathPoint
-from dhkit.planning.along.path_states import PathStates
-from dhkit.planning.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows, Scaling
-from dhkit.planning.costs import size_of
-from dhkit.planning.joint_limits import Limit
-from dhkit.planning.program import Program, limit_rows
-from dhkit.planning.task import Margins, Task
+from dhkit.planning.along.path_states import PathPoint, PathStates
+from dhkit.planning.criteria import Limit, size_of
+from dhkit.planning.program import (
+    Block,
+    BlockProgram,
+    Indices,
+    LocalFunction,
+    Margins,
+    Program,
+    RowKind,
+    Rows,
+    Scaling,
+    Task,
+    limit_rows,
+)
 from dhkit.trajectories import JointPath, Trajectory
 
 if TYPE_CHECKING:

@@ -1,22 +1,69 @@
-"""A path and the arm's dynamics along it on a grid: torques are tau = m sdd + c sd^2 + g.
+"""A path on a grid, and the arm's states along it, as numbers and as CasADi symbols: tau = m sdd + c sd^2 + g.
 
-Bobrow, Dubowsky and Gibson 1985, Time-optimal control of robotic manipulators along specified paths.
+Bobrow, Dubowsky and Gibson 1985, Time-optimal control of robotic manipulators along specified paths. The grid is finer
+where the arm has to move slowly, with knots where the path's curvature jumps.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dhkit import dynamics, kinematics
-from dhkit.description import Array
-from dhkit.planning.loaded import LoadedArm
+from dhkit.description import Array, Description
+from dhkit.description.robot import require_bodies
+from dhkit.planning.criteria import LoadedArm, Point
+from dhkit.symbolic import Friction
+from dhkit.symbolic.differentiable.friction import friction_parameters, friction_torque
 from dhkit.trajectories import JointPath, Limits
 from dhkit.trajectories.pieces import Side
 
+if TYPE_CHECKING:
+    import casadi
+
+JUMP_ROUNDING = 1e-6
+"""Jump of a derivative, relative to its largest value, that counts as rounding."""
+EVEN_SHARE, MIN_TIME = 0.3, 1e-12
+"""Share of knots with even spacing, and the shortest time of an interval, s."""
 CANCELLED_SHARE = 1e-9
 """Magnitude of a sum relative to that of its parts below which it counts as zero."""
+
+
+def jumps(path: JointPath, order: int) -> Array:
+    """Return the jumps of a derivative by s at the inner breaks, shape (K-1, n), rad and m."""
+    pieces, inside = path.pieces.differentiated(order), path.breaks[1:-1]
+    steps: Array = pieces(inside) - pieces(inside, "left")
+    return steps
+
+
+def knots_of(path: JointPath, intervals: int, rough: Array, speeds: Array) -> Array:
+    """Return a grid whose intervals take about the same time, with knots where the path's curvature jumps.
+
+    From rest, s and the first knots grow as t^2; where joints have to move slowly, near singularities, the grid is
+    finer.
+
+    Parameters
+    ----------
+    rough, speeds
+        A first grid, shape (K+1,), and the largest constant speed in its intervals, shape (K,), 1/s.
+    """
+    steps = np.diff(rough)
+    times = steps / speeds
+    share = (1 - EVEN_SHARE) * times / max(float(times.sum()), MIN_TIME) + EVEN_SHARE * steps
+    x = (1 - np.cos(np.linspace(0.0, np.pi, intervals + 1))) / 2
+    knots, taken = np.interp(x, np.concatenate([[0.0], np.cumsum(share) / share.sum()]), rough), set()
+    bends = np.abs(jumps(path, 2)).max(axis=1)
+    for s in path.breaks[1:-1][bends > JUMP_ROUNDING * np.abs(path.qss(path.breaks)).max()]:
+        k = int(np.argmin(np.abs(knots[1:-1] - s))) + 1
+        if knots[k] in taken:
+            knots = np.insert(knots, np.searchsorted(knots, s), s)
+        else:
+            knots[k] = s
+        taken.add(s)
+    return knots
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,3 +163,56 @@ class PathStates:
                 most = np.where((spare > 0) & (used != 0), spare / np.abs(used), np.inf)
             found = np.minimum(found, most.min(axis=2))
         return found
+
+
+class PathPoint(Point):
+    """A state on a path: its speed and acceleration sd and sdd along it, and the path's coefficients there.
+
+    The coefficients are those of :class:`PathStates`, 7 n + 6.
+    """
+
+    def __init__(self, description: Description, limits: Limits, friction: Friction | None) -> None:
+        import casadi
+
+        n = description.n
+        self.description, self.limits, self.n, self.friction = description, limits, n, friction
+        self.b, self.speed, self.sdd = (casadi.SX.sym(name) for name in ("b", "speed", "sdd"))
+        self.path = casadi.SX.sym("path", 7 * n + 6)
+        edges = [*range(0, 6 * n + 1, n), 6 * n + 3, 6 * n + 6, 7 * n + 6]
+        q, qs, qss, m, c, g, ps, pss, _ = casadi.vertsplit(self.path, edges)
+        self.q, self.qd, self.qdd = q, qs * self.speed, qs * self.sdd + qss * self.b
+        self.load = casadi.SX(0, 1)  # torques along the path include the payload
+        self._rigid = m * self.sdd + c * self.b + g
+        self._tool = ps * self.speed, ps * self.sdd + pss * self.b
+
+    @cached_property
+    def tau(self) -> casadi.SX:
+        """Joint torques, n x 1, N m and N."""
+        require_bodies(self.description)
+        return self._rigid + self._friction_torque
+
+    @cached_property
+    def dissipation(self) -> casadi.SX:
+        """The power lost to friction, 1 x 1, W."""
+        import casadi
+
+        return casadi.dot(self._friction_torque, self.qd)
+
+    @cached_property
+    def _friction_torque(self) -> casadi.SX:
+        import casadi
+
+        if self.friction is None:
+            return casadi.SX(self.n, 1)
+        parameters = friction_parameters(self.description.numbers, self.friction.width)
+        return friction_torque(self.qd, casadi.SX(casadi.DM(parameters)), smooth=self.friction.width > 0)
+
+    @cached_property
+    def tool_velocity(self) -> casadi.SX:
+        """The velocity of the tool's origin, 3 x 1, m/s."""
+        return self._tool[0]
+
+    @cached_property
+    def tool_acceleration(self) -> casadi.SX:
+        """The acceleration of the tool's origin, 3 x 1, m/s^2."""
+        return self._tool[1]

@@ -1,12 +1,11 @@
-"""Obstacles: scenes, capsules around links, exact distances, separating planes, and sampled paths."""
+"""Obstacles: scenes, capsules around links, exact distances, and separating planes."""
 
 from dhkit.planning.obstacles.capsules import LinkBody, LinkCapsule, link_capsules, link_name, world_axes
 from dhkit.planning.obstacles.clearance import Distances, distance, not_checked, pair_distances, smallest_distances
-from dhkit.planning.obstacles.link_shapes import shape_distances
 from dhkit.planning.obstacles.pairs import CheckedPairs, LinkPairs, Pair, checked_pairs, link_pairs, standing
-from dhkit.planning.obstacles.sampling import PathSampler
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
 from dhkit.planning.obstacles.separation import Gaps, PlaneRow, Separation
+from dhkit.planning.obstacles.solids import shape_distances
 
 __all__ = [
     "CheckedPairs",
@@ -18,7 +17,6 @@ __all__ = [
     "LinkPairs",
     "Obstacle",
     "Pair",
-    "PathSampler",
     "PlaneRow",
     "Scene",
     "Separation",

@@ -12,12 +12,16 @@ from dhkit.description import Array, Box, Description, joint_array, takes_robot
 from dhkit.display import counted, repr_line
 from dhkit.model.shapes import links_without_shapes, missing_shapes
 from dhkit.planning.obstacles.capsules import LinkCapsule, link_capsules, link_name, world_axes
-from dhkit.planning.obstacles.link_shapes import shape_distances
 from dhkit.planning.obstacles.pairs import Pair, capsules_beside, ends_above, link_pairs, pair_text, standing
-from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
-from dhkit.planning.obstacles.segments import Bounds, axis_bounds, segment_distances
-from dhkit.planning.obstacles.solid_arrays import Solids
-from dhkit.planning.obstacles.solids import capsule_distances, obstacle_distances
+from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, Solids, check_obstacles
+from dhkit.planning.obstacles.solids import (
+    Bounds,
+    axis_bounds,
+    capsule_distances,
+    obstacle_distances,
+    segment_distances,
+    shape_distances,
+)
 
 EQUAL_BOUNDS = 1e-7
 """Difference of bounds (m) that counts as equal: coal's distances are accurate to about 1e-9."""

@@ -12,10 +12,8 @@ import numpy as np
 from dhkit.description import Array, Convention, Description, link_transforms, world_to_frames
 from dhkit.model.shapes import MeshVersions, link_parts, mesh_versions
 from dhkit.planning.obstacles.capsules import LinkBody, link_capsules, world_axes
-from dhkit.planning.obstacles.link_shapes import shape_distances
 from dhkit.planning.obstacles.scene import Floor, Obstacle
-from dhkit.planning.obstacles.segments import segment_distances
-from dhkit.planning.obstacles.solids import obstacle_distances
+from dhkit.planning.obstacles.solids import obstacle_distances, segment_distances, shape_distances
 
 SAMPLES = 4000
 """Number of random configurations from which the pairs are chosen."""

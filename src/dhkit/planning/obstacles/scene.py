@@ -1,4 +1,4 @@
-"""Obstacles in the world: boxes, spheres, capsules and a floor."""
+"""Obstacles in the world: boxes, spheres, capsules and a floor; and many of them as arrays."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from dhkit.description import Array, Box, Capsule, Sphere, check_pose
 from dhkit.description.arrays import number_array
@@ -245,3 +245,61 @@ def _shown(array: Array) -> str:
 def _frozen(array: Array) -> Array:
     array.setflags(write=False)
     return array
+
+
+@dataclass(frozen=True, eq=False)
+class Solids:
+    """P solids, all boxes or none.
+
+    Attributes
+    ----------
+    are_boxes
+        Whether they are boxes; else spheres and capsules.
+    centres
+        Shape (P, 3), m.
+    radii
+        Distances of the surfaces from the boxes, segments or points inside, shape (P,), m.
+    half_sizes
+        Half the edges of those boxes, shape (P, 3), m.
+    placements
+        Poses in the world, shape (P, 4, 4), m.
+    axes
+        Ends of the axes, shape (P, 2, 3), m.
+    """
+
+    are_boxes: bool
+    centres: Array
+    radii: Array
+    half_sizes: Array
+    placements: Array
+    axes: Array
+
+    @classmethod
+    def of(cls, items: Sequence[Obstacle]) -> Solids:
+        """Return obstacles of one kind as arrays."""
+        return cls(
+            bool(items) and isinstance(items[0].geometry, Box),
+            np.array([item.centre for item in items]).reshape(-1, 3),
+            np.array([item.radius for item in items]),
+            np.array([item.half_sizes for item in items]).reshape(-1, 3),
+            np.array([item.T_world_obstacle for item in items]).reshape(-1, 4, 4),
+            np.array([item.axis for item in items]).reshape(-1, 2, 3),
+        )
+
+    @property
+    def bounds(self) -> Array:
+        """Radii of balls around the solids, shape (P,), m."""
+        bounds: Array = self.radii + np.linalg.norm(self.half_sizes, axis=1)
+        return bounds
+
+    def __getitem__(self, which: NDArray[np.int_]) -> Solids:
+        """Return some of them."""
+        arrays = (self.centres, self.radii, self.half_sizes, self.placements, self.axes)
+        return Solids(self.are_boxes, *(array[which] for array in arrays))
+
+    def reach(self, which: NDArray[np.int_], normals: Array) -> Array:
+        """Return how far P of them reach along M directions (M, 3), shape (M, P), m."""
+        halves = self.placements[which, :3, :3] * self.half_sizes[which, None]  # half edges, as columns
+        along = np.abs(np.einsum("ix,jxa->ija", normals, halves)).sum(axis=2)
+        reach: Array = normals @ self.centres[which].T + along + self.radii[which]
+        return reach

@@ -4,6 +4,9 @@ Solids are convex. The plane at a solid's nearest point, at right angles to the 
 solid on one side: while a link stays on the other side, the two cannot meet. Planes are linear in the positions of the
 links, so that an optimizer needs no distances. A plane between two links moves with one of them, so that it need not
 move when they move together.
+
+A plane that separates a link from one obstacle separates it from every solid behind that plane too. Of copies, and of
+the obstacles of a wall or a heap, few planes are left, with the same motions allowed.
 """
 
 from __future__ import annotations
@@ -18,15 +21,16 @@ from numpy.typing import NDArray
 from dhkit.description import Array, Box, Description, world_to_frames
 from dhkit.planning.obstacles.capsules import link_capsules, world_axes
 from dhkit.planning.obstacles.pairs import Pair, capsules_beside, ends_above, link_pairs
-from dhkit.planning.obstacles.scene import Floor, Obstacle
-from dhkit.planning.obstacles.segments import nearest_on_box, nearest_points
-from dhkit.planning.obstacles.solid_arrays import Solids, needed_planes
+from dhkit.planning.obstacles.scene import Floor, Obstacle, Solids
+from dhkit.planning.obstacles.solids import nearest_on_box, nearest_points
 
 Indices = NDArray[np.int_]
 
 ZERO = 1e-12
 """Length (m) of the shortest connection below which its direction is undefined."""
 UP = np.array([0.0, 0.0, 1.0])
+BEHIND_TOLERANCE = 1e-9
+"""Distance (m) by which a solid may stand before a plane and counts as behind it: of copies only rounding differs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +173,7 @@ class Separation:
                     which = which[np.argsort(gaps.gap[k, which + group.part.start], kind="stable")]
                     p = which + group.part.start
                     planes = gaps.normal[k, p], gaps.level[k, p], margins[k, p]
-                    needed[k, p] = needed_planes(group.solids, which, *planes)
+                    needed[k, p] = _needed_planes(group.solids, which, *planes)
         return needed
 
     def _near(self, axes: Array, group: _Group, near: float) -> tuple[Indices, Indices]:
@@ -284,3 +288,27 @@ class _Group:
     def is_of_links(self) -> bool:
         """Whether its pairs are links."""
         return self.solids is None and self.floor is None
+
+
+def _needed_planes(
+    solids: Solids, which: NDArray[np.int_], normal: Array, level: Array, required: Array
+) -> NDArray[np.bool_]:
+    """Return which planes between a link and solids are needed, shape (P,).
+
+    Parameters
+    ----------
+    which
+        Indices of the solids, the nearest first, shape (P,).
+    normal, level
+        Their planes: normals towards the link, shape (P, 3), and positions along them, shape (P,), m.
+    required
+        Distances of the link from each plane, shape (P,), m.
+    """
+    # Entry (i, j): whether solid j, with the distance required from it, is behind what the link keeps from plane i.
+    shields = solids.reach(which, normal) + required <= (level + required)[:, None] + BEHIND_TOLERANCE
+    needed, is_shielded = np.zeros((2, len(which)), dtype=bool)
+    for i in range(len(which)):
+        if not is_shielded[i]:
+            needed[i] = True
+            is_shielded |= shields[i]
+    return needed

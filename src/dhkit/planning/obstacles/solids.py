@@ -1,18 +1,37 @@
-"""Exact signed distances of capsules from solids and from each other, by coal (formerly hpp-fcl)."""
+"""Distances of two solids: bounds in closed form, and exact signed ones by coal (formerly hpp-fcl).
+
+The bounds, of points, segments and boxes, exclude pairs before exact distances are measured: of capsules, of obstacles,
+and of the shapes of links whose capsules are too wide for them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import product
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dhkit.description import Array, Box, Capsule
+from dhkit.description import Array, Box, Capsule, Cylinder, Description, Sphere, world_to_frames
 from dhkit.errors import ModelError
-from dhkit.planning.obstacles.scene import Obstacle, rotations_onto
+from dhkit.model.shapes import MeshVersions, Part, link_parts, mesh_versions
+from dhkit.planning.obstacles.capsules import LinkBody, convex_hull
+from dhkit.planning.obstacles.scene import Obstacle, Solids, rotations_onto
 
 if TYPE_CHECKING:
     CoalModule: TypeAlias = Any
 
+POINTS = 9
+"""Number of points of an axis at which its distance from a box is bounded."""
+
+ZERO = 1e-15
+"""Squared length (m^2), or that times a squared sine, below which a direction is undefined."""
+
+Bounds = tuple[Array, Array]
+"""Lower and upper bounds of a distance, shape (...) each, m."""
 POINT = 1e-9
 """Length of an axis (m) below which its capsule is a ball."""
 FAILED = -1e300
@@ -23,6 +42,124 @@ UNKNOWN_DEPTH = -1e-6
 """Distance, m, of solids that penetrate each other to a depth that is not found."""
 TOLERANCE = 1e-9
 """Tolerance of coal's iterations, m; its default is 1e-6."""
+SHORT = 1e-12
+"""Length of a vector, m, below which it has no direction."""
+
+
+def segment_distances(first: Array, second: Array) -> Array:
+    """Return the distances of segments (Ericson, Real-Time Collision Detection, 2005, section 5.1.9).
+
+    Parameters
+    ----------
+    first, second
+        Ends of the segments, shape (..., 2, 3), m; batch axes are broadcast. Ends may coincide.
+
+    Returns
+    -------
+    Array
+        Distances, shape (...), m.
+    """
+    own, theirs = nearest_points(first, second)
+    distances: Array = np.linalg.norm(own - theirs, axis=-1)
+    return distances
+
+
+def nearest_points(first: Array, second: Array) -> tuple[Array, Array]:
+    """Return the nearest points of segments, shape (..., 3) each, m, on the first and on the second.
+
+    Parameters
+    ----------
+    first, second
+        As in :func:`segment_distances`.
+    """
+    p, d1 = first[..., 0, :], first[..., 1, :] - first[..., 0, :]
+    other, d2 = second[..., 0, :], second[..., 1, :] - second[..., 0, :]
+    r = p - other
+    a, b, e = _dot(d1, d1), _dot(d1, d2), _dot(d2, d2)
+    c, f = _dot(d1, r), _dot(d2, r)
+    s = np.clip(_quotient(b * f - c * e, a * e - b * b), 0.0, 1.0)
+    t = np.clip(_quotient(b * s + f, e), 0.0, 1.0)
+    s = np.clip(_quotient(b * t - c, a), 0.0, 1.0)
+    return p + s[..., None] * d1, other + t[..., None] * d2
+
+
+def nearest_on_box(axes: Array, T_world_box: Array, half_sizes: Array) -> tuple[Array, Array]:
+    """Return the nearest points of segments and a box, shape (..., 3) each, m, on the segment and in the box.
+
+    The derivative of the squared distance along a segment is piecewise linear and grows: its zero lies between two of
+    the positions at which a coordinate enters or leaves the box.
+
+    Parameters
+    ----------
+    axes
+        Ends of the segments, shape (..., 2, 3), m.
+    T_world_box
+        Pose of the box, shape (..., 4, 4), m; batch axes are broadcast.
+    half_sizes
+        Half the edges, shape (..., 3), m; zeros for a point or a segment.
+    """
+    R, centre, half = T_world_box[..., :3, :3], T_world_box[..., None, :3, 3], half_sizes[..., None, :]
+    ends = (axes - centre) @ R
+    start, along = ends[..., 0, :], ends[..., 1, :] - ends[..., 0, :]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossings = np.concatenate([(-half_sizes - start) / along, (half_sizes - start) / along], axis=-1)
+    shares = np.clip(np.nan_to_num(crossings, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
+    edges = np.zeros((*shares.shape[:-1], 1))
+    shares = np.sort(np.concatenate([edges, shares, edges + 1], axis=-1), axis=-1)
+    points = start[..., None, :] + shares[..., None] * along[..., None, :]
+    slopes = np.sum(along[..., None, :] * (points - np.clip(points, -half, half)), axis=-1)
+    last = np.maximum(np.sum(slopes < 0, axis=-1, keepdims=True) - 1, 0)
+    after = np.minimum(last + 1, shares.shape[-1] - 1)
+    (s0, g0), (s1, g1) = (
+        [np.take_along_axis(array, k, axis=-1)[..., 0] for array in (shares, slopes)] for k in (last, after)
+    )
+    s = np.where(g0 >= 0, s0, np.where(g1 < 0, s1, s0 + (s1 - s0) * _quotient(-g0, g1 - g0)))
+    own = (start + s[..., None] * along)[..., None, :]
+    R_world_box = np.swapaxes(R, -1, -2)
+    found = own @ R_world_box + centre, np.clip(own, -half, half) @ R_world_box + centre
+    return found[0][..., 0, :], found[1][..., 0, :]
+
+
+def axis_bounds(solids: Solids, axes: Array) -> Bounds:
+    """Return bounds of the signed distances of segments from solids.
+
+    Parameters
+    ----------
+    solids
+        P solids.
+    axes
+        Ends of the segments, shape (..., P, 2, 3), m: the last batch axis goes with the solids.
+    """
+    if solids.are_boxes:
+        return _box_bounds(solids, axes)
+    distance = segment_distances(axes, solids.axes) - solids.radii
+    return distance, distance
+
+
+def _box_bounds(solids: Solids, axes: Array) -> Bounds:
+    ends = (axes - solids.centres[:, None]) @ solids.placements[:, :3, :3]
+    share = np.linspace(0, 1, POINTS)[:, None]
+    points = ends[..., :1, :] + share * (ends[..., 1:, :] - ends[..., :1, :])
+    beyond = np.abs(points) - solids.half_sizes[:, None]
+    signed = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + np.minimum(beyond.max(axis=-1), 0.0)
+    length = np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1)
+    least = signed.min(axis=-1)
+    # No point of the segment is farther than half a step from a sampled point. A segment that is partly inside is
+    # bounded only by the ball around its middle, since it may have to move its own length to get out.
+    outside = least - length / (2 * (POINTS - 1))
+    return np.where(outside > 0, outside, signed[..., POINTS // 2] - length / 2), least
+
+
+def _dot(first: Array, second: Array) -> Array:
+    """Return scalar products along the last axis: five times as fast as a product and its sum over three numbers."""
+    products: Array = np.einsum("...i,...i->...", first, second)
+    return products
+
+
+def _quotient(numerator: Array, denominator: Array) -> Array:
+    """Return a quotient, 0 where the denominator is 0."""
+    quotient: Array = np.divide(numerator, denominator, out=np.zeros_like(numerator), where=denominator > ZERO)
+    return quotient
 
 
 def obstacle_distances(radius: float, axes: Array, obstacle: Obstacle) -> Array:
@@ -133,3 +270,137 @@ def coal_module() -> CoalModule:
             "planning around obstacles checks its paths with it"
         ) from None
     return coal
+
+
+@dataclass(frozen=True, eq=False)
+class _Solid:
+    """A convex solid that moves with a link."""
+
+    shape: Any
+    """coal's."""
+    T_link_solid: Array
+    """Pose in the link's DH frame, shape (4, 4), m."""
+    extent: Callable[[Array], Array]
+    """Support function: the largest n . x of its points x, m, for unit vectors n in its frame, shape (..., 3)."""
+
+
+def shape_distances(
+    description: Description, q: Array, bodies: tuple[LinkBody, LinkBody], enough: float = np.inf
+) -> Array:
+    """Return the signed distances between the shapes of two bodies of links, shape (N,), m; inf if one has none.
+
+    Boxes, spheres, cylinders and capsules are exact; a mesh counts as its convex hull.
+
+    Parameters
+    ----------
+    q
+        Joint values, shape (N, n), rad and m.
+    bodies
+        The two bodies.
+    enough
+        Distance, m, from which a lower bound of the distance is returned in its place: it takes 2 µs a state, and the
+        distance itself 50 µs.
+
+    Raises
+    ------
+    ModelError
+        coal is not installed, or a mesh cannot be read.
+    """
+    solids = _solids(description, mesh_versions(description))
+    frames = world_to_frames(description, q)
+    least = np.full(len(q), np.inf)
+    coal = coal_module()
+    request, result = distance_request(), coal.DistanceResult()
+    for first, second in product(*(solids.get(body, ()) for body in bodies)):
+        T1 = frames[:, bodies[0].link] @ first.T_link_solid
+        T2 = frames[:, bodies[1].link] @ second.T_link_solid
+        bound = _separation(first, T1, second, T2)
+        decided = bound >= np.minimum(least, enough)
+        least[decided] = np.minimum(least, bound)[decided]
+        for k in np.flatnonzero(~decided):
+            here, there = (
+                coal.Transform3s(np.ascontiguousarray(T[k, :3, :3]), np.ascontiguousarray(T[k, :3, 3]))
+                for T in (T1, T2)
+            )
+            gap = signed_distance(coal, first.shape, here, second.shape, there, request, result)
+            least[k] = min(least[k], gap)
+    return least
+
+
+def _separation(first: _Solid, T1: Array, second: _Solid, T2: Array) -> Array:
+    """Return the largest gap between two solids along one of several directions, shape (N,), m.
+
+    It is a lower bound of their distance: with the support function h of a solid, that is h(n) = max n . x over its
+    points x, a plane of normal n lies between them if the gap along n is positive,
+
+        gap(n) = n . (c2 - c1) - h1(n) - h2(-n),
+
+    and two convex solids are as far apart as the largest gap (Boyd and Vandenberghe 2004, ch. 8.1). Tried are the axes
+    of both solids, the line between their centres, its parts across an axis, and the common normal of the axes.
+    """
+    R1 = T1[:, :3, :3]
+    R2 = T2[:, :3, :3]
+    line = T2[:, :3, 3] - T1[:, :3, 3]
+    z1 = R1[:, :, 2]
+    z2 = R2[:, :, 2]
+    across = [line - np.sum(line * z, axis=1, keepdims=True) * z for z in (z1, z2)]
+    axes = [R[:, :, i] for R in (R1, R2) for i in range(3)]
+    n = np.stack([*axes, line, *across, np.cross(z1, z2)], axis=1)
+
+    length = np.linalg.norm(n, axis=2, keepdims=True)
+    n = np.divide(n, length, out=np.broadcast_to(z1[:, None], n.shape).copy(), where=length > SHORT)
+    along = np.einsum("nki,ni->nk", n, line)
+    n = np.where(along[..., None] < 0, -n, n)
+
+    # n in the frame of each solid, the second seen from outside.
+    gaps: Array = np.abs(along) - first.extent(n @ R1) - second.extent(-n @ R2)
+    largest: Array = gaps.max(axis=1)
+    return largest
+
+
+@lru_cache(maxsize=64)
+def _solids(description: Description, meshes: MeshVersions) -> dict[LinkBody, tuple[_Solid, ...]]:
+    """Return the solids of each body that has any."""
+    found: dict[LinkBody, tuple[_Solid, ...]] = {}
+    for part in link_parts(description):
+        body = LinkBody(part.link, part.body)
+        found[body] = (*found.get(body, ()), _solid(part))
+    return found
+
+
+def _solid(part: Part) -> _Solid:
+    coal = coal_module()
+    T = part.T_link_part
+    match part.geometry:
+        case Sphere():
+            r = float(part.geometry.radius)
+            return _Solid(coal.Sphere(r), T, lambda n: np.full(n.shape[:-1], r))
+        case Capsule():
+            r = float(part.geometry.radius)
+            half = float(part.geometry.length) / 2
+            return _Solid(coal.Capsule(r, 2 * half), T, lambda n: r + half * np.abs(n[..., 2]))
+        case Cylinder():
+            r = float(part.geometry.radius)
+            half = float(part.geometry.length) / 2
+            return _Solid(
+                coal.Cylinder(r, 2 * half), T, lambda n: r * np.hypot(n[..., 0], n[..., 1]) + half * np.abs(n[..., 2])
+            )
+        case Box():
+            edges = np.array([float(edge) for edge in part.geometry.size])
+            return _Solid(coal.Box(*edges.tolist()), T, lambda n: np.abs(n) @ (edges / 2))
+    corners, faces = convex_hull(part)
+    hull = coal.Convex(_vectors(corners), _triangles(faces))
+    return _Solid(hull, T, lambda n: np.max(n @ corners.T, axis=-1))
+
+
+def _vectors(corners: Array) -> Any:
+    vectors = coal_module().StdVec_Vec3s()
+    vectors.extend(corners)
+    return vectors
+
+
+def _triangles(faces: NDArray[np.int_]) -> Any:
+    coal = coal_module()
+    triangles = coal.StdVec_Triangle()
+    triangles.extend([coal.Triangle(*map(int, face)) for face in faces])
+    return triangles

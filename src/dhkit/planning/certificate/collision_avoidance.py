@@ -1,0 +1,363 @@
+"""Obstacles of a motion, and the clearance that a certificate checks by coal."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.description import Array, Description
+from dhkit.errors import PlanningError
+from dhkit.planning.certificate.between_states import smallest_between
+from dhkit.planning.criteria import Constraint, States, joint_limits
+from dhkit.planning.obstacles import (
+    Floor,
+    LinkBody,
+    Obstacle,
+    Pair,
+    Scene,
+    Separation,
+    check_obstacles,
+    checked_pairs,
+    distance,
+    link_capsules,
+    link_pairs,
+    not_checked,
+    pair_distances,
+    shape_distances,
+    smallest_distances,
+    standing,
+    world_axes,
+)
+from dhkit.planning.second_check import Claim
+from dhkit.trajectories import Limits
+
+BETWEEN, MIN_BETWEEN = 0.1, 1e-3
+"""Share of the clearance, at least in m, by which a distance may fall below it between two states of a certificate."""
+MEASURED = 0.02
+"""Distance, m, beyond the required one up to which distances between shapes are measured, and not bounded."""
+KEPT_SHARE = 0.75
+"""Share of a gap at an end of a motion to which the clearance is reduced there: a link may come a little nearer on its
+way out of a narrow place."""
+LEAVING = 10.0
+"""Travel of a link from its place at an end of a motion, as a multiple of the clearance, within which its clearance is
+reduced."""
+
+
+def _without_slack(required: Array) -> Array:
+    """Return the distances that are asked for between two states, m, of those that are required at states."""
+    slack = np.minimum(np.maximum(BETWEEN * required, MIN_BETWEEN), required)
+    return np.asarray(required - slack)
+
+
+@dataclass(frozen=True)
+class ReducedClearance:
+    """A pair that is nearer than the clearance at the start or the goal of a motion, and what it keeps there."""
+
+    pair: Pair
+    names: tuple[str, str]
+    """Names of the link and of what it is near."""
+    start: float
+    """Distance to keep near the start, m; without effect where it is above the clearance."""
+    goal: float
+
+    def __str__(self) -> str:
+        return f"{1000 * min(self.start, self.goal):.3g} mm between {self.names[0]} and {self.names[1]}"
+
+
+@dataclass(frozen=True)
+class LinkClearance:
+    """Two links that are measured by their shapes, and the distance that they keep during a whole motion."""
+
+    bodies: tuple[LinkBody, LinkBody]
+    kept: float
+    """Distance to keep, m: the clearance, or less where the links are nearer at the start or the goal."""
+
+    def __str__(self) -> str:
+        first, second = (body.name for body in self.bodies)
+        return f"{1000 * self.kept:.3g} mm between {first} and {second}"
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionAvoidance:
+    """Obstacles of a motion, and the clearance from them and between links."""
+
+    obstacles: tuple[Obstacle | Floor, ...] = ()
+    clearance: float = 0.01
+    """Smallest distance, m."""
+    self_collision: bool = False
+    reduced: tuple[ReducedClearance, ...] = ()
+    by_shapes: tuple[LinkClearance, ...] = ()
+    """Links that are measured by their shapes."""
+    ends: Array | None = None
+    """Joint values at the start and the goal, shape (2, n), rad and m, where clearances are reduced."""
+    is_reduced_throughout: bool = False
+    """Whether they are reduced during the whole motion, not only near the ends."""
+
+    @classmethod
+    def of(cls, obstacles: Scene, clearance: float, self_collision: bool) -> CollisionAvoidance:
+        """Return checked settings.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A clearance that is negative, not finite or no number; a choice that is neither True nor False.
+        """
+        if isinstance(clearance, bool) or not isinstance(clearance, Real):
+            raise TypeError(f"clearance is {clearance!r}; expected a number of at least 0, m")
+        if not isinstance(self_collision, bool | np.bool_):
+            raise TypeError(f"self_collision is {self_collision!r}; expected True or False")
+        if not (math.isfinite(clearance) and clearance >= 0):
+            raise ValueError(f"clearance is {clearance!r}; expected a number of at least 0, m")
+        obstacles = check_obstacles(obstacles)
+        # Of copies, one is kept.
+        unlike = {(item.geometry, item.placement) if isinstance(item, Obstacle) else item: item for item in obstacles}
+        return cls(tuple(unlike.values()), float(clearance), bool(self_collision))
+
+    def __bool__(self) -> bool:
+        return bool(self.obstacles) or self.self_collision
+
+    @property
+    def names(self) -> str:
+        """Names of the obstacles, as text."""
+        counted = Counter([item.name for item in self.obstacles] + ["itself"] * self.self_collision)
+        return ", ".join(name if count == 1 else f"{count} x {name}" for name, count in counted.items())
+
+    def report(self, arm: Description, excess: float) -> dict[str, Any]:
+        """Return the fields of a :class:`dhkit.planning.PlanReport`; ``excess`` is the certificate's, m."""
+        if not self:
+            return {}
+        return {
+            "clearance": self.clearance,
+            "clear_of": " and ".join(
+                ["from obstacles"] * bool(self.obstacles) + ["between links"] * self.self_collision
+            ),
+            "spare_clearance": -excess,
+            "reduced_clearances": tuple(
+                str(reduced)
+                for reduced in (*self.reduced, *(pair for pair in self.by_shapes if pair.kept < self.clearance))
+            ),
+            "not_checked": not_checked(arm, self.obstacles, self.self_collision, self.clearance),
+            "is_clearance_reduced_throughout": self.is_reduced_throughout,
+        }
+
+    @property
+    def kept_in_part(self) -> tuple[str, ...]:
+        """Where less than the clearance is kept, in words."""
+        where = "during the whole motion" if self.is_reduced_throughout else "near the ends"
+        near_ends = (f"all of the clearance {where}: {one}" for one in self.reduced if min(one.start, one.goal) > 0)
+        by_shapes = (pair for pair in self.by_shapes if pair.kept < self.clearance)
+        return (*near_ends, *(f"all of the clearance during the whole motion: {pair}" for pair in by_shapes))
+
+    def between(self, description: Description, start: Array, goal: Array) -> CollisionAvoidance:
+        """Return the settings for a motion between two configurations (n,), with the reduced clearances of its ends.
+
+        Raises
+        ------
+        PlanningError
+            A clearance larger than the space in which the arm moves.
+        """
+        if self.clearance > (size := checked_pairs(description).size):
+            raise PlanningError(f"clearance is {self.clearance:.4g} m; the arm itself reaches over {size:.4g} m")
+        separation = Separation(description, self.obstacles, self.self_collision)
+        ends = separation.gaps(np.stack([start, goal])[:, None]).gap
+        reduced = []
+        for p in np.flatnonzero(ends.min(axis=0, initial=np.inf) < self.clearance):
+            pair = separation.pairs[p]
+            other = separation.capsules[pair.other].name if pair.other is not None else ""
+            names = separation.capsules[pair.capsule].name, other or self.obstacles[pair.obstacle or 0].name
+            reduced.append(ReducedClearance(pair, names, *(KEPT_SHARE * ends[:, p]).tolist()))
+        at_ends = np.stack([start, goal])
+        by_shapes = []
+        for bodies in link_pairs(description).shapes if self.self_collision else ():
+            gap = float(shape_distances(description, at_ends, bodies).min())
+            by_shapes.append(LinkClearance(bodies, self.clearance if gap >= self.clearance else KEPT_SHARE * gap))
+        return replace(self, reduced=tuple(reduced), by_shapes=tuple(by_shapes), ends=at_ends)
+
+    def claims(self, description: Description) -> tuple[Claim, ...]:
+        """Return the distances that a certificate claims: of all links but those that reports name as not checked.
+
+        A clearance that is reduced at an end counts as reduced during the whole motion.
+        """
+        capsules = link_capsules(description)
+        with_obstacle: dict[tuple[int, int], float] = {}
+        with_link: dict[tuple[int, int], float] = {}
+        for reduced in self.reduced:
+            link, gap = capsules[reduced.pair.capsule].link, min(reduced.start, reduced.goal, self.clearance)
+            if reduced.pair.other is None:
+                place = link, reduced.pair.obstacle or 0
+                with_obstacle[place] = min(gap, with_obstacle.get(place, gap))
+            else:
+                other = capsules[reduced.pair.other].link
+                place = min(link, other), max(link, other)
+                with_link[place] = min(gap, with_link.get(place, gap))
+        for pair in self.by_shapes:
+            links = pair.bodies[0].link, pair.bodies[1].link
+            with_link[links] = min(pair.kept, with_link.get(links, pair.kept))
+
+        claims = []
+        for k, obstacle in enumerate(self.obstacles):
+            beside = {link for link, gap in standing(description, obstacle) if gap < self.clearance}
+            claims += [
+                Claim(link, obstacle, with_obstacle.get((link, k), self.clearance))
+                for link in range(1, description.n + 1)
+                if link not in beside
+            ]
+        if self.self_collision:
+            pairs = link_pairs(description)
+            named = {(a.link, b.link) for a, b in pairs.unchecked}
+            named |= {(a.link, b.link) for a, b, gap in pairs.steady if gap < self.clearance}
+            claims += [
+                Claim(b, a, with_link.get((a, b), self.clearance))
+                for a, b in combinations(range(description.n + 1), 2)
+                if b - a > 1 and (a, b) not in named
+            ]
+        return tuple(claims)
+
+    @property
+    def reduced_throughout(self) -> CollisionAvoidance:
+        """The same, with clearances that are reduced at an end reduced during the whole motion."""
+        return replace(self, is_reduced_throughout=True)
+
+    def at_ends(self, pairs: Sequence[Pair]) -> Array:
+        """Return the reduced clearances of pairs at the start and the goal, shape (P, 2), m; inf if not reduced."""
+        ends = {reduced.pair: (reduced.start, reduced.goal) for reduced in self.reduced}
+        return np.array([ends.get(pair, (np.inf, np.inf)) for pair in pairs]).reshape(-1, 2)
+
+    def required(self, description: Description, q: Array, pairs: Sequence[Pair]) -> Array:
+        """Return the required gaps of pairs at states q (N, n), shape (N, P), m.
+
+        A pair that is nearer than the clearance at an end keeps less while its links are near where they are there.
+        """
+        need = np.full((len(q), len(pairs)), self.clearance)
+        if self.reduced and self.ends is not None:
+            axes, at_ends = world_axes(description, q), world_axes(description, self.ends)
+            for p, kept in zip(range(len(pairs)), self.at_ends(pairs), strict=True):
+                links = [link for link in (pairs[p].capsule, pairs[p].other) if link is not None]
+                for end in np.flatnonzero(kept < self.clearance):
+                    travel = np.linalg.norm(axes[:, links] - at_ends[end, links], axis=-1).max(axis=(1, 2))
+                    near = (travel < LEAVING * self.clearance) | self.is_reduced_throughout
+                    need[near, p] = np.minimum(need[near, p], kept[end])
+        return need
+
+    def shortfalls(self, states: States) -> Array:
+        """Return how much is missing of the required distances along a motion, shape (N,), m; by coal.
+
+        At the states the distances themselves are required, and between them all but ``BETWEEN`` of them.
+        """
+        pairs, description = [reduced.pair for reduced in self.reduced], states.description
+
+        def gaps(q: Array) -> Array:
+            return np.column_stack([self._distances(description, q), self._reduced_distances(description, q)])
+
+        found = gaps(states.q)
+        required = np.full(found.shape, self.clearance)
+        if pairs:
+            required[:, 1:] = self.required(description, states.q, pairs)
+        # Between two states, what is required at one of them.
+        required_between = np.minimum(required, np.append(required[1:], required[-1:], axis=0))
+        least = _without_slack(required_between)
+        between = smallest_between(states, found, gaps, least)
+        missing = np.where(between < least, required_between - between, -np.inf)
+        short = np.maximum(required - found, missing).max(axis=1)
+        result: Array = np.maximum(short, self._shortfalls_of_shapes(states))
+        return result
+
+    def _shortfalls_of_shapes(self, states: States) -> Array:
+        """Return how much is missing of the distances between links that are measured by their shapes, (N,), m."""
+        if not self.by_shapes:
+            return np.full(len(states.q), -np.inf)
+        kept = np.array([pair.kept for pair in self.by_shapes])
+        found = self._shape_gaps(states.description, states.q, MEASURED)
+        least = np.broadcast_to(_without_slack(kept), found.shape)
+
+        def gaps(q: Array) -> Array:
+            return self._shape_gaps(states.description, q, MEASURED)
+
+        # A shape lies in its link's capsules, so that its points are at most a radius away from their axes.
+        largest_radius = max(capsule.radius for capsule in link_capsules(states.description))
+        between = smallest_between(states, found, gaps, least, largest_radius)
+        missing = np.where(between < least, kept - between, -np.inf)
+        shortfalls: Array = np.maximum(kept - found, missing).max(axis=1)
+        return shortfalls
+
+    def _shape_gaps(self, description: Description, q: Array, more: float) -> Array:
+        """Return the distances of the links that are measured by their shapes, shape (N, E), m.
+
+        They are lower bounds where links are farther apart than they must be by ``more``, m.
+        """
+        gaps = [shape_distances(description, q, pair.bodies, pair.kept + more) for pair in self.by_shapes]
+        return np.stack(gaps, axis=1) if gaps else np.zeros((len(q), 0))
+
+    def keeps_shapes_apart(self, description: Description, q: Array) -> NDArray[np.bool_]:
+        """Return whether links that are measured by their shapes keep their distances at states q (N, n)."""
+        kept = np.array([pair.kept for pair in self.by_shapes])
+        apart: NDArray[np.bool_] = np.all(self._shape_gaps(description, q, 0.0) >= kept, axis=1)
+        return apart
+
+    def _distances(self, description: Description, q: Array) -> Array:
+        """Return the smallest distance of pairs whose clearance is not reduced, shape (N,), m."""
+        without = [reduced.pair for reduced in self.reduced]
+        return smallest_distances(description, q, self.obstacles, self.self_collision, without)
+
+    def _reduced_distances(self, description: Description, q: Array) -> Array:
+        """Return the distances of the pairs whose clearance is reduced, shape (N, P), m."""
+        each = [pair_distances(description, q, self.obstacles, reduced.pair) for reduced in self.reduced]
+        return np.stack(each, axis=1) if each else np.zeros((len(q), 0))
+
+    def require_gap(self, description: Description, q: Array, where: str, least: float) -> None:
+        """Require a distance of at least ``least`` (m), and no collision, at one configuration q (n,), rad and m.
+
+        Raises
+        ------
+        PlanningError
+            Names the link, the obstacle and the gap.
+        """
+        found = distance(description, q, self.obstacles, self.self_collision)
+        gap = float(found.distance)
+        if gap >= least and gap > 0:
+            return
+        who, what = found.pair or ("the arm", "an obstacle")
+        state = f"{1000 * gap:.3g} mm from" if gap > 0 else f"{-1000 * gap:.3g} mm inside"
+        raise PlanningError(f"{where}: {who} is {state} {what}, {1000 * self.clearance:.3g} mm are asked for")
+
+
+NO_AVOIDANCE = CollisionAvoidance()
+
+
+@dataclass(frozen=True, eq=False)
+class Clearance(Constraint):
+    """The clearance from obstacles, measured by coal; an optimizer keeps it by planes, see ``avoiding.py``."""
+
+    avoidance: CollisionAvoidance
+    moving = False
+    active_share = 0.999
+
+    @property
+    def what(self) -> str:
+        """Name of the limited quantity."""
+        return "clearance"
+
+    @property
+    def is_limiting(self) -> bool:
+        """Whether there are obstacles."""
+        return bool(self.avoidance)
+
+    def measured(self, states: States, parameters: Array) -> Array:
+        """Return 1 plus what is missing of the required distances in m, shape (N, 1); at least 0."""
+        short = self.avoidance.shortfalls(states)
+        return 1 + np.maximum(short[:, None], -1.0)
+
+
+def motion_constraints(
+    limits: Limits, avoidance: CollisionAvoidance, constraints: Sequence[Constraint]
+) -> tuple[Constraint, ...]:
+    """Return all constraints of a motion: those of :class:`dhkit.planning.criteria.Limit`, then the given ones."""
+    return (*joint_limits(limits), Clearance(avoidance), *constraints)

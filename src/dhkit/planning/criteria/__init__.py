@@ -1,0 +1,56 @@
+"""Criteria of motions: what is minimized, what is limited, and the states in which both are written."""
+
+from dhkit.planning.criteria.constraints import (
+    Constraint,
+    Limit,
+    MotorPower,
+    PositionLimit,
+    ToolAcceleration,
+    ToolDirection,
+    ToolOrientation,
+    ToolSpeed,
+    TorqueSpeedLine,
+    joint_limits,
+    require_value,
+)
+from dhkit.planning.criteria.objectives import (
+    OBJECTIVES,
+    Effort,
+    Energy,
+    Jerk,
+    Objective,
+    ObjectiveLike,
+    Time,
+    cost_of,
+    size_of,
+)
+from dhkit.planning.criteria.states import LOAD, LoadedArm, Point, States, loaded, prepare
+
+__all__ = [
+    "LOAD",
+    "OBJECTIVES",
+    "Constraint",
+    "Effort",
+    "Energy",
+    "Jerk",
+    "Limit",
+    "LoadedArm",
+    "MotorPower",
+    "Objective",
+    "ObjectiveLike",
+    "Point",
+    "PositionLimit",
+    "States",
+    "Time",
+    "ToolAcceleration",
+    "ToolDirection",
+    "ToolOrientation",
+    "ToolSpeed",
+    "TorqueSpeedLine",
+    "cost_of",
+    "joint_limits",
+    "loaded",
+    "prepare",
+    "require_value",
+    "size_of",
+]

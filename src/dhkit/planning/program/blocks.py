@@ -1,0 +1,284 @@
+"""Nonlinear programs made of blocks: one small function, applied at many points, with exact sparse derivatives.
+
+CasADi would derive a whole program at once, in time proportional to its size. Here each small function is derived once
+and evaluated at all its points; the derivatives of the program are these values at other indices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.description import Array
+
+if TYPE_CHECKING:
+    import casadi
+
+Indices = NDArray[np.int_]
+
+
+class LocalFunction:
+    """Rows and a cost of a few variables, with their first and second derivatives.
+
+    Parameters
+    ----------
+    z, p
+        Variables and parameters, symbols of shape (., 1).
+    rows
+        Expressions of shape (m, 1), without unit.
+    cost
+        Expression of shape (1, 1) that is added to the objective.
+    """
+
+    def __init__(self, z: casadi.SX, p: casadi.SX, rows: casadi.SX, cost: casadi.SX | None = None) -> None:
+        import casadi
+
+        cost = casadi.SX(1, 1) if cost is None else cost
+        rows, self.has_cost = casadi.densify(rows), cost.nnz() > 0
+        self.count: int = rows.numel()
+        multipliers, weight = casadi.SX.sym("multipliers", self.count), casadi.SX.sym("weight")
+        jacobian, gradient = casadi.jacobian(rows, z), casadi.jacobian(cost, z).T
+        hessian = casadi.triu(casadi.hessian(weight * cost + casadi.dot(multipliers, rows), z)[0])
+
+        def function(name: str, inputs: list[casadi.SX], result: casadi.SX) -> casadi.Function:
+            return casadi.Function(name, inputs, [result], {"cse": True})
+
+        self.rows, self.cost = function("rows", [z, p], rows), function("cost", [z, p], casadi.densify(cost))
+        # Derivatives return their nonzeros, (nonzeros, 1), whose rows and columns are these.
+        self.jacobian, self.jacobian_at = function("jacobian", [z, p], _nonzeros(jacobian)), _triplet(jacobian)
+        self.gradient, self.gradient_at = function("gradient", [z, p], _nonzeros(gradient)), _triplet(gradient)
+        inputs = [z, p, multipliers, weight]
+        self.hessian, self.hessian_at = function("hessian", inputs, _nonzeros(hessian)), _triplet(hessian)
+
+
+class RowKind(Enum):
+    """What rows are for, which decides their bounds and units."""
+
+    CONTINUITY = "continuity"
+    """Zero: a variable equals an expression."""
+    TIME = "time"
+    """At most zero: the time that an interval takes beyond its duration."""
+    DURATION = "duration"
+    """The duration of the motion."""
+    LIMIT = "limit"
+    """A limit of the motion."""
+    PLANE = "plane"
+    """At least zero: the distance beyond a plane, m."""
+    POSITIVE_PART = "positive part"
+    """At least zero: how far a variable exceeds the quantity whose positive part it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Rows of one kind at each point of a block."""
+
+    kind: RowKind
+    what: str
+    """Name of the limited quantity, for messages."""
+    count: int
+    """Number of rows at each point."""
+    limit: int = -1
+    """Place of the limit among the motion's constraints, see :class:`dhkit.planning.criteria.Limit`."""
+    order: int | None = None
+    """Order of the derivative by time of joint values that the rows are; None if they have no unit."""
+    of_joints: bool = False
+    """Whether there is one row for each joint."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A local function at P points of a program."""
+
+    function: LocalFunction
+    variables: Indices
+    """Indices of its variables in those of the program, shape (variables, P)."""
+    parameters: Indices
+    """Indices of its parameters in those of the program, shape (parameters, P)."""
+    rows: tuple[Rows, ...] = ()
+    """Kinds of its rows, in order."""
+    intervals: Indices | None = None
+    """First and last of the mesh's intervals that a point belongs to, shape (P, 2); None for the whole motion."""
+    is_limited: NDArray[np.bool_] | None = None
+    """Whether each point's rows are limited, shape (P,); None for all."""
+
+    @property
+    def points(self) -> int:
+        """The number of points."""
+        points: int = self.variables.shape[1]
+        return points
+
+    @property
+    def count(self) -> int:
+        """The number of rows at all points."""
+        count: int = self.function.count * self.points
+        return count
+
+
+@dataclass(frozen=True, eq=False)
+class Scaling:
+    """Units in which a program is solved."""
+
+    offset: Array
+    """Values that count as 0, shape (variables,)."""
+    unit: Array
+    """Units of the variables, shape (variables,)."""
+    row_unit: Array
+    """Units of the rows, shape (rows,)."""
+
+    @property
+    def vector(self) -> Array:
+        """All of them, in this order."""
+        return np.concatenate([self.offset, self.unit, self.row_unit])
+
+    def scaled(self, x: Array) -> Array:
+        """Return variables, shape (variables,), in these units."""
+        return (x - self.offset) / self.unit
+
+    def variables(self, scaled: Array) -> Array:
+        """Return variables from those in these units, shape (variables,)."""
+        return self.offset + self.unit * scaled
+
+
+@dataclass(frozen=True, eq=False)
+class BlockProgram:
+    """A nonlinear program: the sum of its blocks' costs, and all their rows, point by point."""
+
+    variables: int
+    """Number of variables."""
+    parameters: int
+    """Number of parameters."""
+    blocks: tuple[Block, ...]
+
+    @property
+    def rows(self) -> int:
+        """The number of rows."""
+        count: int = sum(block.count for block in self.blocks)
+        return count
+
+    def row_units(self, unit_of: Callable[[Rows], float]) -> Array:
+        """Return the units of all rows, shape (rows,), from those of their kinds."""
+        units = [np.zeros(0)]
+        for block in self.blocks:
+            each = [np.full(rows.count, unit_of(rows)) for rows in block.rows]
+            units.append(np.tile(np.concatenate([np.zeros(0), *each]), block.points))
+        return np.concatenate(units)
+
+    @property
+    def unscaled(self) -> Scaling:
+        """Units of 1."""
+        return Scaling(np.zeros(self.variables), np.ones(self.variables), np.ones(self.rows))
+
+    @cached_property
+    def functions(self) -> tuple[casadi.Function, dict[str, casadi.Function]]:
+        """The program's function of x and p for :func:`casadi.nlpsol`, and its derivatives as options of it.
+
+        The function's x are the variables less an offset over a scale, its rows are scaled, and its p are the
+        parameters followed by those of a :class:`Scaling`.
+        """
+        import casadi
+
+        scaled = casadi.MX.sym("x", self.variables)
+        given = casadi.MX.sym("p", self.parameters + 2 * self.variables + self.rows)
+        edges = np.cumsum([0, self.parameters, self.variables, self.variables, self.rows])
+        p, offset, unit, row_unit = casadi.vertsplit(given, edges.tolist())
+        scaled_multipliers, weight = casadi.MX.sym("lam_g", self.rows), casadi.MX.sym("lam_f")
+        x, multipliers = offset + unit * scaled, scaled_multipliers / row_unit
+        cost, rows = casadi.MX(1, 1), []
+        jacobian, gradient, hessian = (
+            _Nonzeros(shape) for shape in ((self.rows, self.variables), (self.variables, 1), (self.variables,) * 2)
+        )
+        begin = 0
+        for block in self.blocks:
+            function, points, at = block.function, block.points, block.variables
+            local = _gather(x, at), _gather(p, block.parameters)
+            if function.count:
+                rows.append(casadi.vec(function.rows.map(points)(*local)))
+                i, j = function.jacobian_at
+                here = begin + i[:, None] + function.count * np.arange(points)
+                jacobian.add(here, at[j], function.jacobian.map(points)(*local))
+            if function.has_cost:
+                cost += casadi.sum2(function.cost.map(points)(*local))
+                i, _ = function.gradient_at
+                gradient.add(at[i], np.zeros_like(at[i]), function.gradient.map(points)(*local))
+            i, j = function.hessian_at
+            if len(i):
+                multiplied = casadi.reshape(multipliers[begin : begin + block.count], function.count, points)
+                values = function.hessian.map(points)(*local, multiplied, casadi.repmat(weight, 1, points))
+                hessian.add(np.minimum(at[i], at[j]), np.maximum(at[i], at[j]), values)
+            begin += block.count
+        g = casadi.vertcat(casadi.MX(0, 1), *rows) / row_unit
+
+        inputs = {"x": scaled, "p": given}
+        weights = {"lam_f": weight, "lam_g": scaled_multipliers}
+
+        def function_of(arguments: dict[str, casadi.MX], results: dict[str, casadi.MX]) -> casadi.Function:
+            symbols, values = list(arguments.values()), list(results.values())
+            return casadi.Function("program", symbols, values, list(arguments), list(results))
+
+        return function_of(inputs, {"f": cost, "g": g}), {
+            "grad_f": function_of(inputs, {"f": cost, "grad_f_x": casadi.densify(gradient.matrix()) * unit}),
+            "jac_g": function_of(inputs, {"g": g, "jac_g_x": jacobian.matrix(1 / row_unit, unit)}),
+            "hess_lag": function_of({**inputs, **weights}, {"triu_hess_gamma_x_x": hessian.matrix(unit, unit)}),
+        }
+
+
+class _Nonzeros:
+    """Sparse matrix as a sum of values at given places."""
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        self.shape = shape
+        self._rows: list[Indices] = []
+        self._columns: list[Indices] = []
+        self._values: list[casadi.MX] = []
+
+    def add(self, rows: Indices, columns: Indices, values: casadi.MX) -> None:
+        """Add values, shape (k, P), at rows and columns of the same shape."""
+        import casadi
+
+        self._rows.append(rows.ravel(order="F"))
+        self._columns.append(columns.ravel(order="F"))
+        self._values.append(casadi.vec(values))
+
+    def matrix(self, row_factors: casadi.MX | None = None, column_factors: casadi.MX | None = None) -> casadi.MX:
+        """Return the matrix, with its rows and columns multiplied by factors, shape (rows, 1) and (columns, 1)."""
+        import casadi
+
+        if not self._values:
+            return casadi.MX(*self.shape)
+        rows, columns = np.concatenate(self._rows), np.concatenate(self._columns)
+        values = casadi.vertcat(*self._values)
+        # In CasADi's order, by columns; values at the same place are added.
+        places, order = np.unique(columns * self.shape[0] + rows, return_inverse=True)
+        i, j = (places % self.shape[0]).tolist(), (places // self.shape[0]).tolist()
+        if len(places) == len(order):
+            nonzeros = values[np.argsort(order).tolist()]
+        else:
+            adding = casadi.Sparsity.triplet(len(places), len(order), order.tolist(), list(range(len(order))))
+            nonzeros = casadi.DM(adding, 1.0) @ values
+        if row_factors is not None and column_factors is not None:
+            nonzeros = nonzeros * row_factors[i] * column_factors[j]
+        return casadi.MX(casadi.Sparsity.triplet(*self.shape, i, j), nonzeros)
+
+
+def _gather(vector: casadi.MX, indices: Indices) -> casadi.MX:
+    import casadi
+
+    if not indices.size:
+        return casadi.MX(*indices.shape)
+    return casadi.reshape(vector[indices.ravel(order="F").tolist()], *indices.shape)
+
+
+def _nonzeros(matrix: casadi.SX) -> casadi.SX:
+    column: casadi.SX = matrix.nz[:]
+    return column
+
+
+def _triplet(matrix: casadi.SX) -> tuple[Indices, Indices]:
+    rows, columns = matrix.sparsity().get_triplet()
+    return np.array(rows, dtype=int), np.array(columns, dtype=int)

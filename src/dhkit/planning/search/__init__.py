@@ -1,0 +1,14 @@
+"""Search: solve a program, certify its motion, tighten what it exceeds, solve again; around obstacles likewise."""
+
+from dhkit.planning.search.avoiding import FINER, motion_around
+from dhkit.planning.search.search import RESOLUTION, TIME_SCALING_MARGIN, PlannedMotion, Search, coarser
+
+__all__ = [
+    "FINER",
+    "RESOLUTION",
+    "TIME_SCALING_MARGIN",
+    "PlannedMotion",
+    "Search",
+    "coarser",
+    "motion_around",
+]

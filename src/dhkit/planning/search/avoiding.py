@@ -1,0 +1,395 @@
+"""Search for a motion around obstacles: sampled paths as starts, improved between planes that separate pairs.
+
+The best motion without obstacles is found first. If it collides, paths around the obstacles are sampled, and each is
+improved: planes between the arm and the obstacles near a motion that is clear of them keep the next one clear, in which
+the planes turn, until the cost no longer falls.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dhkit.description import Array
+from dhkit.errors import PlanningError
+from dhkit.planning.certificate import Certificate
+from dhkit.planning.criteria import Limit
+from dhkit.planning.obstacles import Gaps, Separation
+from dhkit.planning.program import Knots, Margins, MotionProgram, SearchLimitError, Task, knots_along
+from dhkit.planning.search.sampling import PathSampler
+from dhkit.planning.search.search import Excess, PlannedMotion, Search
+from dhkit.trajectories import Trajectory
+
+POINTS = 9
+"""Number of states of an interval at which gaps are measured, with both ends."""
+ACTIVE_GAP = 0.05
+"""Gap beyond the clearance (m) below which pairs are kept apart by planes; others only once they have come too near."""
+NO_SHORTFALL = 1e-6
+"""Shortfall of a gap (m) that counts as none."""
+INFLATION_FACTOR = 1.2
+"""Factor of a gap's shortfall between knots that is added to its margin."""
+FINER = 2.0
+"""Factor of the number of intervals of a finer mesh."""
+MAX_SOLUTIONS = 16
+"""Largest number of solutions in the improvement of one path."""
+EXPECTED_ROUNDS = 4
+"""Number of further improvements like the last one that a motion may need to become the best."""
+MIN_IMPROVEMENT = 2e-3
+"""Relative decrease of the cost below which a motion is no longer improved."""
+PATHS, MAX_PATHS = 4, 24
+"""Number of sampled paths that are improved, and of paths that are tried if none of them leads to a motion."""
+MAX_LENGTH_RATIO = 1.5
+"""Largest length of a path that is improved, relative to the shortest one."""
+PATH_CLEARANCES = (5e-3, 1e-3)
+"""Distances (m) that sampled paths keep beyond the clearance, where their ends do, in turns: narrow ways are closed to
+the first."""
+FIRST_SAMPLES, MAX_SAMPLES = 500, 4000
+"""Number of samples of the first paths, which doubles whenever both distances have been tried, and the largest one."""
+LIKE_POINTS = 16
+"""Number of points at which a path is compared with a motion, and of states between them."""
+PATH_SPEED = 0.6
+"""Speed of the initial guess along a sampled path, as a share of the speed limits."""
+
+
+@dataclass(eq=False)
+class Planes:
+    """Planes between the pairs of a separation, beside one motion that is clear."""
+
+    gaps: Gaps
+    """Gaps of that motion in each interval, which place the planes."""
+    active: NDArray[np.bool_]
+    """Pairs that are kept apart, shape (K, P)."""
+    required: Array
+    """Distances to keep, shape (K, P), m."""
+    inflation: Array | float
+    """Additions to them for what is missing between knots, shape (K, P), m."""
+
+    @classmethod
+    def of(cls, gaps: Gaps, required: Array, inflation: Array | float) -> Planes:
+        """Return the planes beside a motion with these gaps."""
+        return cls(gaps, gaps.gap < required + ACTIVE_GAP, required, inflation)
+
+    def widened(self, gap: Array, required: Array) -> bool:
+        """Include pairs of another motion that came too near, and inflate others; return whether pairs were new."""
+        short = required - gap
+        new = (short > NO_SHORTFALL) & ~self.active
+        # An active pair is too near only between knots.
+        missing = np.where(self.active, np.maximum(short, 0.0), 0.0)
+        self.inflation = self.inflation + INFLATION_FACTOR * missing
+        if new.any():
+            self.active = self.active | (gap < required + ACTIVE_GAP / 2)
+        return bool(new.any())
+
+
+class AvoidingSearch:
+    """The search for one motion among obstacles.
+
+    Parameters
+    ----------
+    task
+        The motion, with its obstacles.
+    search
+        The search of the same motion without obstacles.
+    program
+        Its program.
+    finer
+        Returns the program of a finer mesh, on which paths that led to no motion are tried again.
+    """
+
+    def __init__(
+        self, task: Task, search: Search[Knots], program: MotionProgram, finer: Callable[[], MotionProgram]
+    ) -> None:
+        avoidance = task.avoidance
+        self.task, self.search, self.clearance = task, search, avoidance.clearance
+        self.program = program
+        self.separation = Separation(task.arm, avoidance.obstacles, avoidance.self_collision)
+        self.paths = 0
+        self._speed = np.where(np.isfinite(task.limits.velocity), task.limits.velocity, 1.0)
+        self._finer, self._found = finer, list[Trajectory]()
+        self._paths: dict[int, list[Array] | None] = {}
+
+    def __call__(self, warm: Trajectory | None = None) -> PlannedMotion:
+        """Return the best motion found.
+
+        Raises
+        ------
+        PlanningError
+            None was found: says in how many starts, and why the first failed.
+        """
+        search, best = self.search, None
+        try:
+            # On the coarse mesh the arm may move too far in an interval for one plane to separate it from an obstacle.
+            for is_finer in (False, True):
+                if is_finer:
+                    self.program = search.program = self._finer()
+                for guess in self._starts(warm):
+                    try:
+                        found = self._improved(*guess, np.inf if best is None else best.cost)
+                    except PlanningError as error:
+                        search.keep_first_failure(error)
+                        continue
+                    self._found.append(found.trajectory)
+                    best = found if best is None or found.cost < best.cost else best
+                if best is not None:
+                    break
+        except SearchLimitError:
+            when = f" within {search.work.limit_text}"
+        else:
+            when = ""
+        best = best or self._slowed_path()
+        if best is None:
+            raise self._none_found(when) from None
+        return best
+
+    def _slowed_path(self) -> PlannedMotion | None:
+        """Return the shortest sampled path, followed from rest to rest between its corners; None if there is none."""
+        paths = sorted((path for path in self._paths.values() if path is not None), key=self._length)
+        for path in paths:
+            corners = np.vstack([path[0][:1], *(leg[1:] for leg in path)])
+            task = replace(self.task, points=corners)
+            failure = self.search.failure or PlanningError(f"no motion found within {self.search.work.limit_text}")
+            slow = PlannedMotion.slowed_straight(task, self.program.mesh.intervals, failure)
+            if slow is not None:
+                return slow
+        return None
+
+    def _none_found(self, when: str) -> PlanningError:
+        failure = self.search.failure
+        clear = f"{1000 * self.clearance:.3g} mm clear of {self.task.avoidance.names}"
+        starts = f"in {self.paths} start{'s' * (self.paths > 1)}" if self.paths else "sampling found no way around"
+        reason = f"; the first: {failure}" if failure else ""
+        return PlanningError(f"no motion found that keeps {clear}{when}, {starts}{reason}")
+
+    # Starts
+
+    def _starts(self, warm: Trajectory | None) -> Iterator[tuple[Trajectory, Array]]:
+        """Yield motions that are about clear of obstacles, and the ends of their legs, s: short ones first."""
+        if warm is not None and len(self.program.mesh.legs) == 1:
+            self.paths += 1
+            yield warm, np.array([warm.duration])
+        found: list[tuple[float, list[Array]]] = []
+        for seed in range(MAX_PATHS):
+            if seed not in self._paths:
+                self._paths[seed] = self._path(seed)
+            path = self._paths[seed]
+            if path is not None:
+                found.append((self._length(path), path))
+            if len(found) == PATHS or (found and seed >= PATHS):
+                break
+            if path is not None and all(len(leg) == 2 for leg in path):
+                break  # the straight way: others are not shorter
+        found.sort(key=lambda item: item[0])
+        for length, path in found:
+            if length <= MAX_LENGTH_RATIO * found[0][0] and not any(
+                self._is_like(path, other) for other in self._found
+            ):
+                self.paths += 1
+                yield self._timed(path)
+
+    def _path(self, seed: int) -> list[Array] | None:
+        """Return a path around the obstacles, shape (k, n) for each leg, or None."""
+        task, limits = self.task, self.task.limits
+        arm = task.arm.numbers
+        span = np.where(arm.prismatic, max(task.arm.reach, 1e-3), np.pi)
+        lower = np.where(np.isfinite(limits.lower), limits.lower, np.minimum(task.points.min(axis=0), 0) - span)
+        upper = np.where(np.isfinite(limits.upper), limits.upper, np.maximum(task.points.max(axis=0), 0) + span)
+        ends = self.separation.gaps(task.points[:, None]).gap
+        reduced = task.avoidance.at_ends(self.separation.pairs).min(axis=1)
+        at_ends = np.minimum(ends.min(axis=0) - NO_SHORTFALL, reduced)
+        turn, which = divmod(seed, len(PATH_CLEARANCES))
+        need = np.minimum(self.clearance + PATH_CLEARANCES[which], at_ends)
+        samples = min(FIRST_SAMPLES * 2**turn, MAX_SAMPLES)
+        most = float(need.max(initial=0.0))
+
+        def is_free(q: Array) -> NDArray[np.bool_]:
+            free: NDArray[np.bool_] = np.all(self.separation.gaps(q[:, None], most).gap >= need, axis=1)
+            free[free] = task.avoidance.keeps_shapes_apart(task.arm, q[free])
+            return free
+
+        sampler = PathSampler(is_free, lower, upper, self._speed / self._speed.mean(), seed, self.search.work, samples)
+        path = []
+        for start, goal in zip(task.points[:-1], task.points[1:], strict=True):
+            leg = sampler.path(start, goal)
+            if leg is None:
+                return None
+            path.append(sampler.shortened(leg))
+        return path
+
+    def _is_like(self, path: list[Array], motion: Trajectory) -> bool:
+        """Return whether straight ways lead from a path to a motion without collision, from each point to its like."""
+        if len(path) > 1:
+            return False
+        share = np.linspace(0.0, 1.0, LIKE_POINTS)
+        way = motion.q(np.linspace(0.0, motion.duration, 8 * LIKE_POINTS))
+        one, other = (_evenly(points, share) for points in (path[0], way))
+        between = one + np.linspace(0.0, 1.0, LIKE_POINTS)[:, None, None] * (other - one)
+        return bool(self.separation.smallest(between.reshape(-1, self.task.arm.n), 0.0).min() >= 0.0)
+
+    def _length(self, path: list[Array]) -> float:
+        """Return the time that a path takes at the speed limits, s."""
+        return float(sum(self._durations(leg).sum() for leg in path))
+
+    def _durations(self, leg: Array) -> Array:
+        times: Array = np.max(np.abs(np.diff(leg, axis=0)) / self._speed, axis=1)
+        return times
+
+    def _timed(self, path: list[Array]) -> tuple[Trajectory, Array]:
+        """Return a motion along a path that rests at the ends of legs, and their times, s; its velocities are rough."""
+        task, mesh = self.task, self.program.mesh
+        total = self.program.guessed_durations(self.search.task)
+        times, q = [np.zeros(1)], [task.points[:1]]
+        for k, leg in enumerate(path):
+            steps = self._durations(leg)
+            straight = max(float(self._durations(leg[[0, -1]]).sum()), 1e-6)
+            taken = total[k] * (
+                1.0 if task.duration is not None else max(float(steps.sum()) / straight, 1.0) / PATH_SPEED
+            )
+            x = np.linspace(0.0, 1.0, 4 * mesh.legs[k] + 1)[1:]
+            along = np.concatenate([[0.0], np.cumsum(steps)]) / max(float(steps.sum()), 1e-9)
+            s = x * x * (3 - 2 * x)
+            q.append(np.stack([np.interp(s, along, column) for column in leg.T], axis=1))
+            times.append(times[-1][-1] + taken * x)
+        t, states = np.concatenate(times), np.vstack(q)
+        qd = np.gradient(states, t, axis=0)
+        qd[0], qd[-1] = task.start_velocity, task.goal_velocity
+        return Trajectory.from_samples(task.arm, t, states, qd), np.array([part[-1] for part in times[1:]])
+
+    # Improvement
+
+    def _improved(self, start: Trajectory, ends: Array, best_cost: float) -> PlannedMotion:
+        """Return the best motion near a start that is about clear of obstacles.
+
+        The improvement ends early where it will hardly lead below ``best_cost``.
+        """
+        search, mesh = self.search, self.program.mesh
+        guess = knots_along(start, mesh, ends)
+        gaps, required = self._measured(start, guess, np.inf)
+        planes, margins = Planes.of(self._with_planes_of_ends(gaps), required, 0.0), Margins(mesh.intervals)
+        best: PlannedMotion | None = None
+        turn = 0
+        for _ in range(MAX_SOLUTIONS):
+            kept = planes.required + planes.inflation
+            program = self.program.apart(self.separation.rows(planes.gaps, planes.active, kept, {0, *mesh.ends}))
+            try:
+                solved = search.solution(guess, margins, program)
+                found = search.checked(solved, turn)
+            except PlanningError:
+                if best is not None:
+                    return best
+                raise
+            knots = self.program.knots_of(found.trajectory)
+            gaps, required = self._measured(found.trajectory, knots, self.clearance + ACTIVE_GAP)
+            short = float(np.max(required - gaps.gap, initial=-np.inf))
+            missing = 0.0
+            if isinstance(found, PlannedMotion) and short <= NO_SHORTFALL:
+                found = self._certified(found)
+                if isinstance(found, PlannedMotion):
+                    saved = np.inf if best is None else best.cost - found.cost
+                    best = found if saved > 0 else best
+                    if saved < MIN_IMPROVEMENT * found.cost or found.cost - EXPECTED_ROUNDS * saved > best_cost:
+                        break
+                    gaps, required = self._measured(found.trajectory, knots, np.inf)
+                    planes = Planes.of(self._with_planes_of_ends(gaps), required, planes.inflation)
+                    guess = knots
+                    continue
+                # The certificate's grid is finer.
+                missing = self._shortfall(found.certificate) - short
+            planes.required = np.where(required < planes.required, planes.required, required)
+            is_new = planes.widened(gaps.gap - missing, required)
+            if is_new and short > ACTIVE_GAP:
+                continue  # from the same guess: this motion went far astray
+            if isinstance(found, Excess) and any(
+                check.excess > 0 and check.limit != Limit.CLEARANCE for check in found.certificate.checks
+            ):
+                margins = search.widen_margins(margins, solved, found, turn)
+                turn += 1
+            guess = knots
+        if best is not None:
+            return best
+        if isinstance(found, Excess):
+            raise search.stays_exceeded(found.certificate)
+        raise PlanningError(f"the clearance stays {1000 * short:.2g} mm short, after {MAX_SOLUTIONS} solutions")
+
+    def _certified(self, found: PlannedMotion) -> PlannedMotion | Excess:
+        """Return a motion with the certificate of its clearance, by coal on the finer grid, or what it exceeds."""
+        checker = self.task.checker
+        states = checker.states(found.trajectory)
+        certificate = checker.check(found.trajectory, states)
+        if certificate.ok:
+            return replace(found, certificate=certificate)
+        self.search.tightened += [Limit.CLEARANCE.what] * (Limit.CLEARANCE.what not in self.search.tightened)
+        return Excess(found.trajectory, states, certificate)
+
+    def _with_planes_of_ends(self, gaps: Gaps) -> Gaps:
+        """Return gaps with the planes of the start and the goal in the first and the last interval.
+
+        Only for pairs that are within the clearance there: another plane leaves them less of the little room that they
+        have at the end itself, which cannot move.
+        """
+        pairs = self.separation.pairs
+        reduced = self.task.avoidance.at_ends(pairs) < self.clearance
+        ends = self.separation.gaps(self.task.points[[0, -1], None])
+        normal, level = gaps.normal.copy(), gaps.level.copy()
+        for end, interval in ((0, 0), (1, -1)):
+            which = reduced[:, end]
+            for own, at_end in ((normal, ends.normal), (level, ends.level)):
+                own[interval, which] = at_end[end, which]
+        return replace(gaps, normal=normal, level=level)
+
+    def _shortfall(self, certificate: Certificate) -> float:
+        """Return how much the smallest gap is below the clearance on the certificate's grid and between, m."""
+        return max(0.0, certificate.excess_of(Limit.CLEARANCE))
+
+    def _measured(self, motion: Trajectory, knots: Knots, near: float) -> tuple[Gaps, Array]:
+        """Return the gaps in each interval of the mesh, those above ``near`` (m) perhaps infinite, and those required.
+
+        Required gaps have shape (K, P), m: the largest of an interval.
+        """
+        inside = self._inside(motion, knots, POINTS)
+        avoidance, pairs = self.task.avoidance, self.separation.pairs
+        required = avoidance.required(self.task.arm, inside.reshape(-1, self.task.arm.n), pairs)
+        return self.separation.gaps(inside, near), required.reshape(*inside.shape[:2], -1).max(axis=1)
+
+    def _inside(self, motion: Trajectory, knots: Knots, points: int) -> Array:
+        """Return states of a motion in each interval of the mesh, both ends included, shape (K, points, n)."""
+        times = self.program.mesh.times(knots.durations)
+        return motion.q(times[:-1, None] + np.diff(times)[:, None] * np.linspace(0.0, 1.0, points))
+
+
+def motion_around(
+    task: Task,
+    free: PlannedMotion,
+    search: Search[Knots],
+    program: MotionProgram,
+    finer: Callable[[], MotionProgram],
+    warm: Trajectory | None,
+) -> tuple[Task, PlannedMotion]:
+    """Return the best motion among obstacles, with the task whose clearance it keeps.
+
+    A clearance that is reduced at an end is reduced during the whole motion first: the motion then found is the
+    start of the search for one that keeps the clearance farther away, and the result if there is none.
+    """
+    if not task.avoidance:
+        return task, free
+    if (certificate := task.checker.check(free.trajectory)).ok:
+        return task, replace(free, certificate=certificate)
+    if not task.avoidance.reduced or task.avoidance.is_reduced_throughout:
+        return task, AvoidingSearch(task, search, program, finer)(warm)
+    easier = task.avoiding(task.avoidance.reduced_throughout)
+    _, near = motion_around(easier, free, search, program, finer, warm)
+    search.program = program
+    if (certificate := task.checker.check(near.trajectory)).ok:
+        return task, replace(near, certificate=certificate)
+    try:
+        return task, AvoidingSearch(task, search, program, finer)(near.trajectory)
+    except PlanningError:
+        return easier, near
+
+
+def _evenly(points: Array, share: Array) -> Array:
+    """Return the points of a polygon (k, n) at shares (N,) of its length, shape (N, n)."""
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    return np.stack([np.interp(share * along[-1], along, column) for column in points.T], axis=1)
