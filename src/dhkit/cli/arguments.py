@@ -320,7 +320,8 @@ def with_long_options(counts: Mapping[str, int | None]) -> type[TyperCommand]:
 
 def _join_option_words(args: Sequence[str], counts: Mapping[str, int | None], short: Collection[str]) -> list[str]:
     """Return arguments with the words after each of these options joined into one."""
-    joined, rest = [], list(args)
+    joined = []
+    rest = list(args)
     while rest:
         word = rest.pop(0)
         joined.append(word)

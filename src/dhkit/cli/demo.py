@@ -137,7 +137,8 @@ def _equations(arm: Arm, folder: Path) -> str:
     except DhkitError as error:
         return f"skipped: {error}"
     operations = operation_count(dynamics_graph("inverse_dynamics", arm.description))
-    sums, products = operations.get("additions", 0), operations.get("multiplications", 0)
+    sums = operations.get("additions", 0)
+    products = operations.get("multiplications", 0)
     return (
         f"M qdd + C qd + g proved equal to Euler and Lagrange's equation in {seconds:.2f} s: "
         f"{folder / 'equations.html'} and .tex; inverse dynamics in {products} multiplications and {sums} additions"

@@ -44,7 +44,8 @@ def tour(arm: Arm, line: Array | None = None) -> tuple[Array, Array]:
         goes along the line first.
     """
     stops = _stops(arm)
-    pieces, start = [], stops[0]
+    pieces = []
+    start = stops[0]
     if line is not None:
         start = line[0]
         pieces += [_along(arm, line), _along(arm, line[::-1])]
@@ -120,7 +121,8 @@ def there_and_back(there: Trajectory, back: Trajectory) -> Trajectory:
 
     A reversed motion has the same torques at the same places: without friction it keeps the same limits.
     """
-    goal, start = there.q(there.duration), there.q(0.0)
+    goal = there.q(there.duration)
+    start = there.q(0.0)
     return there.then(_rest(there, goal)).then(back.reversed()).then(_rest(there, start))
 
 

@@ -179,7 +179,8 @@ def _names(graded: Sequence[Graded]) -> list[str]:
     for one in graded:
         student = one.report.student or Path(one.report.sheet or "sheet").stem
         plain = UNSAFE.sub("_", student).encode()[:MAX_NAME_BYTES].decode(errors="ignore").lstrip(".") or "sheet"
-        name, number = plain, 1
+        name = plain
+        number = 1
         while name.casefold() in names:
             number += 1
             name = f"{plain}-{number}"

@@ -52,7 +52,8 @@ def info(robot: Robot, json: Json = False) -> None:
     if json:
         print_json(_facts(arm))
         return
-    description, numbers = arm.description, arm.description.numbers
+    description = arm.description
+    numbers = arm.description.numbers
     reach = f"reach {tool_reach(description):.3g} m (tool from axis 1)"
     say(f"{arm.name}: {description.kinds}, {description.convention.value} DH, {reach}", "bold")
     if description.source:
@@ -97,7 +98,8 @@ def fk(
     """Print where the tool is for given joint values (rad and m)."""
     arm = read_arm(robot)
     values = joint_values(arm, q, degrees)
-    T, link_frames = arm.fk(values), arm.frames(values)
+    T = arm.fk(values)
+    link_frames = arm.frames(values)
     if json:
         xyz, angles = pose_parts(T, degrees=degrees)
         pose = {"T": T.tolist(), "xyz_m": xyz.tolist(), angle_key("euler_XYZ", degrees=degrees): angles.tolist()}
@@ -172,7 +174,8 @@ def _number_keys(joint: Joint) -> dict[str, str]:
 
 
 def _facts(arm: Arm) -> dict[str, Any]:
-    description, numbers = arm.description, arm.description.numbers
+    description = arm.description
+    numbers = arm.description.numbers
     fit = classify(description).fit
     joints = [
         {"name": joint.name, "type": joint.type.value, "assumed": list(joint.assumed)}

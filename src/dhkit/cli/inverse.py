@@ -192,7 +192,8 @@ def _with_whole_turns(solutions: IKSolutions, near: Array | None) -> Array:
 
 
 def _print(reached: ReachedPose) -> None:
-    arm, unit = reached.arm, "°" if reached.degrees else "rad"
+    arm = reached.arm
+    unit = "°" if reached.degrees else "rad"
     say(f"{arm.name}: {arm.family}", "bold")
     if reached.note:
         say(f"note: {reached.note}", "yellow")
@@ -221,14 +222,16 @@ def _limits(reached: ReachedPose, k: int) -> str:
     """Return whether a branch is inside the limits, and the joints that are not, as text."""
     if reached.solutions.allowed[k]:
         return "inside"
-    numbers, q = reached.arm.description.numbers, reached.q[k]
+    numbers = reached.arm.description.numbers
+    q = reached.q[k]
     outside = np.flatnonzero((q < numbers.lower - LIMIT_SLACK) | (q > numbers.upper + LIMIT_SLACK))
     return f"outside: {', '.join(f'q{i + 1}' for i in outside)}"
 
 
 def _summary(reached: ReachedPose) -> str:
     solutions, nearest = reached.solutions, reached.nearest
-    count, inside = int(np.sum(solutions.valid)), int(np.sum(solutions.allowed))
+    count = int(np.sum(solutions.valid))
+    inside = int(np.sum(solutions.allowed))
     if reached.method is Method.CLOSED_FORM:
         text = f"{count} of {len(solutions)} branches reach the pose, {inside} inside the limits"
     else:

@@ -157,7 +157,8 @@ def plan(
     else:
         goal = option_values(arm, to, "--to", degrees)
     given = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk, "torque": torque}
-    limits, sought = joint_limits(arm, given, degrees, speed), parse_objective(wanted)
+    limits = joint_limits(arm, given, degrees, speed)
+    sought = parse_objective(wanted)
     constraints = () if tool_speed is None else (ToolSpeed(tool_speed),)
     scene = obstacles(box or (), sphere or (), floor)
     options = PlanOptions(

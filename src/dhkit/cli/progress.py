@@ -23,14 +23,17 @@ class ProgressBar:
 
     def __init__(self, text: str) -> None:
         self._text = text
-        self._done, self._total = 0.0, 0.0
+        self._done = 0.0
+        self._total = 0.0
         self._timer = threading.Timer(DELAY, self._open)
         self._timer.daemon = True
         self._bar: Any = None
 
     def show(self, done: float, total: float, text: str | None = None) -> None:
         """Show how much of the total is done, and another text if given."""
-        self._done, self._total, self._text = done, total, self._text if text is None else text
+        self._done = done
+        self._total = total
+        self._text = self._text if text is None else text
         if self._bar is not None:
             self._bar.update(self._task, completed=done, total=total, description=self._text)
 

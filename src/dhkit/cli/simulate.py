@@ -152,12 +152,14 @@ def simulate(
     files.check(SUFFIXES)
     tuned = tuned_controller(controller, arm, trajectory, bandwidth, damping, compensate)
     begin = time.perf_counter()
-    failure, result = "", None
+    failure = ""
+    result = None
     try:
         with ProgressBar("simulating") as bar:
             result = arm.simulate(tuned, trajectory, options=options, sensors=sensors, progress=bar.show)
     except SimulationError as error:
-        failure, result = str(error), error.result
+        failure = str(error)
+        result = error.result
     seconds = time.perf_counter() - begin
     written: list[str] = []
     if result is not None:

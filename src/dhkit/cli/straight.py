@@ -100,13 +100,16 @@ def straight_line(arm: Arm) -> Line | None:
 def _starts(arm: Arm) -> Iterator[Array]:
     """Yield joint values inside the limits, shape (n,): named ones, then random ones."""
     numbers = arm.description.numbers
-    named, preferred = dict(arm.configurations), PREFERRED_CONFIGURATIONS
+    named = dict(arm.configurations)
+    preferred = PREFERRED_CONFIGURATIONS
     for name in sorted(named, key=lambda name: preferred.index(name) if name in preferred else len(preferred)):
         if np.all((named[name] >= numbers.lower) & (named[name] <= numbers.upper)):
             yield named[name]
     room = np.where(numbers.prismatic, arm.description.reach / 2, np.pi / 2)
-    lower, upper = np.maximum(numbers.lower, -room), np.minimum(numbers.upper, room)
-    low, high = np.minimum(lower, upper), np.maximum(lower, upper)
+    lower = np.maximum(numbers.lower, -room)
+    upper = np.minimum(numbers.upper, room)
+    low = np.minimum(lower, upper)
+    high = np.maximum(lower, upper)
     yield from low + (high - low) * np.random.default_rng(0).random((RANDOM_STARTS, arm.n))
 
 
@@ -132,7 +135,8 @@ def _line_in_closed_form(arm: Arm, T: Array, q: Array) -> Line | None:
 def _line_by_iteration(arm: Arm, T: Array, q: Array) -> Line | None:
     """Return a line that is followed by iteration from its middle at q outwards; None if it cannot be followed."""
     half = len(T) // 2
-    ahead, behind = _follow_by_iteration(arm, T[half:], q), _follow_by_iteration(arm, T[:half][::-1], q)
+    ahead = _follow_by_iteration(arm, T[half:], q)
+    behind = _follow_by_iteration(arm, T[:half][::-1], q)
     if ahead is None or behind is None:
         return None
     return Line(T, np.concatenate([behind[::-1], ahead]), near_singular=False)
@@ -151,7 +155,8 @@ def _follow_by_iteration(arm: Arm, T: Array, q: Array) -> Array | None:
 def _iterative_solutions(arm: Arm, T: Array, q: Array) -> Array:
     """Return some different solutions of a pose, shape (k, n), the first of them q itself."""
     numbers = arm.description.numbers
-    lower, upper = np.maximum(numbers.lower, -np.pi), np.minimum(numbers.upper, np.pi)
+    lower = np.maximum(numbers.lower, -np.pi)
+    upper = np.minimum(numbers.upper, np.pi)
     starts = lower + (upper - lower) * np.random.default_rng(0).random((ITERATION_STARTS, arm.n))
     solutions = arm.ik_numeric(np.broadcast_to(T, (ITERATION_STARTS, 4, 4)), starts)
     kept = [q]

@@ -93,7 +93,8 @@ def check(
     """
     if not run and len(program) != 1:
         raise DescriptionError(f"{len(program)} files; expected one, or --run with a program and its arguments")
-    arm, source = read_arm(robot), program if run else Path(program[0])
+    arm = read_arm(robot)
+    source = program if run else Path(program[0])
     protect_from_children()
     end_in_order_on_signals()
     points = None if rubric is None else CheckRubric.read(rubric)

@@ -98,7 +98,8 @@ def _value(arm: Arm, i: int, x: float) -> str:
 
 
 def _facts(arm: Arm, space: Workspace) -> dict[str, Any]:
-    estimate, singular = space.estimate, _singularities(arm)
+    estimate = space.estimate
+    singular = _singularities(arm)
     return {
         "robot": arm.name,
         "samples": space.samples,

@@ -133,7 +133,8 @@ class Adaptive:
             A link without a body, or a joint that feels no inertia.
         """
         description = description_of(robot)
-        w, z = positive(bandwidth, "bandwidth"), positive(damping, "damping")
+        w = positive(bandwidth, "bandwidth")
+        z = positive(damping, "damping")
         if z < 1:
             raise ValueError(f"damping is {damping!r}; expected 1 or more: both poles of this controller are real")
         m = effective_inertia(description, q)
@@ -156,7 +157,8 @@ class Adaptive:
         rate = self.adaptation @ (Y.T @ s)
         if self._time is not None:
             self.estimate = self.estimate + (t - self._time) / 2 * (self._rate + rate)
-        self._time, self._rate = t, rate
+        self._time = t
+        self._rate = rate
         return Y @ self.estimate + known
 
     def initial_state(self, q: Array | None = None) -> Array:

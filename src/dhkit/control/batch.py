@@ -70,7 +70,10 @@ def simulate_batch(
         An argument that does not fit: says which, and what is expected.
     """
     chosen = BatchOptions.of(options, keywords)
-    friction, rate, keep, sensors = Friction.chosen(chosen.friction), chosen.rate, chosen.keep, chosen.sensors
+    friction = Friction.chosen(chosen.friction)
+    rate = chosen.rate
+    keep = chosen.keep
+    sensors = chosen.sensors
     if not getattr(controller, "batches", True):
         name = type(controller).__name__
         raise ValueError(f"{name} controls one arm at a time; expected another controller, or runs one by one")
@@ -90,7 +93,8 @@ def simulate_batch(
         held = _states(description, given, np.zeros(n), name)
         t = row_times(None, duration, rate)
         setpoints = held[None], np.zeros((1, *held.shape)), np.zeros((1, *held.shape))
-    q, qd = _states(description, q0, setpoints[0][0], "q0"), _states(description, qd0, setpoints[1][0], "qd0")
+    q = _states(description, q0, setpoints[0][0], "q0")
+    qd = _states(description, qd0, setpoints[1][0], "qd0")
     size = _size(
         q, qd, setpoints[0][0], np.empty((len(moving), n)), np.empty((*getattr(controller, "batch_shape", ()), n))
     )

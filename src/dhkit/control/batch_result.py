@@ -107,7 +107,8 @@ class BatchResult:
             raise TypeError(f"run {index!r}; expected the number of one run")
         if not -len(self) <= index < len(self):
             raise IndexError(f"run {index} of {len(self)}")
-        arm, history = self.arm(index), self.history
+        arm = self.arm(index)
+        history = self.history
         q, qd, tau, asked = (x[index] for x in (history.q, history.qd, history.tau, history.tau_asked))
         return SimulationResult(
             description=arm,
@@ -146,7 +147,8 @@ class BatchResult:
         return path
 
     def __repr__(self) -> str:
-        summary, unit = [span_text(self.t)], joint_unit(self.arms[0].numbers.prismatic)
+        summary = [span_text(self.t)]
+        unit = joint_unit(self.arms[0].numbers.prismatic)
         if self.peak_error is not None:
             summary.append(f"largest error {np.nanmax(self.peak_error, initial=0.0):.3g} {unit}")
         return repr_line("BatchResult", f"{len(self)} x {self.arms[0].name}", ", ".join([*summary, *self._remarks]))
@@ -162,7 +164,8 @@ class BatchResult:
             )
             for i, joint in enumerate(self.arms[0].joints)
         ]
-        headings, align = ("joint", *columns, ""), "l" + "r" * len(columns) + "l"
+        headings = ("joint", *columns, "")
+        align = "l" + "r" * len(columns) + "l"
         title = f"{len(self)} x {self.arms[0].name}: {', '.join([span_text(self.t), *self._remarks])}"
         return html_block(title, html_table(headings, rows, "Largest of all runs that did not fail", align))
 

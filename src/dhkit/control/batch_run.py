@@ -103,7 +103,8 @@ class BatchRun:
 
     def __call__(self, record: Record, threads: int, progress: Progress | None) -> None:
         """Fill a record."""
-        size, steps = len(record.q), len(self.t) - 1
+        size = len(record.q)
+        steps = len(self.t) - 1
         if self.closed_step is None:
             self._run(record, threads, lambda k: progress(k, steps) if progress else None)
             return
@@ -148,7 +149,8 @@ class BatchRun:
             if closed is None:
                 commanded = self._commanded(k, *states[:2])
             else:
-                later, commanded = _empty_like(states), np.empty_like(states[0])
+                later = _empty_like(states)
+                commanded = np.empty_like(states[0])
                 closed(states, setpoints[min(k, len(setpoints) - 1)], (*later, commanded), threads)
             applied = self._saturate(commanded) if closed is None or self.measured or self.substeps > 1 else commanded
             if self.measured:

@@ -53,9 +53,11 @@ def advance(plant: Plant, integrator: Integrator, state: State, end: float, phas
             if later.t >= end:
                 return later
             # An integrator with steps of its own goes on under the same contact.
-            state, later = later, _checked_step(integrator, later, phase, end)
+            state = later
+            later = _checked_step(integrator, later, phase, end)
             event = None if plant.has_no_events else _first_event(plant, integrator, state, later, phase)
-        state, phase = event, None
+        state = event
+        phase = None
         if state.t >= end:
             return state
     raise SimulationError(f"more than {MAX_EVENTS_PER_STEP} impacts and stops before {end:g} s, from {state.t:g} s on")

@@ -98,13 +98,15 @@ def effective_inertia(description: Description, q: ArrayLike | None = None) -> A
 
 def pd_gains(bandwidth: ArrayLike, damping: ArrayLike) -> tuple[Array, Array]:
     """Return k_p = w^2 and k_d = 2 z w of the error dynamics s^2 + 2 z w s + w^2, shape () or (B, 1)."""
-    w, z = _positive_each(bandwidth, "bandwidth"), _positive_each(damping, "damping")
+    w = _positive_each(bandwidth, "bandwidth")
+    z = _positive_each(damping, "damping")
     return w * w, 2 * z * w
 
 
 def pid_gains(bandwidth: ArrayLike, damping: ArrayLike, integral: float) -> tuple[Array, Array, Array]:
     """Return k_p, k_i and k_d of the poles of (s + a w) (s^2 + 2 z w s + w^2), a = ``integral``; () or (B, 1)."""
-    w, z = _positive_each(bandwidth, "bandwidth"), _positive_each(damping, "damping")
+    w = _positive_each(bandwidth, "bandwidth")
+    z = _positive_each(damping, "damping")
     a = integral
     if not (np.isfinite(a) and a >= 0):
         raise ValueError(f"integral is {integral!r}; expected a number, 0 or more")

@@ -155,7 +155,10 @@ class DormandPrince:
     def __init__(
         self, plant: Plant, torques: Torques, tolerance: float, edges: Sequence[float], longest: float = np.inf
     ) -> None:
-        self.plant, self.torques, self.tolerance, self.edges = plant, torques, tolerance, edges
+        self.plant = plant
+        self.torques = torques
+        self.tolerance = tolerance
+        self.edges = edges
         self.longest = longest
         self._length: float | None = None
         self._usual_rate = max(USUAL_STEPS_PER_SECOND, plant.stiffness)
@@ -199,12 +202,16 @@ class DormandPrince:
         return self._last
 
     def _started(self, state: State, phase: Phase, end: float) -> DOP853:
-        plant, n, contact, pushes = self.plant, self.plant.n, phase.contact, phase.pushes
+        plant = self.plant
+        n = self.plant.n
+        contact = phase.contact
+        pushes = phase.pushes
         # A setpoint that jumps at the end keeps its earlier value until then.
         latest = float(np.nextafter(end, state.t))
 
         def rates(t: float, y: Array) -> Array:
-            q, qd = y[:n], y[n : 2 * n]
+            q = y[:n]
+            qd = y[n : 2 * n]
             tau, memory = self.torques(min(t, latest), q, qd, y[2 * n : -3])
             friction = 0.0 if plant.friction is None else float(qd @ plant.resistance(qd, contact.directions))
             push = float(qd @ plant.push_torques(pushes, q)) if pushes else 0.0
@@ -291,7 +298,8 @@ class DormandPrince:
             y = solver.y_old + s * (solver.y - solver.y_old)
             return self.torques(t, y[:n], y[n : 2 * n], y[2 * n : -3])[0]
 
-        low, high = 0.0, LOOK_AHEAD
+        low = 0.0
+        high = LOOK_AHEAD
         below, above = torques_at(low), torques_at(high)
         largest = max(float(np.abs(below).max()), float(np.abs(above).max()))
         first = float(np.abs(above - below).max())
@@ -302,9 +310,11 @@ class DormandPrince:
             middle = (low + high) / 2
             between = torques_at(middle)
             if np.abs(between - below).max() > np.abs(above - between).max():
-                high, above = middle, between
+                high = middle
+                above = between
             else:
-                low, below = middle, between
+                low = middle
+                below = between
         return True
 
     def _state(self, before: State, y: Array, t: float) -> State:
@@ -317,7 +327,8 @@ def _hold(phase: Phase, before: Array, q: Array, qd: Array) -> None:
     """Set joints that hold back to exactly their earlier joint values, with rate 0."""
     holds = phase.contact.holds
     if holds.any():
-        q[holds], qd[holds] = before[holds], 0.0
+        q[holds] = before[holds]
+        qd[holds] = 0.0
 
 
 def _weighted(powers: Sequence[float]) -> float:

@@ -99,7 +99,8 @@ class LQR:
         self.A, self.B = linearize(self.description, q)
         deviations = np.repeat([ERROR, RATE], n)
         torques = np.minimum(self.description.numbers.effort, ACCELERATION / np.diagonal(self.B[n:]))
-        self.Q, self.R = _weights(Q, 1 / deviations**2, "Q"), _weights(R, 1 / torques**2, "R")
+        self.Q = _weights(Q, 1 / deviations**2, "Q")
+        self.R = _weights(R, 1 / torques**2, "R")
         if np.linalg.eigvalsh(self.Q).min() < 0 or np.linalg.eigvalsh(self.R).min() <= 0:
             raise ValueError("Q is to be positive semidefinite, and R positive definite")
         try:

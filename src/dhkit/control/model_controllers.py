@@ -181,7 +181,8 @@ class FrictionCompensation:
             raise ValueError("robot is not given, and the inner controller has none")
         if friction is not None and not isinstance(friction, Friction):
             raise TypeError(f"friction is {friction!r}; expected a Friction, or None")
-        self.inner, self.description = inner, description_of(found)
+        self.inner = inner
+        self.description = description_of(found)
         self.batches: bool = getattr(inner, "batches", True)
         self.batch_shape: tuple[int, ...] = getattr(inner, "batch_shape", ())
         self.friction = Friction(REST) if friction is None else friction

@@ -175,7 +175,8 @@ class Plant:
             return friction_torque(self.description, qd, self.friction)
         numbers = self.description.numbers
         dry = np.zeros(self.n)
-        forwards, backwards = directions > 0, directions < 0
+        forwards = directions > 0
+        backwards = directions < 0
         dry[forwards] = numbers.coulomb[forwards, 0]
         dry[backwards] = numbers.coulomb[backwards, 1]
         return numbers.viscous * qd + dry

@@ -182,7 +182,10 @@ class SimulationResult:
         return repr_line("SimulationResult", self.description.name, f"{span_text(self.t)}, {error}")
 
     def _repr_html_(self) -> str:
-        joints, peak, rms, final = self.description.joints, self.peak_error, self.rms_error, self.final_error
+        joints = self.description.joints
+        peak = self.peak_error
+        rms = self.rms_error
+        final = self.final_error
         saturated = self.saturated if len(self.saturated) else np.mean(self.tau != self.tau_asked, axis=0)
         rows = [
             (

@@ -130,7 +130,8 @@ def _checked_arrays(values: Mapping[str, Any], n: int) -> dict[str, Array]:
         if not np.isfinite(array).all():
             row = f", the first in row {int(np.argwhere(~np.isfinite(array))[0, 0])}" if array.ndim else ""
             raise ValueError(f"{name} has values that are not finite{row}")
-    t, shares = arrays["t"], arrays[SATURATED]
+    t = arrays["t"]
+    shares = arrays[SATURATED]
     if arrays[f"{AUDIT}turnover"] < 0:
         raise ValueError(f"{AUDIT}turnover is {float(arrays[f'{AUDIT}turnover']):g}; expected 0 or more")
     if t[0] != 0:

@@ -61,8 +61,12 @@ class Run(ABC):
         reference: tuple[Array, Array, Array],
         effort_limits: Array,
     ) -> None:
-        self.description, self.plant, self.controller = description, plant, controller
-        self.t, self.reference, self.effort_limits = t, reference, effort_limits
+        self.description = description
+        self.plant = plant
+        self.controller = controller
+        self.t = t
+        self.reference = reference
+        self.effort_limits = effort_limits
         self.q, self.qd, self.qdd, self.tau, self.tau_asked = (np.zeros((len(t), plant.n)) for _ in range(5))
         self.turnover = 0.0
 
@@ -78,16 +82,23 @@ class Run(ABC):
         SimulationError
             With the result of all rows so far.
         """
-        plant, steps = self.plant, len(self.t) - 1
-        edges, first, kept = self.edges(), state, -1
+        plant = self.plant
+        steps = len(self.t) - 1
+        edges = self.edges()
+        first = state
+        kept = -1
         try:
             for k in range(steps + 1):
                 commanded, integrator = self.integrator(k, state)
                 tau = integrator.torque(state)
                 phase = plant.phase(state.q, state.qd, tau, plant.active_pushes(state.t))
-                self.q[k], self.qd[k], self.qdd[k] = state.q, state.qd, phase.qdd
-                self.tau[k], self.tau_asked[k] = tau, commanded
-                kept, last = k, state
+                self.q[k] = state.q
+                self.qd[k] = state.qd
+                self.qdd[k] = phase.qdd
+                self.tau[k] = tau
+                self.tau_asked[k] = commanded
+                kept = k
+                last = state
                 if k == steps:
                     break
                 stops = self.stops(k, edges)
@@ -108,7 +119,8 @@ class Run(ABC):
 
     def stops(self, k: int, edges: Sequence[float]) -> list[float]:
         """Return the times at which integration from row k to the next one pauses, the next row's at the end."""
-        begin, end = self.t[k], self.t[k + 1]
+        begin = self.t[k]
+        end = self.t[k + 1]
         return [edge for edge in edges if begin < edge < end] + [float(end)]
 
     def setpoint(self, k: int) -> Setpoint:
@@ -138,12 +150,14 @@ class SampledRun(Run):
 
     def __init__(self, *others: Any, substeps: int = 1, measuring: Measuring | None = None) -> None:
         super().__init__(*others)
-        self.substeps, self.measuring = substeps, measuring
+        self.substeps = substeps
+        self.measuring = measuring
         reset(self.controller)
 
     def integrator(self, k: int, state: State) -> tuple[Array, Integrator]:
         """Return the controller's torques, shape (n,), N m and N, and an integrator that holds them."""
-        n, t = self.plant.n, float(self.t[k])
+        n = self.plant.n
+        t = float(self.t[k])
         if self.controller is None:
             none = np.zeros(n)
             return none, RungeKutta(self.plant, none)
@@ -153,7 +167,8 @@ class SampledRun(Run):
 
     def stops(self, k: int, edges: Sequence[float]) -> list[float]:
         """Return the ends of all steps to the next row."""
-        begin, m = self.t[k], self.substeps
+        begin = self.t[k]
+        m = self.substeps
         between = [float(begin + (self.t[k + 1] - begin) * i / m) for i in range(1, m)]
         return sorted({*between, *super().stops(k, edges)})
 

@@ -78,7 +78,8 @@ class Measuring:
     """Sensors during one run, with the state of their noise."""
 
     def __init__(self, sensors: Sensors, period: float) -> None:
-        self._sensors, self._period = sensors, period
+        self._sensors = sensors
+        self._period = period
         self._random = np.random.default_rng(sensors.seed)
         self._before: Array | None = None
 

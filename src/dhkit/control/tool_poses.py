@@ -111,9 +111,12 @@ class ToolPoses:
         for k, motion in enumerate(self._motions):
             rows = np.flatnonzero(t >= self._knots[k])
             within = np.minimum(t[rows] - self._knots[k], motion.duration)
-            q[rows], qd[rows], qdd[rows] = motion.q(within), motion.qd(within), motion.qdd(within)
+            q[rows] = motion.q(within)
+            qd[rows] = motion.qd(within)
+            qdd[rows] = motion.qdd(within)
         after = t >= self._knots[-1]
-        qd[after], qdd[after] = 0.0, 0.0
+        qd[after] = 0.0
+        qdd[after] = 0.0
         return q, qd, qdd
 
 

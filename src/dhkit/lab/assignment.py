@@ -348,7 +348,8 @@ def _joint_values(arm: Arm, given: str | tuple[float, ...], place: str) -> Array
         q = np.array(given)
     numbers = arm.description.numbers
     for i in np.flatnonzero((q < numbers.lower - GOAL_TOLERANCE) | (q > numbers.upper + GOAL_TOLERANCE)):
-        joint, limits = arm.description.joints[i].name, f"{numbers.lower[i]:.4g} to {numbers.upper[i]:.4g}"
+        joint = arm.description.joints[i].name
+        limits = f"{numbers.lower[i]:.4g} to {numbers.upper[i]:.4g}"
         raise DescriptionError(f"{place}{joint} is {q[i]:.4g}; expected {limits}, its limits")
     return q
 

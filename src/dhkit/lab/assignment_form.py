@@ -238,7 +238,8 @@ def validated(document: Mapping[str, object]) -> AssignmentForm:
 
 
 def _fault_text(error: ErrorDetails) -> str:
-    path, value = tuple(error["loc"]), error["input"]
+    path = tuple(error["loc"])
+    value = error["input"]
     where = _place_text(path)
     match error["type"]:
         case "missing":

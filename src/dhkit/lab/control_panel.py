@@ -55,7 +55,8 @@ class ControlPanel(Panel):
 
     def __init__(self, desk: Desk, motions: MotionPanel, own: OwnPanel) -> None:
         super().__init__(desk)
-        self.motions, self.own = motions, own
+        self.motions = motions
+        self.own = own
         self.settings = Settings()
         self.planar = False
         """Whether only joints 2 and 3 are free."""
@@ -86,7 +87,8 @@ class ControlPanel(Panel):
         self._require_reference(settings.reference)
         self._end_run()
         with self._lock:
-            previous, self.settings = self.settings, settings
+            previous = self.settings
+            self.settings = settings
             self.free = [1, 2] if self.planar else list(range(arm.n))
             self._start_q = self.desk.q.copy()
             try:
@@ -99,7 +101,9 @@ class ControlPanel(Panel):
                 self.publish()
                 raise
             self._live = live
-            self._error, self._paused, self._speed = None, False, 1.0
+            self._error = None
+            self._paused = False
+            self._speed = 1.0
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, args=(live, self._stop), name="dhkit-control", daemon=True)
         self.desk.running = True
@@ -110,7 +114,8 @@ class ControlPanel(Panel):
     def change(self, fields: Fields) -> None:
         """Change settings, also while a simulation runs: whatever they do not concern goes on as it is."""
         with self._lock:
-            previous, settings = self.settings, self.settings.changed(fields)
+            previous = self.settings
+            settings = self.settings.changed(fields)
             live = self._live if self.desk.running else None
             if live is not None:
                 try:
@@ -183,7 +188,8 @@ class ControlPanel(Panel):
     @answers("arm.planar", "on")
     def lock_to_planar(self, fields: Fields) -> None:
         """Leave only joints 2 and 3 free, or all joints again."""
-        on, kinds = fields.flag("on"), self.desk.arm.description.kinds
+        on = fields.flag("on")
+        kinds = self.desk.arm.description.kinds
         if on and (self.desk.arm.n < 4 or kinds[1:3] != "RR"):
             raise ValueError(f"arm.planar: joints are {kinds}; expected at least 4, the second and third revolute")
         self._end_run()
@@ -228,15 +234,19 @@ class ControlPanel(Panel):
 
     def _run(self, live: Live, stop: threading.Event) -> None:
         """Simulate and show frames at FRAME_RATE; if more than MAX_FRAMES_BEHIND late, drop the delay."""
-        begin, frame, published = time.monotonic(), 0, 0.0
-        shown, ratio = 0, CONTROL_RATE / FRAME_RATE
+        begin = time.monotonic()
+        frame = 0
+        published = 0.0
+        shown = 0
+        ratio = CONTROL_RATE / FRAME_RATE
         columns = self._columns()
         self.desk.view.append(Samples("control", columns, np.zeros((0, len(columns)), np.float32), restart=True))
         try:
             while not stop.is_set():
                 if self._paused:
                     time.sleep(1 / FRAME_RATE)
-                    begin, frame = time.monotonic(), 0
+                    begin = time.monotonic()
+                    frame = 0
                     continue
                 delay = time.monotonic() - (begin + frame / FRAME_RATE)
                 if delay < 0:
@@ -244,7 +254,8 @@ class ControlPanel(Panel):
                 elif delay > MAX_FRAMES_BEHIND / FRAME_RATE:
                     speed = frame / FRAME_RATE / max(time.monotonic() - begin, 1e-9)
                     self._speed = 0.8 * self._speed + 0.2 * speed
-                    begin, frame = time.monotonic(), 0
+                    begin = time.monotonic()
+                    frame = 0
                 # A frame lasts no whole number of steps: rounding alike each time would change the speed.
                 self._simulate_frame(live, round((shown + 1) * ratio) - round(shown * ratio))
                 frame, shown = frame + 1, shown + 1
@@ -264,7 +275,9 @@ class ControlPanel(Panel):
             error = tau = np.zeros(len(self.free))
             for _ in range(steps):
                 error, tau = live.advance()
-            q, reference, t = self._whole_arm(live.q), self._whole_arm(live.setpoint_q), live.t
+            q = self._whole_arm(live.q)
+            reference = self._whole_arm(live.setpoint_q)
+            t = live.t
         self.desk.show(q)
         self.desk.view.ghosts(reference[None], GHOST_COLOR)
         tool_error = np.linalg.norm(self.desk.arm.fk(q)[:3, 3] - self.desk.arm.fk(reference)[:3, 3])
@@ -278,7 +291,9 @@ class ControlPanel(Panel):
     def _report_failure(self, live: Live, stop: threading.Event, error: str) -> None:
         """Publish why a run failed, unless the run was stopped or replaced in the meantime."""
         if not stop.is_set() and live is self._live and not self._stop.is_set():
-            self._error, self._thread, self.desk.running = error, None, False
+            self._error = error
+            self._thread = None
+            self.desk.running = False
             self.desk.view.ghosts(None)
             self.publish()
 
@@ -296,7 +311,8 @@ class ControlPanel(Panel):
         was_running = self.desk.running
         self._end_run()
         with self._lock:
-            self._live, self.planar = None, False
+            self._live = None
+            self.planar = False
             self._error = "ended: the arm was edited" if was_running else None
         self.publish()
 
@@ -326,7 +342,8 @@ class ControlPanel(Panel):
         return free_arm.with_payload(self.settings.payload) if self.settings.payload else free_arm
 
     def _controller(self, live: Live) -> Controller:
-        settings, description = self.settings, live.arm.description
+        settings = self.settings
+        description = live.arm.description
         controller: Controller = (
             self.own.controller()
             if settings.controller == OWN
@@ -349,7 +366,8 @@ class ControlPanel(Panel):
 
     def _setpoints(self, live: Live, arm: Arm) -> Setpoints:
         """Return the setpoints of the free joints that the run follows from now on."""
-        begin, free = live.t, self.free
+        begin = live.t
+        free = self.free
         held = live.setpoint_q if live.t else live.q.copy()
         at_rest = np.zeros(len(free))
         match self.settings.reference:
@@ -380,7 +398,8 @@ class ControlPanel(Panel):
             if live is None or not self.desk.running:
                 self.desk.show(q)
                 return
-            held, at_rest = live.setpoint_q.copy(), np.zeros(len(self.free))
+            held = live.setpoint_q.copy()
+            at_rest = np.zeros(len(self.free))
             steered = [k for k, i in enumerate(self.free) if joint in (None, i)]
             if not steered:
                 raise ValueError(f"joint {1 + (joint or 0)} is locked: only joints 2 and 3 move")

@@ -52,7 +52,8 @@ class Desk:
     """
 
     def __init__(self, arm: Arm, view: View) -> None:
-        self.arm, self.view = arm, view
+        self.arm = arm
+        self.view = view
         self.assumed_bodies = False
         """Whether the links' masses are assumed, as uniform rods."""
         self.order = "XYZ"
@@ -87,7 +88,9 @@ class Desk:
             same_kinds = arm.description.kinds == self.arm.description.kinds
             q = self.q if same_kinds else first_configuration(arm.description)
         previous = self.arm, self.q, self.target_q
-        self.arm, self.q, self.target_q = arm, q, None
+        self.arm = arm
+        self.q = q
+        self.target_q = None
         try:
             self.view.replace(arm.description, q)
             self.publish()
@@ -128,7 +131,8 @@ class Desk:
         xyz, euler = pose_parts(T, order=self.order)
         # Where this is 0 the second angle is at an end of its range: only the sum or difference of the others counts.
         uniqueness = np.cos(euler[1]) if self.order[0] != self.order[2] else np.sin(euler[1])
-        sigma, rank = singular_values(arm.description, q, "whole"), freedoms(arm.description, "whole")
+        sigma = singular_values(arm.description, q, "whole")
+        rank = freedoms(arm.description, "whole")
         singular = rank >= 1 and sigma[rank - 1] < SINGULAR_RATIO * sigma[0]
         return {
             "T": T.ravel().tolist(),

@@ -66,7 +66,9 @@ class DynamicsPanel(Panel):
     @answers("dynamics.entry", "name")
     def derive_entry(self, fields: Fields) -> None:
         """Derive an entry of the mass matrix or of the gravity torques as a formula, in the background."""
-        name, arm, view = fields.text("name", 3), self.desk.arm, self.desk.view
+        name = fields.text("name", 3)
+        arm = self.desk.arm
+        view = self.desk.view
         if not ENTRY.fullmatch(name) or any(int(digit) > arm.n for digit in name[1:]):
             raise ValueError(f"dynamics.entry: name is {name!r}; expected M11 to M{arm.n}{arm.n}, or g1 to g{arm.n}")
         if not has_bodies(arm):
@@ -98,7 +100,8 @@ def _formula(arm: Arm, name: str, job: Job) -> JsonObject:
     element = quantity.elements[tuple(int(digit) - 1 for digit in name[1:])]
     first, *others = latex_lines(element, LINE_WIDTH) if element else ["0"]
     latex = (f"{name[0]}_{{{name[1:]}}} = {first}", *(rf"\quad {line}" for line in others))
-    formulas, terms = [mathml(line) for line in latex], len(element)
+    formulas = [mathml(line) for line in latex]
+    terms = len(element)
     fits = len(formulas) <= MAX_LINES and all(formulas)
     return {
         "name": name,

@@ -36,7 +36,9 @@ class Job:
     """A job, as the work that it runs sees it."""
 
     def __init__(self, number: int, title: str, report: Callable[[Job], None]) -> None:
-        self.number, self.title, self.text = number, title, ""
+        self.number = number
+        self.title = title
+        self.text = ""
         self._report = report
         self._cancelled = threading.Event()
 
@@ -107,7 +109,8 @@ class Jobs:
 
     def cancel(self) -> None:
         """Cancel the job that runs."""
-        job, self._job = self._job, None
+        job = self._job
+        self._job = None
         with self._lock:
             self._waiting = None
         if job is not None:
@@ -126,7 +129,8 @@ class Jobs:
     def _run_waiting(self) -> None:
         while True:
             with self._lock:
-                run, self._waiting = self._waiting, None
+                run = self._waiting
+                self._waiting = None
                 if run is None:
                     self._thread = None
                     return

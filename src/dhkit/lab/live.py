@@ -43,7 +43,8 @@ class Live:
     """
 
     def __init__(self, arm: Arm, plant: Arm, friction: Friction | None, q: Array, rate: float) -> None:
-        self.arm, self.rate = arm, rate
+        self.arm = arm
+        self.rate = rate
         self.controller: Controller | None = None
         self.setpoints: Setpoints = lambda t: (q, np.zeros(len(q)), np.zeros(len(q)))
         self._pushes: tuple[Push, ...] = ()
@@ -117,7 +118,9 @@ class Live:
         SimulationError
             The controller fails, or the state is no longer finite.
         """
-        plant, state, n = self._plant, self._state, self.arm.n
+        plant = self._plant
+        state = self._state
+        n = self.arm.n
         assert self.controller is not None  # noqa: S101 - for mypy: a controller was taken before
         setpoint = Setpoint(self.arm.description, *self.setpoints(state.t))
         returned = call_controller(self.controller, state.t, state.q.copy(), state.qd.copy(), setpoint)
@@ -126,7 +129,8 @@ class Live:
         tau = np.clip(commanded, -effort, effort)
         phase = plant.phase(state.q, state.qd, tau, plant.active_pushes(state.t))
         self._record((state.t, *state.q, *state.qd, *phase.qdd, *tau, *commanded, *setpoint.q, *setpoint.qd))
-        begin, end = state.t, state.t + 1 / self.rate
+        begin = state.t
+        end = state.t + 1 / self.rate
         edges = sorted({edge for push in self._pushes for edge in (push.begin, push.end) if begin < edge < end})
         integrator = RungeKutta(plant, tau)
         first_end, *later_ends = [*edges, end]
@@ -157,12 +161,15 @@ class Live:
     def _begin_record(self, state: State) -> None:
         self._start = self._state = state
         self._turnover = 0.0
-        self._count, self._steps, self._stride = 0, 0, 1
+        self._count = 0
+        self._steps = 0
+        self._stride = 1
 
     def _record(self, row: tuple[float, ...]) -> None:
         if self._steps % self._stride == 0:
             if self._count == MAX_ROWS:
-                self._count, self._stride = MAX_ROWS // 2, 2 * self._stride
+                self._count = MAX_ROWS // 2
+                self._stride = 2 * self._stride
                 self._rows[: self._count] = self._rows[::2].copy()
             self._rows[self._count] = row
             self._count += 1

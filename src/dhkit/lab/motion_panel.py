@@ -76,7 +76,8 @@ class MotionPanel(Panel):
         """Plan a motion from the state on show; one that takes long is answered with the number of its job."""
         kind = fields.choice("kind", KINDS)
         duration = fields.number("duration", 1e-3, MAX_DURATION) if "duration" in fields else None
-        arm, start = self.desk.arm, self.desk.q.copy()
+        arm = self.desk.arm
+        start = self.desk.q.copy()
         goal_data = fields.data.get("goal")
         goal = Fields("motion.plan", goal_data if isinstance(goal_data, dict) else {}, GOAL_FIELDS)
         if "waypoints" in goal:
@@ -210,7 +211,8 @@ class MotionPanel(Panel):
         return motion
 
     def _plan_through_waypoints(self, kind: str, duration: float | None) -> JsonObject | None:
-        arm, points = self.desk.arm, [q.copy() for q in self.waypoints]
+        arm = self.desk.arm
+        points = [q.copy() for q in self.waypoints]
         if kind not in ("quintic", "least-time"):
             raise ValueError("motion.plan: waypoints are gone through by a quintic spline or in least time alone")
         if len(points) < 2:
@@ -232,11 +234,13 @@ class MotionPanel(Panel):
 
     def _take(self, kind: str, planned: PlannedMotion, by_job: bool = False) -> None:
         """Publish the numbers of a motion, and play it unless a controller moves the arm; contacts are added later."""
-        motion, arm = planned.motion, self.desk.arm
+        motion = planned.motion
+        arm = self.desk.arm
         if motion.duration > MAX_DURATION:
             raise ValueError(f"the motion lasts {motion.duration:g} s; expected at most {MAX_DURATION:g} s")
         times = np.linspace(0.0, motion.duration, PLOT_SAMPLES)
-        q, qd = motion.q(times), motion.qd(times)
+        q = motion.q(times)
+        qd = motion.qd(times)
         tau = motion.tau(times) if has_bodies(arm) else None
         excess = exceeded_limit(arm.description, q, qd, tau)
         state = {
@@ -254,7 +258,9 @@ class MotionPanel(Panel):
         if not np.isfinite(checked_q).all() or np.abs(checked_q).max() > MAX_JOINT_VALUE:
             raise ValueError(f"the motion's joint values go beyond {MAX_JOINT_VALUE:g}")
         self.desk.view.panel("motion", state)
-        self.motion, self.excess, self.call = motion, excess, planned.call
+        self.motion = motion
+        self.excess = excess
+        self.call = planned.call
         if not by_job:
             self.jobs.cancel()
             self.desk.view.panel("job", None)

@@ -58,7 +58,8 @@ class OwnPanel(Panel):
         lock: AbstractContextManager[object] | None = None,
     ) -> None:
         super().__init__(desk)
-        self.source, self._isolation = source, isolation
+        self.source = source
+        self._isolation = isolation
         self.on_change: list[Callable[[], None]] = []
         """Called when the program has been loaded, with the functions that it defines now."""
         self.on_score: list[Callable[[Arm, Mapping[str, object]], None]] = []
@@ -164,7 +165,8 @@ class OwnPanel(Panel):
         if self._program is not None:
             self._program.close()
         program = self._program = Program(self.source, CALL_LIMITS, self._isolation)
-        self._compared, self._functions = None, ()
+        self._compared = None
+        self._functions = ()
         self._state = {"file": program.name, "functions": [], "loading": True, "report": None}
         self.publish()
         try:
@@ -187,7 +189,9 @@ class OwnPanel(Panel):
 
     def _compare(self) -> None:
         """Compare the program's answers with the arm's, at the state on show."""
-        program, arm, q = self._program, self.desk.arm, self.desk.q
+        program = self._program
+        arm = self.desk.arm
+        q = self.desk.q
         if program is None or not program.functions or self._state.get("loading", True):
             return
         output = program.output[-MAX_OUTPUT_LENGTH:]  # it may come after the answer
@@ -207,7 +211,8 @@ class OwnPanel(Panel):
         self._publish(**results, imported=list(program.imported))
 
     def _compare_forward(self, arm: Arm, q: Array, program: Program) -> JsonObject:
-        T, T_arm = program.fk(q), arm.fk(q)
+        T = program.fk(q)
+        T_arm = arm.fk(q)
         cosine = np.clip((np.trace(T_arm[:3, :3].T @ T[:3, :3]) - 1) / 2, -1.0, 1.0)
         distance = float(np.linalg.norm(T[:3, 3] - T_arm[:3, 3]))
         return {"distance": distance, "angle": float(np.arccos(cosine)), "T": T.ravel().tolist()}

@@ -38,7 +38,9 @@ class PythonPanel(Panel):
 
     def __init__(self, desk: Desk, tool: ToolPanel, motions: MotionPanel, control: ControlPanel) -> None:
         super().__init__(desk)
-        self.tool, self.motions, self.control = tool, motions, control
+        self.tool = tool
+        self.motions = motions
+        self.control = control
 
     @answers("python")
     def write(self, _: Fields) -> JsonObject:
@@ -66,7 +68,9 @@ class PythonPanel(Panel):
 
     def _target_lines(self, T: ArrayLike) -> list[str]:
         """Return the lines that solve the inverse kinematics at the target, shape (4, 4), m."""
-        lines, arm, branch = [f"T = {literal(T)}"], self.desk.arm, self.tool.chosen
+        lines = [f"T = {literal(T)}"]
+        arm = self.desk.arm
+        branch = self.tool.chosen
         if classify(arm.description).fit is None:
             return [*lines, f"print(arm.ik_numeric(T, q, position_only={arm.n < 6}).q)"]
         lines += ["solutions = arm.ik(T)", "print(solutions.branches, solutions.q)"]
@@ -74,7 +78,9 @@ class PythonPanel(Panel):
 
     def _run_lines(self) -> list[str]:
         """Return the lines that simulate the present run from its present setpoint."""
-        settings, locked, sine = self.control.settings, self.control.locked, self.control.sine
+        settings = self.control.settings
+        locked = self.control.locked
+        sine = self.control.sine
         lines = [f"arm = arm.lock({locked!r})", f"q = q[{self.control.free!r}]"] if locked else []
         if settings.reference is ReferenceKind.MOTION and locked:
             text = "# The run follows the motion's joints that are free: arm.simulate takes a motion of these alone."

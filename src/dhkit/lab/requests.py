@@ -45,7 +45,8 @@ class Fields:
     """
 
     def __init__(self, request: str, data: JsonObject, known: Collection[str]) -> None:
-        self.request, self.data = request, data
+        self.request = request
+        self.data = data
         unknown = next((name for name in data if name not in known), None)
         if unknown is not None:
             raise ValueError(f"{request}: found field {str(unknown)[:40]!r}; expected {', '.join(known) or 'none'}")
@@ -108,7 +109,8 @@ class Fields:
             raise self._error(name, "a right-handed frame")
         U, _, Vt = np.linalg.svd(R)
         exact = np.eye(4)
-        exact[:3, :3], exact[:3, 3] = U @ Vt, T[:3, 3]
+        exact[:3, :3] = U @ Vt
+        exact[:3, 3] = T[:3, 3]
         return exact
 
     def text(self, name: str, max_length: int = MAX_TEXT_LENGTH) -> str:

@@ -159,7 +159,8 @@ def gentle_sine(arm: Arm, q: Array, free: list[int]) -> Sine:
     """
     numbers = arm.description.numbers
     size = np.where(numbers.prismatic, SINE_AMPLITUDE * arm.description.reach, SINE_AMPLITUDE)[free]
-    room_up, room_down = numbers.upper[free] - q, q - numbers.lower[free]
+    room_up = numbers.upper[free] - q
+    room_down = q - numbers.lower[free]
     enough_room = room_up >= np.minimum(size, room_down)
     up = np.clip(np.where(enough_room, np.minimum(size, LIMIT_SHARE * room_up), 0.0), 0.0, None)
     down = np.clip(np.minimum(size, LIMIT_SHARE * room_down), 0.0, None)

@@ -55,7 +55,8 @@ class SubmitPanel(Panel):
     @answers("submit.grade", "kind", "text")
     def grade(self, fields: Fields) -> None:
         """Judge an answer in the background; it is read as text, and never run."""
-        kind, text = fields.choice("kind", SUFFIXES), fields.text("text", MAX_ANSWER_LENGTH)
+        kind = fields.choice("kind", SUFFIXES)
+        text = fields.text("text", MAX_ANSWER_LENGTH)
         self._clear()  # an answer that is refused must not leave the verdict of another
         if not text.strip():
             raise ValueError("submit.grade: the answer is empty; expected M, C, g, tau, A1, T, J, ... of this robot")

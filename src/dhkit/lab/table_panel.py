@@ -104,7 +104,8 @@ class TablePanel(Panel):
     @answers("table.download", "format")
     def download(self, fields: Fields) -> JsonObject:
         """Return the arm as a robot file or a URDF."""
-        kind, arm = fields.choice("format", ("toml", "urdf")), self.desk.arm
+        kind = fields.choice("format", ("toml", "urdf"))
+        arm = self.desk.arm
         return {"name": f"{arm.name}.{kind}", "text": to_toml(arm.description) if kind == "toml" else arm.urdf()}
 
     def publish(self) -> None:
@@ -179,7 +180,8 @@ class TablePanel(Panel):
         self._show(table)
 
     def _show(self, table: Table) -> None:
-        previous, self._table = self._table, table
+        previous = self._table
+        self._table = table
         if table.description != previous.description:
             self._is_replacing = True
             arm = Arm(table.description)
@@ -238,7 +240,8 @@ def rotation_about(axis: int, angle: float) -> Array:
     T = np.eye(4)
     i, j = [(1, 2), (2, 0), (0, 1)][axis]
     T[i, i] = T[j, j] = np.cos(angle)
-    T[i, j], T[j, i] = -np.sin(angle), np.sin(angle)
+    T[i, j] = -np.sin(angle)
+    T[j, i] = np.sin(angle)
     return T
 
 

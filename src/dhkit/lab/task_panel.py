@@ -34,7 +34,9 @@ class TaskPanel(Panel):
 
     def __init__(self, desk: Desk, motions: MotionPanel, own: OwnPanel, assignment: Assignment | None) -> None:
         super().__init__(desk)
-        self.motions, self.own, self.assignment = motions, own, assignment
+        self.motions = motions
+        self.own = own
+        self.assignment = assignment
         self._lock = threading.Lock()
         self._reached: set[Place] = set()
         self._left: set[Place] = set()
@@ -142,7 +144,8 @@ class TaskPanel(Panel):
 
     def _update_arm(self) -> bool:
         """Compare an arm that has replaced another with the assignment's; return whether the result has changed."""
-        arm, was_assigned_arm = self.desk.arm, self._is_assigned_arm
+        arm = self.desk.arm
+        was_assigned_arm = self._is_assigned_arm
         if arm is not self._arm and self.assignment is not None:
             self._arm = arm
             self._is_assigned_arm = _moves_alike(arm.description, self.assignment.arm.description)

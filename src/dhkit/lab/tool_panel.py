@@ -80,7 +80,8 @@ class ToolPanel(Panel):
     @answers("tool.jog", "axis", "step", "frame")
     def jog(self, fields: Fields) -> JsonObject:
         """Move the target by a step along or about an axis of the world or of the tool."""
-        axis, step = fields.integer("axis", 0, 5), fields.number("step", -MAX_DISTANCE, MAX_DISTANCE)
+        axis = fields.integer("axis", 0, 5)
+        step = fields.number("step", -MAX_DISTANCE, MAX_DISTANCE)
         vector = np.zeros(3)
         vector[axis % 3] = step
         motion = pose(vector) if axis < 3 else pose(euler=vector, order="XYZ")
@@ -136,7 +137,9 @@ class ToolPanel(Panel):
                 self._follow(T)
 
     def _forget(self) -> None:
-        self.T, self.chosen, self.desk.target_q = None, None, None
+        self.T = None
+        self.chosen = None
+        self.desk.target_q = None
         self._plane = _plane_of(self.desk.arm)
         self.desk.view.ghosts(None)
         self.publish()
@@ -192,7 +195,8 @@ class ToolPanel(Panel):
     def _branches(self, solutions: IKSolutions, by_iteration: bool) -> list[Branch]:
         """Return the branches that reach the pose."""
         q = solutions.q if by_iteration else solutions.within_limits(near=self.desk.q)
-        q, allowed = np.where(np.isfinite(q), q, solutions.q), np.atleast_1d(solutions.allowed)
+        q = np.where(np.isfinite(q), q, solutions.q)
+        allowed = np.atleast_1d(solutions.allowed)
         return [
             Branch(name, q[k], bool(allowed[k]))
             for k, name in enumerate(solutions.branches)

@@ -96,7 +96,8 @@ class TransformsPanel(Panel):
             if not isinstance(data, dict):
                 raise ValueError(f"{place}: expected kind, axis, amount and about")
             step = Fields(place, data, ["kind", "axis", "amount", "about"])
-            kind, axis = step.choice("kind", ("turn", "move")), step.choice("axis", ("x", "y", "z"))
+            kind = step.choice("kind", ("turn", "move"))
+            axis = step.choice("axis", ("x", "y", "z"))
             about = step.choice("about", ("current", "fixed"))
             amount = _amount(step)
             E = (rotation_about if kind == "turn" else translation_along)("xyz".index(axis), amount)

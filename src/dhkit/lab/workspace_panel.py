@@ -47,7 +47,8 @@ class WorkspacePanel(Panel):
             self.desk.view.points(None)
             self._publish(kind="none", count=0, progress=None)
             return
-        arm, tool = self.desk.arm, self.desk.arm.fk(self.desk.q)[:3, 3]
+        arm = self.desk.arm
+        tool = self.desk.arm.fk(self.desk.q)[:3, 3]
         self._publish(kind=kind, count=0, progress="sampling")
 
         def take(cloud: tuple[Array, Array, str]) -> None:
@@ -102,7 +103,9 @@ def boundary_distance(arm: Arm, q: Array) -> tuple[float, str, str] | None:
     sections = _sections(arm.description)
     if not sections:
         return None
-    axis, frames, tool = first_axis(arm.description), arm.frames(q), arm.fk(q)
+    axis = first_axis(arm.description)
+    frames = arm.frames(q)
+    tool = arm.fk(q)
     candidates: list[tuple[float, str, str]] = []
     for name, point, section in sections:
         T = tool if point == "tool" else frames[min(WRIST_FRAME, arm.n)]
@@ -135,7 +138,8 @@ def _distance_from_line(point: Array, line: Array) -> float:
         return np.inf
     if len(line) == 1:
         return float(np.linalg.norm(point - line[0]))
-    start, segment = line[:-1], np.diff(line, axis=0)
+    start = line[:-1]
+    segment = np.diff(line, axis=0)
     length = np.einsum("ij,ij->i", segment, segment)
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.where(length > 0, np.einsum("ij,ij->i", point - start, segment) / length, 0.0)
@@ -157,7 +161,8 @@ def _sample(arm: Arm, through: Array | None, job: Job) -> tuple[Array, Array, st
     chosen = np.arange(len(space.positions))
     if through is not None:
         axis = first_axis(arm.description)
-        local, towards = (space.positions - axis[:3, 3]) @ axis[:3, :3], (through - axis[:3, 3]) @ axis[:3, :3]
+        local = (space.positions - axis[:3, 3]) @ axis[:3, :3]
+        towards = (through - axis[:3, 3]) @ axis[:3, :3]
         angle = np.arctan2(towards[1], towards[0])
         offset = -np.sin(angle) * local[:, 0] + np.cos(angle) * local[:, 1]
         chosen = np.flatnonzero(np.abs(offset) < HALF_THICKNESS * max(arm.description.reach, 1e-9))[:MAX_POINTS]

@@ -62,7 +62,8 @@ def solve_many(
     check_whole("workers", workers, 1)
     if progress is not None and not callable(progress):
         raise TypeError(f"progress is {type(progress).__name__}; expected a function of two numbers")
-    report, given = progress or (lambda done, total: None), dict(options or {})
+    report = progress or (lambda done, total: None)
+    given = dict(options or {})
     if min(workers, count) <= 1:
         found = []
         for pair in pairs:

@@ -171,7 +171,8 @@ class Planner:
             Arguments of another shape or type.
         """
         chosen = PlanOptions.of(options, keywords)
-        description, work = self.description, chosen.work()
+        description = self.description
+        work = chosen.work()
         if chosen.warm is not None:
             chosen.warm.require(description)
         places = parse_places(description, start, chosen.via, goal)
@@ -245,7 +246,8 @@ class Planner:
         scale
             Factor of the number of intervals.
         """
-        legs, limits = len(task.points) - 1, task.limits
+        legs = len(task.points) - 1
+        limits = task.limits
         jerk_limited = bool(np.isfinite(limits.jerk).any())
         with_torque = bool(np.isfinite(limits.torque).any())
         intervals = max(MIN_LEG_INTERVALS, int(scale * self.intervals_for(task) * (2 if attempt else 1)))
@@ -282,7 +284,8 @@ class Planner:
         return curves_for(self.description.n, self.objective, jerk_counts=jerk_counts, friction=has_friction)
 
     def _task(self, request: PlanRequest, points: Array) -> Task:
-        description, limits = self.description, request.limits
+        description = self.description
+        limits = request.limits
         arm = request.loaded(description)
         T_start = world_to_tool(description, points[0])
         parameters = tuple(constraint.values(description, T_start) for constraint in self.constraints)
@@ -337,7 +340,8 @@ class Planner:
                 continue
             reports.append(BranchReport(route.label, found.trajectory.duration, solved=True))
             if best is None or found.cost < best[1].cost:
-                best, chosen = (task, found), number
+                best = (task, found)
+                chosen = number
         if best is None:
             if failure is None or len(routes) == 1:
                 raise failure or PlanningError("no motion found")

@@ -123,7 +123,8 @@ class PlanReport:
         if self.coordinates:
             notes.append(f"of the poses to go to, {', '.join(self.coordinates)} counted and no other coordinates")
         if self.clearance is not None:
-            asked, spare = 1000 * self.clearance, 1000 * max(self.spare_clearance, 0.0)
+            asked = 1000 * self.clearance
+            spare = 1000 * max(self.spare_clearance, 0.0)
             notes.append(f"clearance: {asked:.3g} mm kept {self.clear_of}, and at least {spare:.3g} mm more")
         if self.reduced_clearances:
             less = ", ".join(self.reduced_clearances)
@@ -162,7 +163,8 @@ class PlanReport:
         rows = []
         for motion in self.classical:
             if self.is_least_time:
-                value, ratio = seconds_text(motion.duration), motion.duration / self.duration
+                value = seconds_text(motion.duration)
+                ratio = motion.duration / self.duration
             else:
                 value = self._with_unit(motion.cost)
                 ratio = motion.cost / self.cost if self.cost > 0 else math.nan
@@ -266,7 +268,8 @@ class PlanReport:
         }
 
     def __str__(self) -> str:
-        certificate, lines = self.certificate, []
+        certificate = self.certificate
+        lines = []
         lines.append(f"{self.title}: {self.cost_text}")
         kept = f"certified by {certificate.reference} in {certificate.states} states"
         if certificate.worst is None:

@@ -42,7 +42,8 @@ def require_path(description: LoadedArm, path: JointPath, limits: Limits) -> Non
 
 def _require_no_jump(path: JointPath, order: int, what: str, joint_does: str) -> None:
     """Require a path whose derivative by s of an order does not jump."""
-    steps, values = np.abs(jumps(path, order)), path.pieces.differentiated(order)(path.breaks)
+    steps = np.abs(jumps(path, order))
+    values = path.pieces.differentiated(order)(path.breaks)
     if steps.size and steps.max() > JUMP_ROUNDING * np.abs(values).max():
         k, i = np.unravel_index(int(np.argmax(steps)), steps.shape)
         name = path.description.joints[i].name

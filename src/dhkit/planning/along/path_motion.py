@@ -129,7 +129,8 @@ def along_path(
 
 def _best_timing(task: Task, intervals: int, work: Work, progress: ProgressCall | None) -> PlannedMotion:
     """Return the best motion; objectives other than time start from the fastest one."""
-    path, limits = cast("JointPath", task.path), task.limits
+    path = cast("JointPath", task.path)
+    limits = task.limits
     rough = np.union1d(np.linspace(0.0, 1.0, intervals + 1), path.breaks)
     states = PathStates.of(task.loaded, path, rough)
     s = knots_of(path, intervals, rough, states.even_speeds(limits))

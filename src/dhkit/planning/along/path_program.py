@@ -69,7 +69,10 @@ class PathProgram(Program[Profile]):
     small_step = 1e-3
 
     def __init__(self, task: Task, s: Array) -> None:
-        self.task, self.path, self.s, self.intervals = task, cast("JointPath", task.path), s, len(s) - 1
+        self.task = task
+        self.path = cast("JointPath", task.path)
+        self.s = s
+        self.intervals = len(s) - 1
         self.states = PathStates.of(task.loaded, self.path, s)
         self.point = PathPoint(task.loaded, task.limits, task.friction)
         self._limited = [
@@ -77,13 +80,15 @@ class PathProgram(Program[Profile]):
             for k, (constraint, _) in task.checker.limiting.items()
             if constraint.moving and k not in (Limit.VELOCITY, Limit.JERK)
         ]
-        K, of_interval = self.intervals, 1 + 2 * int(self.point.path.numel())
+        K = self.intervals
+        of_interval = 1 + 2 * int(self.point.path.numel())
         self.sizes = [len(parameters) for _, parameters in task.checker.every]
         of_all = sum(self.sizes) + 1
         self._power = task.objective.positive_parts(self.point)
         self.powers = int(self._power.numel())
         """Number of quantities of a state whose positive parts are in the objective."""
-        own, common = of_interval * np.arange(K) + np.arange(of_interval)[:, None], K * of_interval + np.arange(of_all)
+        own = of_interval * np.arange(K) + np.arange(of_interval)[:, None]
+        common = K * of_interval + np.arange(of_all)
         self.parameters_at: Indices = np.vstack([own, np.tile(common[:, None], K)])
         """Indices of each interval's parameters, shape (parameters, K)."""
         self.parameter_count = K * of_interval + of_all
@@ -92,7 +97,8 @@ class PathProgram(Program[Profile]):
         """Return symbols of an interval's parameters: its length, both ends' coefficients, constraints, scale."""
         import casadi
 
-        symbol, size = casadi.SX.sym, int(self.point.path.numel())
+        symbol = casadi.SX.sym
+        size = int(self.point.path.numel())
         given = [symbol(f"p{k}", count) for k, count in enumerate(self.sizes)]
         return symbol("step"), symbol("left", size), symbol("right", size), given, symbol("scale")
 
@@ -108,7 +114,8 @@ class PathProgram(Program[Profile]):
         """
         import casadi
 
-        point, limits = self.point, limit_rows(self._limited, self.point, given)
+        point = self.point
+        limits = limit_rows(self._limited, self.point, given)
         parts = casadi.SX.sym("parts", self.powers)
         rows = casadi.vertcat(casadi.SX(0, 1), *(row for _, row in limits), parts - self._power)
         inputs = [point.sdd, point.b, point.speed, point.path, parts, *given]
@@ -139,8 +146,10 @@ class PathProgram(Program[Profile]):
         self.positive_parts: Indices = variables + np.arange(2 * self.powers * K).reshape(2 * self.powers, K)
         """Indices of the positive parts at the left and the right end of each interval, shape (2 powers, K)."""
         own = np.vstack([step[None], self.positive_parts])
-        each, total = np.stack([step, step], axis=1), casadi.SX.sym("total", K)
-        of_first, of_last = np.vstack([own[:, :1], inner[:, :1]]), np.vstack([own[:, -1:], inner[:, -1:]])
+        each = np.stack([step, step], axis=1)
+        total = casadi.SX.sym("total", K)
+        of_first = np.vstack([own[:, :1], inner[:, :1]])
+        of_last = np.vstack([own[:, -1:], inner[:, -1:]])
         between = np.vstack([own[:, 1:-1], inner[:, :-1], inner[:, 1:]])
         blocks = [
             Block(function, indices, self.parameters_at[:, part], rows, each[part])
@@ -188,7 +197,8 @@ class PathProgram(Program[Profile]):
     def scaling(self, unit: float, rate: float) -> Scaling:
         """Return units of durations, s, and of positive parts of powers; 1 for all others."""
         scaling = self.blocks.unscaled
-        scaling.unit[: self.intervals], scaling.unit[self.positive_parts] = unit, rate
+        scaling.unit[: self.intervals] = unit
+        scaling.unit[self.positive_parts] = rate
         units = {RowKind.TIME: unit, RowKind.DURATION: unit, RowKind.POSITIVE_PART: rate}
         row_units = self.blocks.row_units(lambda rows: units.get(rows.kind, 1.0))
         return Scaling(scaling.offset, scaling.unit, row_units)
@@ -211,7 +221,8 @@ class PathProgram(Program[Profile]):
 
     def interval_of(self, trajectory: Trajectory, found: Profile) -> Indices:
         """Return the interval that each piece of a trajectory lies in: its breaks are between those of the grid."""
-        ends, breaks = found.times / found.times[-1], trajectory.breaks / trajectory.duration
+        ends = found.times / found.times[-1]
+        breaks = trajectory.breaks / trajectory.duration
         interval: Indices = np.searchsorted(ends, (breaks[1:] + breaks[:-1]) / 2) - 1
         return np.clip(interval, 0, self.intervals - 1)
 

@@ -34,7 +34,8 @@ CANCELLED_SHARE = 1e-9
 
 def jumps(path: JointPath, order: int) -> Array:
     """Return the jumps of a derivative by s at the inner breaks, shape (K-1, n), rad and m."""
-    pieces, inside = path.pieces.differentiated(order), path.breaks[1:-1]
+    pieces = path.pieces.differentiated(order)
+    inside = path.breaks[1:-1]
     steps: Array = pieces(inside) - pieces(inside, "left")
     return steps
 
@@ -54,7 +55,8 @@ def knots_of(path: JointPath, intervals: int, rough: Array, speeds: Array) -> Ar
     times = steps / speeds
     share = (1 - EVEN_SHARE) * times / max(float(times.sum()), MIN_TIME) + EVEN_SHARE * steps
     x = (1 - np.cos(np.linspace(0.0, np.pi, intervals + 1))) / 2
-    knots, taken = np.interp(x, np.concatenate([[0.0], np.cumsum(share) / share.sum()]), rough), set()
+    knots = np.interp(x, np.concatenate([[0.0], np.cumsum(share) / share.sum()]), rough)
+    taken = set()
     bends = np.abs(jumps(path, 2)).max(axis=1)
     for s in path.breaks[1:-1][bends > JUMP_ROUNDING * np.abs(path.qss(path.breaks)).max()]:
         k = int(np.argmin(np.abs(knots[1:-1] - s))) + 1
@@ -100,7 +102,8 @@ class PathStates:
             g = dynamics.inverse_dynamics(arm, q, still, still)
             m = dynamics.inverse_dynamics(arm, q, still, qs) - g
             c = dynamics.inverse_dynamics(arm, q, qs, qss) - g
-        J, Jd = kinematics.jacobian(arm, q), kinematics.jacobian_dot(arm, q, qs)
+        J = kinematics.jacobian(arm, q)
+        Jd = kinematics.jacobian_dot(arm, q, qs)
         ps = np.einsum("...ij,...j->...i", J[..., :3, :], qs)
         pss = np.einsum("...ij,...j->...i", J[..., :3, :], qss) + np.einsum("...ij,...j->...i", Jd[..., :3, :], qs)
         return cls(np.stack([knots[:-1], knots[1:]]), q, qs, qss, m, c, g, ps, pss, qsss)
@@ -150,7 +153,8 @@ class PathStates:
 
     def _factors(self, limits: Limits, shape: Array) -> Array:
         """Return the largest factors of sd^2 = shape (K+1,) by limits of torque and acceleration, shape (2, K)."""
-        b, sdd = np.stack([shape[:-1], shape[1:]])[..., None], (np.diff(shape) / (2 * self.steps))[:, None]
+        b = np.stack([shape[:-1], shape[1:]])[..., None]
+        sdd = (np.diff(shape) / (2 * self.steps))[:, None]
         found = np.full(self.s.shape, np.inf)
         for by_sdd, by_b, rest, limit in (
             (self.m, self.c, self.g, limits.torque),
@@ -175,12 +179,17 @@ class PathPoint(Point):
         import casadi
 
         n = description.n
-        self.description, self.limits, self.n, self.friction = description, limits, n, friction
+        self.description = description
+        self.limits = limits
+        self.n = n
+        self.friction = friction
         self.b, self.speed, self.sdd = (casadi.SX.sym(name) for name in ("b", "speed", "sdd"))
         self.path = casadi.SX.sym("path", 7 * n + 6)
         edges = [*range(0, 6 * n + 1, n), 6 * n + 3, 6 * n + 6, 7 * n + 6]
         q, qs, qss, m, c, g, ps, pss, _ = casadi.vertsplit(self.path, edges)
-        self.q, self.qd, self.qdd = q, qs * self.speed, qs * self.sdd + qss * self.b
+        self.q = q
+        self.qd = qs * self.speed
+        self.qdd = qs * self.sdd + qss * self.b
         self.load = casadi.SX(0, 1)  # torques along the path include the payload
         self._rigid = m * self.sdd + c * self.b + g
         self._tool = ps * self.speed, ps * self.sdd + pss * self.b

@@ -101,7 +101,8 @@ class TimingProgram(PathProgram[Profile]):
         """Return the rows and the cost of an interval; the first begins at rest, the last ends there."""
         import casadi
 
-        duration, inner = casadi.SX.sym("duration"), casadi.SX.sym("b", 2 - first - last)
+        duration = casadi.SX.sym("duration")
+        inner = casadi.SX.sym("b", 2 - first - last)
         parts = [casadi.SX.sym(f"parts{k}", self.powers) for k in range(2)]
         step, left, right, given, scale = self.symbols()
         known = casadi.vertsplit(casadi.exp(inner) if self._logarithmic else inner)
@@ -110,7 +111,8 @@ class TimingProgram(PathProgram[Profile]):
         b = [*rest * first, *known, *rest * last]
         speed = [*rest * first, *(casadi.sqrt(part) for part in known), *rest * last]
         kinds = [Rows(RowKind.TIME, "duration of an interval", 1)]
-        rows, rates = [2 * step / (speed[0] + speed[1]) - duration], []
+        rows = [2 * step / (speed[0] + speed[1]) - duration]
+        rates = []
         at_state, limits = self.at_state(given)
         sdd = (b[1] - b[0]) / (2 * step)
         for x, v, coefficients, part in zip(b, speed, (left, right), parts, strict=True):
@@ -119,7 +121,8 @@ class TimingProgram(PathProgram[Profile]):
             rates.append(rate)
             kinds += limits
         cost = scale * duration * (self.task.objective.time_weight + (rates[0] + rates[1]) / 2)
-        z, p = casadi.vertcat(duration, *parts, inner), casadi.vertcat(step, left, right, *given, scale)
+        z = casadi.vertcat(duration, *parts, inner)
+        p = casadi.vertcat(step, left, right, *given, scale)
         return LocalFunction(z, p, casadi.vertcat(*rows), cost), tuple(kinds)
 
     # Guesses
@@ -145,17 +148,20 @@ class TimingProgram(PathProgram[Profile]):
 
     def arguments(self, task: Task, guess: Profile, margins: Margins) -> Arguments:
         """Return the arguments of a solution; the unit of time is the guess's duration."""
-        K, unit = self.intervals, guess.duration
+        K = self.intervals
+        unit = guess.duration
         lowest = MIN_SQUARED_SPEED / unit**2
         shares = margins.of(Limit.VELOCITY, task.arm.n)
         high = np.maximum(self.states.fastest(task.limits, shares)[1:-1], 2 * lowest)
-        cost, speed = self.cost_unit(task, guess), np.sqrt(guess.b)
+        cost = self.cost_unit(task, guess)
+        speed = np.sqrt(guess.b)
         scaling = self.scaling(unit, cost / unit)
         if self._logarithmic:
             scaling.offset[K : 2 * K - 1] = -2 * np.log(unit)
         else:
             scaling.unit[K : 2 * K - 1] = unit**-2
-        sdd, most = np.diff(guess.b) / (2 * np.diff(self.s)), np.full(self.positive_parts.shape, np.inf)
+        sdd = np.diff(guess.b) / (2 * np.diff(self.s))
+        most = np.full(self.positive_parts.shape, np.inf)
         powers = self.positive_powers(speed, sdd, sdd)
         low = self._variables(np.zeros(K), np.full(K - 1, lowest), 0 * powers)
         return Arguments(
@@ -222,7 +228,8 @@ class SmoothProfile:
         """Return the profile of s = 10 x^3 - 15 x^4 + 6 x^5, x = t / duration, s."""
         x = np.linspace(0.0, 1.0, SAMPLES)
         x = np.interp(s, x**3 * (10 - 15 * x + 6 * x * x), x)
-        sd, sdd = 30 * x**2 * (1 - x) ** 2 / duration, 60 * x * (1 - x) * (1 - 2 * x) / duration**2
+        sd = 30 * x**2 * (1 - x) ** 2 / duration
+        sdd = 60 * x * (1 - x) * (1 - 2 * x) / duration**2
         return cls(s, duration * np.diff(x), sd, sdd)
 
 
@@ -237,7 +244,8 @@ class SmoothTimingProgram(PathProgram[SmoothProfile]):
     def __init__(self, task: Task, s: Array) -> None:
         super().__init__(task, s)
         K = self.intervals
-        self._sd, self._sdd = K + np.arange(K - 1), 2 * K - 1 + np.arange(K - 1)
+        self._sd = K + np.arange(K - 1)
+        self._sdd = 2 * K - 1 + np.arange(K - 1)
         self.blocks = self.program(self._interval, np.stack([self._sd, self._sdd]), 3 * K - 2)
         self.solver = Solver(self.blocks, K, tolerance=JERK_LIMITED_TOLERANCE)
 
@@ -245,26 +253,33 @@ class SmoothTimingProgram(PathProgram[SmoothProfile]):
         """Return the rows and the cost of an interval; the first begins at rest, the last ends there."""
         import casadi
 
-        h, known = casadi.SX.sym("duration"), [casadi.SX.sym(f"state{k}", 2) for k in range(2 - first - last)]
+        h = casadi.SX.sym("duration")
+        known = [casadi.SX.sym(f"state{k}", 2) for k in range(2 - first - last)]
         parts = [casadi.SX.sym(f"parts{k}", self.powers) for k in range(2)]
         step, left, right, given, scale = self.symbols()
         rest = [casadi.SX(2, 1)]
         begin, end = [*rest * first, *known, *rest * last]
         at_state, limits = self.at_state(given)
-        n, reciprocals = self.task.arm.n, given[Limit.JERK]
+        n = self.task.arm.n
+        reciprocals = given[Limit.JERK]
         kinds = [Rows(RowKind.CONTINUITY, "continuity along the path", 2)]
-        moved, gained = h * begin[0] + h * h * (2 * begin[1] + end[1]) / 6, h * (begin[1] + end[1]) / 2
-        rows, rates = [casadi.vertcat(moved / step - 1, begin[0] + gained - end[0])], []
+        moved = h * begin[0] + h * h * (2 * begin[1] + end[1]) / 6
+        gained = h * (begin[1] + end[1]) / 2
+        rows = [casadi.vertcat(moved / step - 1, begin[0] + gained - end[0])]
+        rates = []
         for state, path, part in zip((begin, end), (left, right), parts, strict=True):
             v, a = casadi.vertsplit(state)
             row, rate = at_state(a, v * v, v, path, part, *given)
-            qs, qss, qsss = path[n : 2 * n], path[2 * n : 3 * n], path[-n:]
+            qs = path[n : 2 * n]
+            qss = path[2 * n : 3 * n]
+            qsss = path[-n:]
             jerk = qs * (end[1] - begin[1]) / h + 3 * qss * v * a + qsss * v**3
             rows += [row, jerk * reciprocals]
             rates.append(rate)
             kinds += [*limits, Rows(RowKind.LIMIT, Limit.JERK.what, n, Limit.JERK, of_joints=True)]
         cost = scale * h * (self.task.objective.time_weight + (rates[0] + rates[1]) / 2)
-        z, p = casadi.vertcat(h, *parts, *known), casadi.vertcat(step, left, right, *given, scale)
+        z = casadi.vertcat(h, *parts, *known)
+        p = casadi.vertcat(step, left, right, *given, scale)
         return LocalFunction(z, p, casadi.vertcat(*rows), cost), tuple(kinds)
 
     # Guesses
@@ -294,15 +309,20 @@ class SmoothTimingProgram(PathProgram[SmoothProfile]):
 
     def arguments(self, task: Task, guess: SmoothProfile, margins: Margins) -> Arguments:
         """Return the arguments of a solution; the unit of time is the guess's duration."""
-        K, unit = self.intervals, float(guess.times[-1])
+        K = self.intervals
+        unit = float(guess.times[-1])
         cost = self.cost_unit(task, guess)
         scaling = self.scaling(unit, cost / unit)
-        scaling.unit[self._sd], scaling.unit[self._sdd] = 1 / unit, unit**-2
+        scaling.unit[self._sd] = 1 / unit
+        scaling.unit[self._sdd] = unit**-2
         per_interval = sum(kind.count for kind in self.blocks.blocks[1].rows)
         scaling.row_unit[1 : K * per_interval : per_interval] = 1 / unit
-        low, high = np.full(self.blocks.variables, -np.inf), np.full(self.blocks.variables, np.inf)
+        low = np.full(self.blocks.variables, -np.inf)
+        high = np.full(self.blocks.variables, np.inf)
         shares = margins.of(Limit.VELOCITY, task.arm.n)
-        low[:K], low[self._sd], low[self.positive_parts] = MIN_STEP * unit / K, 0.0, 0.0
+        low[:K] = MIN_STEP * unit / K
+        low[self._sd] = 0.0
+        low[self.positive_parts] = 0.0
         high[self._sd] = np.sqrt(self.states.fastest(task.limits, shares)[1:-1])
         powers = self.positive_powers(guess.sd, guess.sdd[:-1], guess.sdd[1:])
         x = np.concatenate([guess.durations, guess.sd[1:-1], guess.sdd[1:-1], powers.ravel()])

@@ -57,15 +57,21 @@ def smallest_between(
     radii = [capsule.radius for capsule in link_capsules(states.description) if capsule.radius > 0]
     smallest_travel = min([SMALLEST_TRAVEL, *(SMALLEST_SHARE * radius for radius in radii)])
     # Parts of steps: their step, as an index of ``steps``, beginning and end, 0 to 1, and the distances there.
-    which, low, high = np.arange(len(steps)), np.zeros(len(steps)), np.ones(len(steps))
-    at_low, at_high = found[steps], found[steps + 1]
+    which = np.arange(len(steps))
+    low = np.zeros(len(steps))
+    high = np.ones(len(steps))
+    at_low = found[steps]
+    at_high = found[steps + 1]
     while len(which):
         travel = travels[which] * (high - low)
         near = np.minimum(at_low, at_high)
         needed = least[which]
         open_ = (near >= needed) & ((at_low + at_high - travel[:, None]) / 2 < needed)
         kept = open_.any(axis=1) & (travel > smallest_travel)
-        which, low, high, travel = which[kept], low[kept], high[kept], travel[kept]
+        which = which[kept]
+        low = low[kept]
+        high = high[kept]
+        travel = travel[kept]
         room = np.where(open_, at_low + at_high - 2 * needed, np.inf)[kept].min(axis=1, initial=np.inf)
         at_low, at_high = at_low[kept], at_high[kept]
         if not len(which):
@@ -155,7 +161,8 @@ def _levers(states: States) -> Array:
     1 for a prismatic joint, which moves all points alike.
     """
     description = states.description
-    capsules, ends = link_capsules(description), world_axes(description, states.q)
+    capsules = link_capsules(description)
+    ends = world_axes(description, states.q)
     frames = np.moveaxis(world_to_frames(description, states.q), -3, 0)
     levers = np.ones(states.q.shape)
     for i, T in enumerate(carrying(description.convention, frames)):

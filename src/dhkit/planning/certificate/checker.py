@@ -274,7 +274,9 @@ class Checker:
     def check(self, trajectory: Trajectory, states: States | None = None) -> Certificate:
         """Return the certificate of a motion; ``states`` are its states on the grid, if they are known."""
         states = self.states(trajectory) if states is None else states
-        checks, active, anywhere = [], [], np.zeros(len(states.times), dtype=bool)
+        checks = []
+        active = []
+        anywhere = np.zeros(len(states.times), dtype=bool)
         share = _time_shares(trajectory, states)
         if (jump := _largest_jump(trajectory, self.limits)) is not None:
             checks.append(jump)
@@ -346,12 +348,15 @@ class Checker:
             uses = (constraint.use(slower, given) for constraint, given in moving)
             return max((float(np.max(_with_peaks_between(use, self.points))) - 1 for use in uses), default=-1.0)
 
-        low, over_low = 1.0, over(1.0)
+        low = 1.0
+        over_low = over(1.0)
         if over_low <= 0:
             return 1.0
         high = 1.001
         while (over_high := over(high)) > 0:
-            low, over_low, high = high, over_high, 1 + 4 * (high - 1)
+            low = high
+            over_low = over_high
+            high = 1 + 4 * (high - 1)
             if high > MAX_SLOW_DOWN:
                 return np.inf
         # Regula falsi after Dowell and Jarratt 1971 (Illinois); SciPy's brentq takes 0.2 s to be imported.
@@ -360,10 +365,14 @@ class Checker:
             c = high - over_high * (high - low) / (over_high - over_low)
             over_c = over(c)
             if over_c > 0:
-                low, over_low, kept = c, over_c, max(kept, 0) + 1
+                low = c
+                over_low = over_c
+                kept = max(kept, 0) + 1
                 over_high /= 2 if kept > 1 else 1
             else:
-                high, over_high, kept = c, over_c, min(kept, 0) - 1
+                high = c
+                over_high = over_c
+                kept = min(kept, 0) - 1
                 over_low /= 2 if kept < -1 else 1
         return high
 
@@ -418,7 +427,9 @@ def _proved_check(motion: Trajectory, limits: Limits, kind: Limit) -> Check:
     """Return the check of positions or one of their derivatives: bounds of the polynomials, not samples."""
     pieces = motion.pieces.differentiated(int(kind))
     if kind is Limit.POSITION:
-        upper, lower, size = limits.upper, limits.lower, PositionLimit(limits).sizes
+        upper = limits.upper
+        lower = limits.lower
+        size = PositionLimit(limits).sizes
     else:
         upper = size = getattr(limits, kind.what)
         lower = -upper

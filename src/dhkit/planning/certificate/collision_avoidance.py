@@ -190,7 +190,8 @@ class CollisionAvoidance:
         with_obstacle: dict[tuple[int, int], float] = {}
         with_link: dict[tuple[int, int], float] = {}
         for reduced in self.reduced:
-            link, gap = capsules[reduced.pair.capsule].link, min(reduced.start, reduced.goal, self.clearance)
+            link = capsules[reduced.pair.capsule].link
+            gap = min(reduced.start, reduced.goal, self.clearance)
             if reduced.pair.other is None:
                 place = link, reduced.pair.obstacle or 0
                 with_obstacle[place] = min(gap, with_obstacle.get(place, gap))
@@ -238,7 +239,8 @@ class CollisionAvoidance:
         """
         need = np.full((len(q), len(pairs)), self.clearance)
         if self.reduced and self.ends is not None:
-            axes, at_ends = world_axes(description, q), world_axes(description, self.ends)
+            axes = world_axes(description, q)
+            at_ends = world_axes(description, self.ends)
             for p, kept in zip(range(len(pairs)), self.at_ends(pairs), strict=True):
                 links = [link for link in (pairs[p].capsule, pairs[p].other) if link is not None]
                 for end in np.flatnonzero(kept < self.clearance):
@@ -252,7 +254,8 @@ class CollisionAvoidance:
 
         At the states the distances themselves are required, and between them all but ``BETWEEN`` of them.
         """
-        pairs, description = [reduced.pair for reduced in self.reduced], states.description
+        pairs = [reduced.pair for reduced in self.reduced]
+        description = states.description
 
         def gaps(q: Array) -> Array:
             return np.column_stack([self._distances(description, q), self._reduced_distances(description, q)])

@@ -181,7 +181,8 @@ class Energy(Term):
         """
         import casadi
 
-        n, constants = point.n, self.constants
+        n = point.n
+        constants = self.constants
         if self.regenerates and not constants and point.friction is None:
             raise ValueError(
                 "Energy: without motor constants, friction or power that is lost all motions cost the same"

@@ -229,17 +229,18 @@ class States:
         if model is None:
             J = kinematics.jacobian(self.description, self.q)[:, :3]
             Jd = kinematics.jacobian_dot(self.description, self.q, self.qd)[:, :3]
-            velocity, acceleration = np.einsum("kij,kj->ki", J, self.qd), np.einsum("kij,kj->ki", J, self.qdd)
+            velocity = np.einsum("kij,kj->ki", J, self.qd)
+            acceleration = np.einsum("kij,kj->ki", J, self.qdd)
             T = kinematics.forward_kinematics(self.description, self.q)
             return T, velocity, acceleration + np.einsum("kij,kj->ki", Jd, self.qd)
         import pinocchio as pin
 
-        data, frame, axes = model.createData(), model.getFrameId("tool"), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        T, velocity, acceleration = (
-            np.empty((len(self.q), 4, 4)),
-            np.empty((len(self.q), 3)),
-            np.empty((len(self.q), 3)),
-        )
+        data = model.createData()
+        frame = model.getFrameId("tool")
+        axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        T = np.empty((len(self.q), 4, 4))
+        velocity = np.empty((len(self.q), 3))
+        acceleration = np.empty((len(self.q), 3))
         for k, state in enumerate(zip(self.q, self.qd, self.qdd, strict=True)):
             pin.forwardKinematics(model, data, *state)
             T[k] = pin.updateFramePlacement(model, data, frame).homogeneous

@@ -104,7 +104,8 @@ def _candidates(balls: Balls) -> list[Array]:
 def _middle(balls: Balls, R: Array) -> Array:
     """Return the middle of the balls' extent along the columns of R."""
     local = balls.centres @ R
-    low, high = (local - balls.radii[:, None]).min(axis=0), (local + balls.radii[:, None]).max(axis=0)
+    low = (local - balls.radii[:, None]).min(axis=0)
+    high = (local + balls.radii[:, None]).max(axis=0)
     middle: Array = R @ ((low + high) / 2)
     return middle
 
@@ -117,7 +118,8 @@ def _about(balls: Balls, axis: Array, middle: Array) -> Enclosure:
     radii = RADII[:, None] * np.max(aside + balls.radii)
     # A ball at the distance e from the axis is inside if its centre is within r - rho of the segment.
     reach = np.sqrt(np.maximum((radii - balls.radii) ** 2 - aside**2, 0.0))
-    low, high = np.min(along + reach, axis=1), np.max(along - reach, axis=1)
+    low = np.min(along + reach, axis=1)
+    high = np.max(along - reach, axis=1)
     low, high = np.where(low < high, low, (low + high) / 2), np.where(low < high, high, (low + high) / 2)
     best = np.argmin(radii[:, 0] ** 2 * (high - low + 4 / 3 * radii[:, 0]))
     return Enclosure(middle + low[best] * axis, middle + high[best] * axis, float(radii[best, 0]))
@@ -261,17 +263,23 @@ def _balls(part: Part) -> Balls:
     """Return balls in the body's frame whose convex hull contains a part."""
     match part.geometry:
         case Sphere(radius):
-            local, radii = np.zeros((1, 3)), float(radius)
+            local = np.zeros((1, 3))
+            radii = float(radius)
         case Capsule(radius, length):
-            local, radii = np.array([[0, 0, -0.5], [0, 0, 0.5]]) * float(length), float(radius)
+            local = np.array([[0, 0, -0.5], [0, 0, 0.5]]) * float(length)
+            radii = float(radius)
         case Cylinder(radius, length):
-            local, radii = _rims(float(radius), float(length)), 0.0
+            local = _rims(float(radius), float(length))
+            radii = 0.0
         case Box(size):
             corners = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3)).reshape(3, -1).T
-            local, radii = corners * [float(edge) for edge in size], 0.0
+            local = corners * [float(edge) for edge in size]
+            radii = 0.0
         case _:
-            local, radii = convex_hull(part)[0], 0.0
-    R, t = part.T_body_part[:3, :3], part.T_body_part[:3, 3]
+            local = convex_hull(part)[0]
+            radii = 0.0
+    R = part.T_body_part[:3, :3]
+    t = part.T_body_part[:3, 3]
     return Balls(local @ R.T + t, np.full(len(local), radii))
 
 

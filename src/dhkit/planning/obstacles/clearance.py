@@ -98,7 +98,8 @@ def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self
     q = joint_array(description, q)
     rows = q.reshape(-1, description.n)
     finite = np.all(np.isfinite(rows), axis=1)
-    capsules, axes = link_capsules(description), world_axes(description, rows[finite])
+    capsules = link_capsules(description)
+    axes = world_axes(description, rows[finite])
     found, names = [], []
     for obstacle in obstacles:
         found.append(_from_one(description, capsules, axes, obstacle))
@@ -176,7 +177,8 @@ def smallest_distances(
 
     As :func:`distance`, in less time: only the pairs that can be the nearest in a state are measured.
     """
-    capsules, axes = link_capsules(description), world_axes(description, q)
+    capsules = link_capsules(description)
+    axes = world_axes(description, q)
     left_out = {(pair.capsule, pair.obstacle, pair.other) for pair in without}
     least = np.full(len(axes), np.inf)
     for k, item in enumerate(obstacles):
@@ -205,7 +207,8 @@ def _nearer(
 ) -> Array:
     """Return the smaller of ``least`` (N,), m, and the distances of capsules from obstacles, all boxes or none."""
     which = np.array([i for i, _ in beside])
-    solids, radii = Solids.of([item for _, item in beside]), np.array([capsules[i].radius for i in which])
+    solids = Solids.of([item for _, item in beside])
+    radii = np.array([capsules[i].radius for i in which])
     half_lengths = np.array([capsules[i].length / 2 for i in which])
     away = np.stack(
         [
@@ -232,7 +235,8 @@ def _nearer(
 
 def pair_distances(description: Description, q: Array, obstacles: Sequence[Obstacle | Floor], pair: Pair) -> Array:
     """Return the exact distances of one pair at states q (N, n), shape (N,), m."""
-    capsules, axes = link_capsules(description), world_axes(description, q)
+    capsules = link_capsules(description)
+    axes = world_axes(description, q)
     first = axes[:, pair.capsule]
     radius = capsules[pair.capsule].radius
     if pair.other is not None:

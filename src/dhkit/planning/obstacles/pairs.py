@@ -259,7 +259,8 @@ def _least_of_turns(description: Description, i: int, j: int) -> float | None:
     away, so that within half a step h of each joint the distance changes by at most the sum of r_k h / 2.
     """
     capsules = link_capsules(description)
-    inner, outer = capsules[i].link, capsules[j].link
+    inner = capsules[i].link
+    outer = capsules[j].link
     numbers = description.numbers
     joints = range(inner, outer)
     if not joints:
@@ -272,7 +273,8 @@ def _least_of_turns(description: Description, i: int, j: int) -> float | None:
     A = link_transforms(description, np.broadcast_to(values[:, None], (GRID, description.n)))
     outer_ends = np.stack([capsules[j].start, capsules[j].end])
     for k in reversed(joints):
-        R, p = A[:, k, :3, :3], A[:, k, :3, 3]
+        R = A[:, k, :3, :3]
+        p = A[:, k, :3, 3]
         turned = np.tensordot(R, outer_ends, axes=(-1, -1))  # (GRID, 3, ..., 2)
         outer_ends = np.moveaxis(turned, 1, -1) + p.reshape(GRID, *(1,) * (outer_ends.ndim - 1), 3)
     inner_ends = np.broadcast_to(np.stack([capsules[i].start, capsules[i].end]), outer_ends.shape)
@@ -328,7 +330,8 @@ def _ends_above(description: Description, meshes: MeshVersions, height: float) -
     axes = _axes_in_whole_turns(description)
 
     def stands_in(i: int, end: int) -> bool:
-        radius, lowest = capsules[i].radius, axes[:, i, end, 2]
+        radius = capsules[i].radius
+        lowest = axes[:, i, end, 2]
         return bool(np.ptp(lowest) <= radius and (lowest < radius + height).all())
 
     return tuple((i, end) for i, end in checked_pairs(description).heights if not stands_in(i, end))
@@ -379,11 +382,13 @@ def _configurations(description: Description, whole_turns: bool = False) -> Arra
     span = np.where(numbers.prismatic, max(description.reach, 1.0), np.pi)
     lower = np.where(np.isfinite(numbers.lower), numbers.lower, -span)
     upper = np.where(np.isfinite(numbers.upper), numbers.upper, span)
-    low, high = np.minimum(lower, upper), np.maximum(lower, upper)
+    low = np.minimum(lower, upper)
+    high = np.maximum(lower, upper)
     # A joint whose range is a point may move by the limits of a motion.
     least = np.where(numbers.prismatic, LEAST_STROKE * max(description.reach, LEAST_STROKE), LEAST_TURN)
     if whole_turns:
         least = np.where(numbers.prismatic, least, 2 * np.pi)
     widened = np.maximum(least - (high - low), 0.0) / 2
-    low, high = low - widened, high + widened
+    low = low - widened
+    high = high + widened
     return np.random.default_rng(SEED).uniform(low, high, (SAMPLES, description.n))

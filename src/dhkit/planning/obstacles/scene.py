@@ -116,7 +116,8 @@ class Obstacle:
             Not numbers.
         """
         (r,) = _sizes("capsule: radius", radius, (), "a positive number, m")
-        first, last = _point("capsule: start", start), _point("capsule: end", end)
+        first = _point("capsule: start", start)
+        last = _point("capsule: end", end)
         length = float(np.linalg.norm(last - first))
         if not length > 0:
             raise ValueError(f"capsule: start and end are both {_shown(first)}; expected two points (or a sphere)")

@@ -82,7 +82,8 @@ class Separation:
     def __init__(
         self, description: Description, obstacles: Sequence[Obstacle | Floor], self_collision: bool = False
     ) -> None:
-        self.description, self.obstacles = description, tuple(obstacles)
+        self.description = description
+        self.obstacles = tuple(obstacles)
         self.capsules = link_capsules(description)
         self.radii = np.array([capsule.radius for capsule in self.capsules])
         self._half_lengths = np.array([capsule.length / 2 for capsule in self.capsules])
@@ -147,8 +148,10 @@ class Separation:
         """
         rows = []
         for k, p in np.argwhere(self._needed(gaps, active, margins)):
-            pair, n = self.pairs[p], gaps.normal[k, p]
-            capsule, need = self.capsules[pair.capsule], float(margins[k, p])
+            pair = self.pairs[p]
+            n = gaps.normal[k, p]
+            capsule = self.capsules[pair.capsule]
+            need = float(margins[k, p])
             body = capsule if pair.other is None else self.capsules[pair.other]
             frame = None if pair.other is None else capsule.link
             points = [(body.start, body.end)[end] for end in (pair.ends if body.length > 0 else pair.ends[:1])]
@@ -198,7 +201,8 @@ class Separation:
         k, p = at
         pairs = self.pairs[group.part]
         capsules = group.capsules[p]
-        own, solids = axes[k[:, None], np.arange(axes.shape[1]), capsules[:, None]], group.solids
+        own = axes[k[:, None], np.arange(axes.shape[1]), capsules[:, None]]
+        solids = group.solids
         radius = np.zeros(len(k))
         if group.floor is not None:
             is_checked = np.array([[end in pair.ends for end in (0, 1)] for pair in pairs])[p][:, None]
@@ -231,7 +235,8 @@ class Separation:
         own, other = in_frame(firsts), in_frame(seconds)
         nearest, on_other = nearest_points(own, other)
         k, p = np.indices((K, len(firsts))).reshape(2, -1)
-        touched, beyond = (nearest, self.radii[firsts[p]]), (on_other, self.radii[seconds[p]])
+        touched = (nearest, self.radii[firsts[p]])
+        beyond = (on_other, self.radii[seconds[p]])
         _keep(found, (k, p + group.part.start), touched, beyond, other[:, [0, -1]])
 
 
@@ -256,7 +261,8 @@ def _keep(
     ends
         Points of the other body at the first and the last state, shape (m, 2, e, 3), m.
     """
-    (nearest, radius), (on_axis, own_radius) = touched, other
+    (nearest, radius) = touched
+    (on_axis, own_radius) = other
     along = on_axis - nearest
     length = np.sqrt(np.sum(along * along, axis=-1))
     normal = along / np.maximum(length, ZERO)[..., None]

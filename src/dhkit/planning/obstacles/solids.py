@@ -72,8 +72,10 @@ def nearest_points(first: Array, second: Array) -> tuple[Array, Array]:
     first, second
         As in :func:`segment_distances`.
     """
-    p, d1 = first[..., 0, :], first[..., 1, :] - first[..., 0, :]
-    other, d2 = second[..., 0, :], second[..., 1, :] - second[..., 0, :]
+    p = first[..., 0, :]
+    d1 = first[..., 1, :] - first[..., 0, :]
+    other = second[..., 0, :]
+    d2 = second[..., 1, :] - second[..., 0, :]
     r = p - other
     a, b, e = _dot(d1, d1), _dot(d1, d2), _dot(d2, d2)
     c, f = _dot(d1, r), _dot(d2, r)
@@ -98,9 +100,12 @@ def nearest_on_box(axes: Array, T_world_box: Array, half_sizes: Array) -> tuple[
     half_sizes
         Half the edges, shape (..., 3), m; zeros for a point or a segment.
     """
-    R, centre, half = T_world_box[..., :3, :3], T_world_box[..., None, :3, 3], half_sizes[..., None, :]
+    R = T_world_box[..., :3, :3]
+    centre = T_world_box[..., None, :3, 3]
+    half = half_sizes[..., None, :]
     ends = (axes - centre) @ R
-    start, along = ends[..., 0, :], ends[..., 1, :] - ends[..., 0, :]
+    start = ends[..., 0, :]
+    along = ends[..., 1, :] - ends[..., 0, :]
     with np.errstate(divide="ignore", invalid="ignore"):
         crossings = np.concatenate([(-half_sizes - start) / along, (half_sizes - start) / along], axis=-1)
     shares = np.clip(np.nan_to_num(crossings, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
@@ -195,7 +200,8 @@ def obstacle_distances(radius: float, axes: Array, obstacle: Obstacle) -> Array:
     T = obstacle.T_world_obstacle
     place = coal.Transform3s(np.array(T[:3, :3]), np.array(T[:3, 3]))
     capsule, places = _capsule(coal, radius, axes)
-    request, result = distance_request(), coal.DistanceResult()
+    request = distance_request()
+    result = coal.DistanceResult()
     return np.array([signed_distance(coal, capsule, own, solid, place, request, result) for own in places])
 
 
@@ -210,7 +216,8 @@ def capsule_distances(radii: tuple[float, float], first: Array, second: Array) -
     coal = coal_module()
     one, places = _capsule(coal, radii[0], first)
     other, other_places = _capsule(coal, radii[1], second)
-    request, result = distance_request(), coal.DistanceResult()
+    request = distance_request()
+    result = coal.DistanceResult()
     pairs = zip(places, other_places, strict=True)
     return np.array([signed_distance(coal, one, own, other, place, request, result) for own, place in pairs])
 
@@ -310,7 +317,8 @@ def shape_distances(
     frames = world_to_frames(description, q)
     least = np.full(len(q), np.inf)
     coal = coal_module()
-    request, result = distance_request(), coal.DistanceResult()
+    request = distance_request()
+    result = coal.DistanceResult()
     for first, second in product(*(solids.get(body, ()) for body in bodies)):
         T1 = frames[:, bodies[0].link] @ first.T_link_solid
         T2 = frames[:, bodies[1].link] @ second.T_link_solid

@@ -40,21 +40,28 @@ class LocalFunction:
         import casadi
 
         cost = casadi.SX(1, 1) if cost is None else cost
-        rows, self.has_cost = casadi.densify(rows), cost.nnz() > 0
+        rows = casadi.densify(rows)
+        self.has_cost = cost.nnz() > 0
         self.count: int = rows.numel()
-        multipliers, weight = casadi.SX.sym("multipliers", self.count), casadi.SX.sym("weight")
-        jacobian, gradient = casadi.jacobian(rows, z), casadi.jacobian(cost, z).T
+        multipliers = casadi.SX.sym("multipliers", self.count)
+        weight = casadi.SX.sym("weight")
+        jacobian = casadi.jacobian(rows, z)
+        gradient = casadi.jacobian(cost, z).T
         hessian = casadi.triu(casadi.hessian(weight * cost + casadi.dot(multipliers, rows), z)[0])
 
         def function(name: str, inputs: list[casadi.SX], result: casadi.SX) -> casadi.Function:
             return casadi.Function(name, inputs, [result], {"cse": True})
 
-        self.rows, self.cost = function("rows", [z, p], rows), function("cost", [z, p], casadi.densify(cost))
+        self.rows = function("rows", [z, p], rows)
+        self.cost = function("cost", [z, p], casadi.densify(cost))
         # Derivatives return their nonzeros, (nonzeros, 1), whose rows and columns are these.
-        self.jacobian, self.jacobian_at = function("jacobian", [z, p], _nonzeros(jacobian)), _triplet(jacobian)
-        self.gradient, self.gradient_at = function("gradient", [z, p], _nonzeros(gradient)), _triplet(gradient)
+        self.jacobian = function("jacobian", [z, p], _nonzeros(jacobian))
+        self.jacobian_at = _triplet(jacobian)
+        self.gradient = function("gradient", [z, p], _nonzeros(gradient))
+        self.gradient_at = _triplet(gradient)
         inputs = [z, p, multipliers, weight]
-        self.hessian, self.hessian_at = function("hessian", inputs, _nonzeros(hessian)), _triplet(hessian)
+        self.hessian = function("hessian", inputs, _nonzeros(hessian))
+        self.hessian_at = _triplet(hessian)
 
 
 class RowKind(Enum):
@@ -187,15 +194,20 @@ class BlockProgram:
         given = casadi.MX.sym("p", self.parameters + 2 * self.variables + self.rows)
         edges = np.cumsum([0, self.parameters, self.variables, self.variables, self.rows])
         p, offset, unit, row_unit = casadi.vertsplit(given, edges.tolist())
-        scaled_multipliers, weight = casadi.MX.sym("lam_g", self.rows), casadi.MX.sym("lam_f")
-        x, multipliers = offset + unit * scaled, scaled_multipliers / row_unit
-        cost, rows = casadi.MX(1, 1), []
+        scaled_multipliers = casadi.MX.sym("lam_g", self.rows)
+        weight = casadi.MX.sym("lam_f")
+        x = offset + unit * scaled
+        multipliers = scaled_multipliers / row_unit
+        cost = casadi.MX(1, 1)
+        rows = []
         jacobian, gradient, hessian = (
             _Nonzeros(shape) for shape in ((self.rows, self.variables), (self.variables, 1), (self.variables,) * 2)
         )
         begin = 0
         for block in self.blocks:
-            function, points, at = block.function, block.points, block.variables
+            function = block.function
+            points = block.points
+            at = block.variables
             local = _gather(x, at), _gather(p, block.parameters)
             if function.count:
                 rows.append(casadi.vec(function.rows.map(points)(*local)))
@@ -255,7 +267,8 @@ class _Nonzeros:
         values = casadi.vertcat(*self._values)
         # In CasADi's order, by columns; values at the same place are added.
         places, order = np.unique(columns * self.shape[0] + rows, return_inverse=True)
-        i, j = (places % self.shape[0]).tolist(), (places // self.shape[0]).tolist()
+        i = (places % self.shape[0]).tolist()
+        j = (places // self.shape[0]).tolist()
         if len(places) == len(order):
             nonzeros = values[np.argsort(order).tolist()]
         else:

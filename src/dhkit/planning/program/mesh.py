@@ -237,7 +237,8 @@ def _weights(curve: Curve, intervals: int) -> tuple[Array, Array]:
     u = ((1 / 2,), (1 / 3, 1 / 6), (1 / 3, 1 / 6), (1 / 6, 1 / 3, 0.0))[curve.value]
     W, U = np.zeros((2, intervals, curve.columns(intervals)))
     for k in range(intervals):
-        W[k, step * k : step * k + len(w)], U[k, step * k : step * k + len(u)] = w, u
+        W[k, step * k : step * k + len(w)] = w
+        U[k, step * k : step * k + len(u)] = u
     return W, U
 
 

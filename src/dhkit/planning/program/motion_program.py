@@ -57,7 +57,9 @@ def leg_durations(arm: LoadedArm, limits: Limits, points: Array) -> Array:
 def _leg(arm: LoadedArm, limits: Limits, start: Array, goal: Array) -> float:
     step = goal - start
     x = np.linspace(0.0, 1.0, SAMPLES)[:, None]
-    q, qd, qdd = start + step * x * x * (3 - 2 * x), step * 6 * x * (1 - x), step * (6 - 12 * x)
+    q = start + step * x * x * (3 - 2 * x)
+    qd = step * 6 * x * (1 - x)
+    qdd = step * (6 - 12 * x)
     found = [np.max(np.abs(qd) / limits.velocity), np.sqrt(np.max(np.abs(qdd) / limits.acceleration))]
     found.append(np.cbrt(np.max(12 * np.abs(step) / limits.jerk)))
     if np.isfinite(limits.torque).any():
@@ -85,7 +87,8 @@ def usual_accelerations(task: Task, guess: Knots) -> Array:
     The acceleration that the torque limit gives a joint alone, or its limit of acceleration; where neither is limited,
     twice the largest of the initial guess.
     """
-    limits, n = task.limits, task.arm.n
+    limits = task.limits
+    n = task.arm.n
     largest = np.maximum(2 * np.abs(guess.qdd).max(axis=0), 1e-3)
     usual = np.where(np.isfinite(limits.acceleration), limits.acceleration, np.inf)
     if np.isfinite(limits.torque).any():
@@ -98,12 +101,15 @@ def usual_accelerations(task: Task, guess: Knots) -> Array:
 
 def detour(task: Task, mesh: Mesh, durations: Array, seed: int) -> Knots:
     """Return a guess through random configurations, one halfway along each leg; durations (legs,), s."""
-    rng, limits, points = np.random.default_rng(seed), task.limits, task.points
+    rng = np.random.default_rng(seed)
+    limits = task.limits
+    points = task.points
     reach = np.where(task.arm.numbers.prismatic, max(task.arm.reach, 1e-3), np.pi)
     half = np.where(np.isfinite(limits.upper - limits.lower), (limits.upper - limits.lower) / 2, reach)
     halfway = (points[1:] + points[:-1]) / 2 + DETOUR_SHARE * half * rng.uniform(-1, 1, (len(durations), task.arm.n))
     rows = np.empty((2 * len(durations) + 1, task.arm.n))
-    rows[0::2], rows[1::2] = points, np.clip(halfway, limits.lower, limits.upper)
+    rows[0::2] = points
+    rows[1::2] = np.clip(halfway, limits.lower, limits.upper)
     velocities = np.zeros_like(rows)
     velocities[0], velocities[-1] = task.start_velocity, task.goal_velocity
     times = np.concatenate(
@@ -124,10 +130,12 @@ class MotionProgram(Program[Knots]):
     """
 
     def __init__(self, problem: Problem, planes: Sequence[PlaneRow] = ()) -> None:
-        self.problem, self.mesh = problem, problem.mesh
+        self.problem = problem
+        self.mesh = problem.mesh
         self.blocks, self._planes = problem.apart(planes)
         self.solver = Solver(self.blocks, len(self.mesh.legs), tolerance=CONVERGENCE[self.mesh.curve])
-        self.intervals, self.small_step = self.mesh.intervals, SMALL_STEP[self.mesh.curve]
+        self.intervals = self.mesh.intervals
+        self.small_step = SMALL_STEP[self.mesh.curve]
 
     def apart(self, planes: Sequence[PlaneRow]) -> MotionProgram:
         """Return the same program with other planes."""
@@ -190,7 +198,8 @@ class MotionProgram(Program[Knots]):
         """Return the arguments of a solution."""
         problem = self.problem
         each = [parameters for _, parameters in task.checker.every]
-        cost, usual = self._cost_scale(task, guess), usual_accelerations(task, guess)
+        cost = self._cost_scale(task, guess)
+        usual = usual_accelerations(task, guess)
         return Arguments(
             problem.vector(guess, task.load),
             np.append(problem.parameters(task.load, each, 1 / cost, usual), self._planes),
@@ -213,12 +222,17 @@ class MotionProgram(Program[Knots]):
         shortest_leg
             Shortest duration of a leg, s.
         """
-        limits, mesh, at = task.limits, self.mesh, self.problem.variables
-        n, low, high = task.arm.n, np.full(at.count, -np.inf), np.full(at.count, np.inf)
+        limits = task.limits
+        mesh = self.mesh
+        at = self.problem.variables
+        n = task.arm.n
+        low = np.full(at.count, -np.inf)
+        high = np.full(at.count, np.inf)
         position, given = task.checker.every[Limit.POSITION]
 
         def set_bounds(indices: Indices, lower: Array, upper: Array) -> None:
-            low[indices], high[indices] = lower, upper
+            low[indices] = lower
+            high[indices] = upper
 
         lower, upper = position.bounds(given, margins.at_knots(Limit.POSITION, n))
         set_bounds(at.q, lower.T, upper.T)
@@ -234,7 +248,8 @@ class MotionProgram(Program[Knots]):
             set_bounds(at.qd[:, k], velocity, velocity)
             if self.problem.jerk_counts:
                 set_bounds(at.qdd[:, k], np.zeros(n), np.zeros(n))
-        low[at.durations], low[at.positive_parts] = shortest_leg, 0.0
+        low[at.durations] = shortest_leg
+        low[at.positive_parts] = 0.0
         if task.duration is not None and len(mesh.legs) == 1:
             low[at.durations] = high[at.durations] = task.duration
         return low, high

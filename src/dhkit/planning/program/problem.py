@@ -97,7 +97,8 @@ class StatePoints:
     @classmethod
     def of(cls, mesh: Mesh, at: Variables, *, with_middles: bool) -> StatePoints:
         """Return the ends of intervals, and their middles on request; a curve without jumps has both ends in common."""
-        K, step = mesh.intervals, np.arange(mesh.intervals)
+        K = mesh.intervals
+        step = np.arange(mesh.intervals)
         columns = np.array([mesh.curve.columns_of(k) for k in range(K)])
         each = np.stack([step, step], axis=1)
         if mesh.curve in (Curve.CONSTANT, Curve.JUMPING):
@@ -114,7 +115,8 @@ class StatePoints:
             leg, shares = mesh.leg, mesh.shares
             knots = [(leg[0], 0, 0, 0, shares[0] / 6)]
             for k in range(1, K):
-                before, after = shares[k - 1] / 6, shares[k] / 6
+                before = shares[k - 1] / 6
+                after = shares[k] / 6
                 if leg[k] == leg[k - 1]:
                     knots.append((leg[k], k, k - 1, k, before + after))
                 else:
@@ -188,8 +190,13 @@ class Problem:
         payload: bool = False,
         jerk_limited: bool = False,
     ) -> None:
-        self.description, self.objective, self.constraints, self.mesh = description, objective, constraints, mesh
-        self.n, self.payload, self.jerk_limited = description.n, payload, jerk_limited
+        self.description = description
+        self.objective = objective
+        self.constraints = constraints
+        self.mesh = mesh
+        self.n = description.n
+        self.payload = payload
+        self.jerk_limited = jerk_limited
         self.point = Point(description, limits, friction, payload)
         self._plane_functions: dict[tuple[int, int | None], LocalFunction] = {}
         every = enumerate(motion_constraints(limits, NO_AVOIDANCE, constraints))
@@ -237,7 +244,8 @@ class Problem:
 
     def vector(self, knots: Knots, load: Array | None) -> Array:
         """Return the variables of a motion, shape (variables,), SI units; a payload's parameters are shape (10,)."""
-        at, interval = self.variables, knots.intervals(self.mesh)
+        at = self.variables
+        interval = knots.intervals(self.mesh)
         x = np.empty(at.count)
         middles = (interval.q_middle, interval.qd_middle, interval.b)
         given = zip((at.q, at.qd, at.qdd, *at.middles), (knots.q, knots.qd, knots.qdd, *middles), strict=True)
@@ -272,14 +280,17 @@ class Problem:
         cost
             Size of the guess's cost, in the unit of the objective.
         """
-        at, span = self.variables, float(np.ptp(guess.q, axis=0).max())
+        at = self.variables
+        span = float(np.ptp(guess.q, axis=0).max())
         total = float(guess.durations.sum())
         length = span if 0 < span < USUAL_MOVE else 1.0
         time = 1.0 if USUAL_DURATIONS[0] < total < USUAL_DURATIONS[1] else total
-        units, rate = program.unscaled, cost / total
+        units = program.unscaled
+        rate = cost / total
         for k, indices in enumerate((at.q, at.qd, at.qdd, *at.middles)):
             units.unit[indices] = length / time ** (k % 3)
-        units.unit[at.durations], units.unit[at.positive_parts] = time, rate
+        units.unit[at.durations] = time
+        units.unit[at.positive_parts] = rate
         if length < 1.0:
             for indices in (at.q, at.middles[0]):
                 units.offset[indices] = guess.q[:1].T
@@ -327,8 +338,10 @@ class Problem:
 
     def apart(self, rows: Sequence[PlaneRow]) -> tuple[BlockProgram, Array]:
         """Return the program with points of links kept on their sides of planes, and its additional parameters."""
-        at, begin = self.variables, self.program.parameters
-        blocks, values = list(self.program.blocks), [np.zeros(0)]
+        at = self.variables
+        begin = self.program.parameters
+        blocks = list(self.program.blocks)
+        values = [np.zeros(0)]
         for link, frame in dict.fromkeys((row.link, row.frame) for row in rows):
             of_link = [row for row in rows if (row.link, row.frame) == (link, frame)]
             knots = np.array([row.knot for row in of_link])
@@ -346,8 +359,11 @@ class Problem:
         import casadi
 
         if (link, frame) not in self._plane_functions:
-            point, normal, level = casadi.SX.sym("point", 3), casadi.SX.sym("normal", 3), casadi.SX.sym("level")
-            table, q = SymbolicTable.of(self.description), self.point.q
+            point = casadi.SX.sym("point", 3)
+            normal = casadi.SX.sym("normal", 3)
+            level = casadi.SX.sym("level")
+            table = SymbolicTable.of(self.description)
+            q = self.point.q
             x = casadi.vertcat(point, 1)
             for i in reversed(range(frame or 0, link)):
                 x = table.link_transform(i, q[i]) @ x
@@ -364,7 +380,8 @@ class Problem:
         """The block of the legs' durations."""
         import casadi
 
-        D, scale = casadi.SX.sym("durations", len(self.mesh.legs)), casadi.SX.sym("scale")
+        D = casadi.SX.sym("durations", len(self.mesh.legs))
+        scale = casadi.SX.sym("scale")
         total = casadi.sum1(D)
         function = LocalFunction(D, scale, total, scale * self.objective.time_weight * total)
         scale_index = self._parameter_indices[-4]
@@ -376,14 +393,24 @@ class Problem:
         """The block of the intervals: continuity, and bounds of what lies inside."""
         import casadi
 
-        n, mesh, at = self.n, self.mesh, self.variables
-        K, curve, symbol = mesh.intervals, mesh.curve, casadi.SX.sym
-        duration, share, scale, usual = symbol("duration"), symbol("share"), symbol("scale"), symbol("usual", n)
+        n = self.n
+        mesh = self.mesh
+        at = self.variables
+        K = mesh.intervals
+        curve = mesh.curve
+        symbol = casadi.SX.sym
+        duration = symbol("duration")
+        share = symbol("share")
+        scale = symbol("scale")
+        usual = symbol("usual", n)
         q, qd, q_next, qd_next = (symbol(name, n) for name in ("q", "qd", "q_next", "qd_next"))
         accelerations = [symbol(f"qdd{k}", n) for k in range(len(curve.columns_of(0)))]
         lifted = [symbol(f"middle{k}", n if indices.size else 0) for k, indices in enumerate(at.middles)]
         interval = Interval(share * duration, q, qd, *curve.abc(accelerations))
-        a, b, c, h = interval.a, interval.b, interval.c, interval.h
+        a = interval.a
+        b = interval.b
+        c = interval.c
+        h = interval.h
         continuity = [
             Rows(RowKind.CONTINUITY, f"continuity of {what}", n, order=order, of_joints=True)
             for order, what in enumerate(("position", "velocity", "acceleration"))
@@ -455,15 +482,20 @@ class Problem:
         """The block of the states: torques, moving constraints, and the integrands of the objective."""
         import casadi
 
-        point, points, symbols = self.point, self._state_points, self._parameter_symbols
+        point = self.point
+        points = self._state_points
+        symbols = self._parameter_symbols
         rows = limit_rows(self.moving, point, symbols[1:])
         duration, scale, weight = (casadi.SX.sym(name) for name in ("duration", "scale", "weight"))
-        z, p, cost = [point.q, point.qd, point.qdd], list(symbols), None
+        z = [point.q, point.qd, point.qdd]
+        p = list(symbols)
+        cost = None
         variables: list[Indices] = [points.q, points.qd, points.qdd]
         parameters = np.concatenate(self._parameter_indices[: len(symbols)])[:, None]
         parameters = np.tile(parameters, points.count)
         if self.objective.has_integral:
-            power, parts = self._power, casadi.SX.sym("parts", self._power.numel())
+            power = self._power
+            parts = casadi.SX.sym("parts", self._power.numel())
             rows.append((Rows(RowKind.POSITIVE_PART, "positive power", power.numel()), parts - power))
             cost = scale * weight * duration * (self.objective.integrand(point) + casadi.sum1(parts))
             z += [duration, parts]
@@ -485,7 +517,9 @@ class Problem:
         """The block of the constraints of positions: at inner knots and at middles."""
         import casadi
 
-        at, K, symbols = self.variables, self.mesh.intervals, self._parameter_symbols
+        at = self.variables
+        K = self.mesh.intervals
+        symbols = self._parameter_symbols
         rows = limit_rows(self.places, self.point, symbols[1:])
         step = np.arange(K)
         parameters = np.concatenate(self._parameter_indices[: len(symbols)])[:, None]

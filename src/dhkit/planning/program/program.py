@@ -214,7 +214,8 @@ def row_bounds(task: Task, blocks: BlockProgram, margins: Margins) -> tuple[Arra
 def _bounds(task: Task, margins: Margins, block: Block, rows: Rows) -> tuple[Array, Array]:
     """Return the bounds of rows of one kind, shape (P, count) each."""
     shape = (block.points, rows.count)
-    none, zero = np.full(shape, np.inf), np.zeros(shape)
+    none = np.full(shape, np.inf)
+    zero = np.zeros(shape)
     match rows.kind:
         case RowKind.LIMIT:
             constraint, parameters = task.checker.every[rows.limit]
@@ -242,7 +243,8 @@ def worst_row(solution: Solution, blocks: BlockProgram, bounds: tuple[Array, Arr
     """Return the rows with the largest violation of bounds (rows,), its index in them, its interval, the violation."""
     misses = np.maximum(bounds[0] - solution.g, solution.g - bounds[1])
     misses = np.where(np.isnan(misses), np.inf, misses)
-    at, begin = int(np.argmax(misses)), 0
+    at = int(np.argmax(misses))
+    begin = 0
     for block in blocks.blocks:
         if at < begin + block.count:
             point, which = divmod(at - begin, block.function.count)

@@ -102,10 +102,12 @@ class Solver:
     def __init__(self, program: BlockProgram, legs: int, *, tolerance: float) -> None:
         import casadi
 
-        self.tolerance, self._unscaled = tolerance, program.unscaled
+        self.tolerance = tolerance
+        self._unscaled = program.unscaled
         function, derivatives = program.functions
         sizes = program.variables, program.rows, program.parameters + len(program.unscaled.vector)
-        self._watch, self._function = _watch(*sizes, legs), function
+        self._watch = _watch(*sizes, legs)
+        self._function = function
 
         def made(options: dict[str, Any]) -> casadi.Function:
             of_all: dict[str, Any] = {
@@ -118,7 +120,8 @@ class Solver:
             }
             return casadi.nlpsol("plan", "ipopt", function, of_all)
 
-        self._cold, self._warm = made(OPTIONS), cache(lambda: made(WARM_OPTIONS))
+        self._cold = made(OPTIONS)
+        self._warm = cache(lambda: made(WARM_OPTIONS))
         self._turn = threading.Lock()
 
     def __call__(
@@ -164,10 +167,13 @@ class Solver:
             stats = function.stats()
         if raised is not None:
             raise raised
-        success, status, iterations = bool(stats["success"]), str(stats["return_status"]), int(stats["iter_count"])
+        success = bool(stats["success"])
+        status = str(stats["return_status"])
+        iterations = int(stats["iter_count"])
         if status == INVALID_NUMBER:  # Ipopt returns no rows then
             found |= self._function(x=found["x"], p=p)
-        x, g = np.array(found["x"]).ravel(), np.array(found["g"]).ravel()
+        x = np.array(found["x"]).ravel()
+        g = np.array(found["g"]).ravel()
         misses = max(_outside(x, lbx, ubx), _outside(g, lbg, ubg))
         return Solution(
             units.variables(x),
@@ -233,12 +239,19 @@ def _watch(nx: int, ng: int, np_: int, legs: int) -> Any:
             progress: ProgressCall | None,
             interrupts: list[BaseException],
         ) -> None:
-            self.bounds, self.units = bounds, units
-            self.work, self.progress, self.interrupts = work, progress, interrupts
-            self.started, self.iteration, self.raised = time.perf_counter(), 0, None
+            self.bounds = bounds
+            self.units = units
+            self.work = work
+            self.progress = progress
+            self.interrupts = interrupts
+            self.started = time.perf_counter()
+            self.iteration = 0
+            self.raised = None
 
         def end(self) -> BaseException | None:
-            raised, self.raised, self.progress = self.raised, None, None
+            raised = self.raised
+            self.raised = None
+            self.progress = None
             return raised
 
         def get_n_in(self) -> int:

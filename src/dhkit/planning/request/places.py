@@ -154,13 +154,15 @@ def _configurations(
     T = np.asarray(place.T)
     try:
         solutions = inverse_kinematics(description, T)
-        every, labels = solutions.q, [str(label) for label in solutions.branches]
+        every = solutions.q
+        labels = [str(label) for label in solutions.branches]
         met = solutions.met
         angles = solutions.within_limits(near)
         is_proved = int(solutions.status_code) == IKStatus.out_of_reach
     except (DescriptionError, ModelError):
         every, labels = _iterative_solutions(description, T, near)
-        angles, met = every, ALL_COORDINATES
+        angles = every
+        met = ALL_COORDINATES
         is_proved = False
     if coordinates is not None and tuple(coordinates) not in (met, ALL_COORDINATES):
         raise ValueError(f"coordinates is {coordinates!r}; {description.name} meets {met}")

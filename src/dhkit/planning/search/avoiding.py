@@ -103,12 +103,15 @@ class AvoidingSearch:
         self, task: Task, search: Search[Knots], program: MotionProgram, finer: Callable[[], MotionProgram]
     ) -> None:
         avoidance = task.avoidance
-        self.task, self.search, self.clearance = task, search, avoidance.clearance
+        self.task = task
+        self.search = search
+        self.clearance = avoidance.clearance
         self.program = program
         self.separation = Separation(task.arm, avoidance.obstacles, avoidance.self_collision)
         self.paths = 0
         self._speed = np.where(np.isfinite(task.limits.velocity), task.limits.velocity, 1.0)
-        self._finer, self._found = finer, list[Trajectory]()
+        self._finer = finer
+        self._found = list[Trajectory]()
         self._paths: dict[int, list[Array] | None] = {}
 
     def __call__(self, warm: Trajectory | None = None) -> PlannedMotion:
@@ -119,7 +122,8 @@ class AvoidingSearch:
         PlanningError
             None was found: says in how many starts, and why the first failed.
         """
-        search, best = self.search, None
+        search = self.search
+        best = None
         try:
             # On the coarse mesh the arm may move too far in an interval for one plane to separate it from an obstacle.
             for is_finer in (False, True):
@@ -191,7 +195,8 @@ class AvoidingSearch:
 
     def _path(self, seed: int) -> list[Array] | None:
         """Return a path around the obstacles, shape (k, n) for each leg, or None."""
-        task, limits = self.task, self.task.limits
+        task = self.task
+        limits = self.task.limits
         arm = task.arm.numbers
         span = np.where(arm.prismatic, max(task.arm.reach, 1e-3), np.pi)
         lower = np.where(np.isfinite(limits.lower), limits.lower, np.minimum(task.points.min(axis=0), 0) - span)
@@ -238,9 +243,11 @@ class AvoidingSearch:
 
     def _timed(self, path: list[Array]) -> tuple[Trajectory, Array]:
         """Return a motion along a path that rests at the ends of legs, and their times, s; its velocities are rough."""
-        task, mesh = self.task, self.program.mesh
+        task = self.task
+        mesh = self.program.mesh
         total = self.program.guessed_durations(self.search.task)
-        times, q = [np.zeros(1)], [task.points[:1]]
+        times = [np.zeros(1)]
+        q = [task.points[:1]]
         for k, leg in enumerate(path):
             steps = self._durations(leg)
             straight = max(float(self._durations(leg[[0, -1]]).sum()), 1e-6)
@@ -252,7 +259,8 @@ class AvoidingSearch:
             s = x * x * (3 - 2 * x)
             q.append(np.stack([np.interp(s, along, column) for column in leg.T], axis=1))
             times.append(times[-1][-1] + taken * x)
-        t, states = np.concatenate(times), np.vstack(q)
+        t = np.concatenate(times)
+        states = np.vstack(q)
         qd = np.gradient(states, t, axis=0)
         qd[0], qd[-1] = task.start_velocity, task.goal_velocity
         return Trajectory.from_samples(task.arm, t, states, qd), np.array([part[-1] for part in times[1:]])
@@ -264,10 +272,12 @@ class AvoidingSearch:
 
         The improvement ends early where it will hardly lead below ``best_cost``.
         """
-        search, mesh = self.search, self.program.mesh
+        search = self.search
+        mesh = self.program.mesh
         guess = knots_along(start, mesh, ends)
         gaps, required = self._measured(start, guess, np.inf)
-        planes, margins = Planes.of(self._with_planes_of_ends(gaps), required, 0.0), Margins(mesh.intervals)
+        planes = Planes.of(self._with_planes_of_ends(gaps), required, 0.0)
+        margins = Margins(mesh.intervals)
         best: PlannedMotion | None = None
         turn = 0
         for _ in range(MAX_SOLUTIONS):
@@ -332,7 +342,8 @@ class AvoidingSearch:
         pairs = self.separation.pairs
         reduced = self.task.avoidance.at_ends(pairs) < self.clearance
         ends = self.separation.gaps(self.task.points[[0, -1], None])
-        normal, level = gaps.normal.copy(), gaps.level.copy()
+        normal = gaps.normal.copy()
+        level = gaps.level.copy()
         for end, interval in ((0, 0), (1, -1)):
             which = reduced[:, end]
             for own, at_end in ((normal, ends.normal), (level, ends.level)):
@@ -349,7 +360,8 @@ class AvoidingSearch:
         Required gaps have shape (K, P), m: the largest of an interval.
         """
         inside = self._inside(motion, knots, POINTS)
-        avoidance, pairs = self.task.avoidance, self.separation.pairs
+        avoidance = self.task.avoidance
+        pairs = self.separation.pairs
         required = avoidance.required(self.task.arm, inside.reshape(-1, self.task.arm.n), pairs)
         return self.separation.gaps(inside, near), required.reshape(*inside.shape[:2], -1).max(axis=1)
 

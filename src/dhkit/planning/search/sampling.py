@@ -53,8 +53,13 @@ class PathSampler:
         work: Work,
         samples: int = 4000,
     ) -> None:
-        self.is_free, self.lower, self.upper, self.scale = is_free, lower, upper, scale
-        self.rng, self.work, self.samples = np.random.default_rng(seed), work, samples
+        self.is_free = is_free
+        self.lower = lower
+        self.upper = upper
+        self.scale = scale
+        self.rng = np.random.default_rng(seed)
+        self.work = work
+        self.samples = samples
         self._step = REACH * float(np.mean((upper - lower) / scale))
 
     def path(self, start: Array, goal: Array) -> Array | None:
@@ -70,7 +75,8 @@ class PathSampler:
         trees = _Tree(start, self.scale), _Tree(goal, self.scale)
         for turn in range(self.samples):
             self.work.require_left()
-            grown, other = trees[turn % 2], trees[1 - turn % 2]
+            grown = trees[turn % 2]
+            other = trees[1 - turn % 2]
             sample = self.rng.uniform(self.lower, self.upper)
             near = grown.nearest(sample)
             away = (sample - grown.nodes[near]) / self.scale
@@ -121,7 +127,9 @@ class PathSampler:
 
 class _Tree:
     def __init__(self, root: Array, scale: Array) -> None:
-        self.nodes, self._parents, self._scale = [root], [-1], scale
+        self.nodes = [root]
+        self._parents = [-1]
+        self._scale = scale
 
     def nearest(self, q: Array) -> int:
         return int(np.argmin(np.sum(((np.array(self.nodes) - q) / self._scale) ** 2, axis=1)))

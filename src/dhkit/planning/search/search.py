@@ -187,7 +187,8 @@ class Search(Generic[Iterate]):
 
     def _certify(self, guess: Iterate, found: Iterate) -> PlannedMotion:
         """Return a solution as a certified motion, solved again with tightened limits where necessary."""
-        program, margins = self.program, Margins(self.program.intervals)
+        program = self.program
+        margins = Margins(self.program.intervals)
         try:
             for turn in range(self._rounds):
                 checked = self.checked(found, turn, is_last=self.is_last and turn == self._rounds - 1)
@@ -247,7 +248,8 @@ class Search(Generic[Iterate]):
     def _slow_down(self, trajectory: Trajectory, step: float) -> tuple[Trajectory, States, Certificate, float]:
         """Return a motion, slowed down if a factor up to 1 + ``step`` suffices, its states, certificate and factor."""
         task = self.task
-        states, c = task.checker.states(trajectory), 1.0
+        states = task.checker.states(trajectory)
+        c = 1.0
         if task.rests and task.duration is None:
             c = task.checker.slow_down(states)
             if 1 < c < 1 + step:
@@ -264,7 +266,8 @@ class Search(Generic[Iterate]):
 
         The mesh may become finer.
         """
-        interval, factor = self.program.interval_of(excess.trajectory, found), MARGIN_FACTOR * MARGIN_GROWTH**turn
+        interval = self.program.interval_of(excess.trajectory, found)
+        factor = MARGIN_FACTOR * MARGIN_GROWTH**turn
         more = {}
         for limit, use in self.task.checker.peaks(excess.states).items():
             over = use.reshape(len(interval), -1, use.shape[1]).max(axis=1) - 1
@@ -289,9 +292,11 @@ class Search(Generic[Iterate]):
         PlanningError
             Not converged: names the row with the largest violation.
         """
-        task, program = self.task, program or self.program
+        task = self.task
+        program = program or self.program
         margins = margins or Margins(program.intervals)
-        given, rows = program.arguments(task, guess, margins), row_bounds(task, program.blocks, margins)
+        given = program.arguments(task, guess, margins)
+        rows = row_bounds(task, program.blocks, margins)
         self.tried += 1
         self.work.solves += 1
         solution = program.solver(

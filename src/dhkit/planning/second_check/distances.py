@@ -158,7 +158,8 @@ class DrawnArm:
     def _gaps(self, pair: tuple[Solid, Solid], frames: Array, enough: float) -> Array:
         """Return the distances of two solids, shape (N,), m; lower bounds where these are more than ``enough``."""
         first, second = pair
-        T_first, T_second = first.placed(frames), second.placed(frames)
+        T_first = first.placed(frames)
+        T_second = second.placed(frames)
         if second.height is None:
             apart = np.linalg.norm(T_first[:, :3, 3] - T_second[:, :3, 3], axis=1)
             gaps: Array = apart - first.radius - second.radius

@@ -51,7 +51,8 @@ def derivative(motion: Trajectory, instants: Array, order: int) -> Array:
 
     Each of its terms is j! / (j - order)! c_j s^(j - order).
     """
-    pieces, s = instants[:, 0].astype(int), instants[:, 1]
+    pieces = instants[:, 0].astype(int)
+    s = instants[:, 1]
     coefficients: Array = motion.coefficients
     total = np.zeros((len(instants), coefficients.shape[2]))
     for j in range(order, coefficients.shape[1]):

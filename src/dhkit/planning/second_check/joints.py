@@ -29,7 +29,8 @@ def jumps(motion: Trajectory) -> Iterator[Refutation]:
     ends = np.column_stack([np.arange(K - 1.0), np.diff(motion.breaks)[:-1]])
     beginnings = np.column_stack([np.arange(1.0, K), np.zeros(K - 1)])
     for order, name in enumerate(("position", "velocity")):
-        before, after = derivative(motion, ends, order), derivative(motion, beginnings, order)
+        before = derivative(motion, ends, order)
+        after = derivative(motion, beginnings, order)
         jump = np.abs(after - before)
         size = max(1.0, float(np.abs(before).max(initial=0.0)))
         for k, i in np.argwhere(jump > ACCEPTED * size):
@@ -92,12 +93,14 @@ def _largest(measure: Measure, instants: Array) -> Iterator[tuple[float, Array]]
     """Yield the largest value of each column of a measure and its instant, searched closer around the largest."""
     every = measure(instants)
     for i in range(every.shape[1]):
-        at, values = instants, every[:, i]
+        at = instants
+        values = every[:, i]
         k = int(np.argmax(values))
         for _ in range(ZOOMS):
             piece = at[at[:, 0] == at[k, 0]]
             here = int(np.searchsorted(piece[:, 1], at[k, 1]))
-            low, high = piece[max(here - 1, 0)], piece[min(here + 1, len(piece) - 1)]
+            low = piece[max(here - 1, 0)]
+            high = piece[min(here + 1, len(piece) - 1)]
             at = np.linspace(low, high, ZOOM_STATES)
             values = measure(at)[:, i]
             k = int(np.argmax(values))
@@ -109,7 +112,8 @@ def _torques(
 ) -> Measure:
     """Return a function of instants (N, 2) that returns tau = M qdd + h + friction, shape (N, n), N m and N."""
     pin = import_pinocchio()
-    model, numbers = pinocchio_model(description), description.numbers
+    model = pinocchio_model(description)
+    numbers = description.numbers
     if payload is not None:
         inertia = np.zeros((3, 3)) if payload.inertia is None else np.array(payload.inertia)
         T_joint_last = model.frames[model.getFrameId(f"dh{description.n}")].placement
