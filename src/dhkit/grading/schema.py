@@ -9,6 +9,7 @@ from pydantic import TypeAdapter
 
 from dhkit.description import Description
 from dhkit.description.schema import titled_schema
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.quantity_names import SMALL_HEADS
 from dhkit.grading.answers.sheet import (
     ALIASES,
@@ -17,9 +18,6 @@ from dhkit.grading.answers.sheet import (
     FORMAT,
     JACOBIAN_ROWS,
     KEYS,
-    MAX_BRANCHES,
-    MAX_NAMES,
-    MAX_STEPS,
     QUANTITY,
     quantity_names,
     shape_of,
@@ -102,7 +100,7 @@ def _properties() -> Schema:
             "type": "object",
             "description": "Further names, each an expression in the robot's parameters and in names before it.",
             "additionalProperties": ENTRY,
-            "maxProperties": MAX_NAMES,
+            "maxProperties": BOUNDS.names,
         },
         "friction": _switch("Whether tau includes viscous friction."),
         "execute": _switch("Whether programs may be executed where `dhkit grade --execute` asks for it."),
@@ -145,7 +143,7 @@ def _properties() -> Schema:
             "type": "array",
             "description": "Solutions, each a list of n formulas (rad, m) of the tool's pose px py pz, r11 ... r33.",
             "minItems": 1,
-            "maxItems": MAX_BRANCHES,
+            "maxItems": BOUNDS.branches,
             "items": {"type": "array", "items": ENTRY},
         },
     }
@@ -158,7 +156,7 @@ def _properties() -> Schema:
         "type": "array",
         "description": "Steps in the order in which joints are found; in place of branches.",
         "minItems": 1,
-        "maxItems": MAX_STEPS,
+        "maxItems": BOUNDS.steps,
         "items": _table(KEYS["step"], keys, "An equation, its solution, or both.")
         | {"required": ["joint"], "anyOf": [{"required": ["equation"]}, {"required": ["solution"]}]},
     }
@@ -200,7 +198,7 @@ def _answer(**tables: Schema) -> Schema:
 
 def _formulas(description: str) -> Schema:
     """Return the schema of a formula, or of a list of them."""
-    return {"anyOf": [ENTRY, {"type": "array", "items": ENTRY, "maxItems": MAX_STEPS}], "description": description}
+    return {"anyOf": [ENTRY, {"type": "array", "items": ENTRY, "maxItems": BOUNDS.steps}], "description": description}
 
 
 def _text(description: str) -> Schema:

@@ -12,6 +12,7 @@ import numpy as np
 from dhkit.description import Description
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Tree
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.documents.entry_statements import statements_of
 from dhkit.grading.answers.documents.latex_statements import has_relation
 from dhkit.grading.answers.documents.statements import Statement
@@ -31,8 +32,6 @@ from dhkit.symbolic import table_lengths
 LEFT_EMPTY = "left empty"
 """Error of an entry that was not handed in."""
 
-MAX_SHOWN = 1_000
-"""Largest length of an entry's text that is kept where it cannot be read, in characters."""
 
 KINETIC = frozenset(("T", "Ek", "Ec", "Ekin"))
 """Other names of the kinetic energy; T is a quantity of its own too."""
@@ -315,7 +314,7 @@ def _entry(target: Target, value: Answer, vocabulary: Vocabulary, names: Quantit
         try:
             value = _without_name(target, value, names)
         except AnswerError as error:
-            return Given(index, str(value)[:MAX_SHOWN], error=str(error))
+            return Given(index, str(value)[: BOUNDS.unread_characters], error=str(error))
     if isinstance(value, Chain):
         (given,) = _chained([(_read(index, formula, vocabulary),) for formula in value.formulas])
         return given
@@ -384,7 +383,7 @@ def _read(index: tuple[int, ...], value: Answer, vocabulary: Vocabulary) -> Give
         return Given(index, *entry_tree(value, vocabulary))
     except AnswerError as error:
         text = value if isinstance(value, str) else f"{type(value).__name__} object"
-        return Given(index, text[:MAX_SHOWN], error=str(error))
+        return Given(index, text[: BOUNDS.unread_characters], error=str(error))
 
 
 def _flat(
@@ -413,7 +412,7 @@ def _from_one_text(
     """Return the entries of a matrix, a vector or a number that stands in one text, of one matrix or of several."""
     try:
         if is_algebra(text, vocabulary, matrix_of):
-            shown = text.strip()[:MAX_SHOWN]
+            shown = text.strip()[: BOUNDS.unread_characters]
             rows = [[(shown, tree) for tree in row] for row in read_algebra(text, vocabulary, matrix_of)]
         else:
             rows = read_matrix(text, vocabulary)

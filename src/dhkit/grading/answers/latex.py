@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 
 from dhkit.expressions.syntax import Token
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.tokens import (
     closing_bracket,
     derivative_by_time,
@@ -17,12 +18,6 @@ from dhkit.grading.answers.tokens import (
 )
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 from dhkit.symbolic.equations.latex_names import GREEK as LETTERS
-
-MAX_DEPTH = 50
-"""Largest depth of nested arguments."""
-
-MAX_LETTERS = 64
-"""Largest number of letters in a row."""
 
 PIECE = re.compile(r"\s*(?:\\([A-Za-z]+|.)|(\d+\.?\d*|\.\d+)|([A-Za-z]+)|(\S))", re.ASCII | re.DOTALL)
 MIXED = re.compile(r"(?<![\w.{^])(\d+)\s*$", re.ASCII)
@@ -165,8 +160,8 @@ class _LatexReader:
     def _argument(self, at: int) -> list[Token]:
         """Read what a macro applies to: a group in braces, or one thing."""
         self.depth += 1
-        if self.depth > MAX_DEPTH:
-            fail(self.text, at, f"nested more than {MAX_DEPTH} deep")
+        if self.depth > BOUNDS.nesting:
+            fail(self.text, at, f"nested more than {BOUNDS.nesting} deep")
         piece = self._peek()
         if piece is None:
             fail(self.text, at, "ends where an argument was expected")
@@ -198,7 +193,7 @@ class _LatexReader:
 
     def _letters(self, letters: str, at: int) -> list[Token]:
         """Read letters: a known name, a function's, or one name each, the last with what stands below it."""
-        if len(letters) > MAX_LETTERS:
+        if len(letters) > BOUNDS.letters:
             fail(self.text, at, f"{len(letters)} letters in a row")
         digits = re.compile(r"\d+", re.ASCII).match(self.text, self.at)
         run = WORD.match(self.text, at)

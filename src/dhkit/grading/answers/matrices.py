@@ -10,6 +10,7 @@ from itertools import accumulate, pairwise
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Token, Tree
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.computer_algebra import is_mathematica
 from dhkit.grading.answers.latex import is_latex
 from dhkit.grading.answers.pretty import in_one_line
@@ -39,12 +40,6 @@ COLUMN_SIGNS, ROW_SIGNS = (",", "&"), (";", "\\\\")
 
 NOWHERE = -1
 """Place of the zeros beside a diagonal, which nobody typed."""
-
-MAX_DIAGONAL = 30
-"""Largest number of rows of a matrix that is given by its diagonal: arms have fewer joints."""
-
-MAX_ENTRIES = 1_024
-"""Largest number of entries."""
 
 
 def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]]]:
@@ -77,9 +72,9 @@ def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]
         raise AnswerError(f"expected a matrix in brackets, found {text[:60]!r}{hint}")
     before, after, is_transposed = _factors(tokens[:start], tokens[end + 1 :], text)
     entry_count = sum(token.text in (*COLUMN_SIGNS, *ROW_SIGNS) for token in tokens)
-    rows = _rows(tokens[start : end + 1], text) if entry_count <= MAX_ENTRIES else []
-    if entry_count > MAX_ENTRIES or sum(map(len, rows)) > MAX_ENTRIES:
-        raise AnswerError(f"a matrix of more than {MAX_ENTRIES} entries")
+    rows = _rows(tokens[start : end + 1], text) if entry_count <= BOUNDS.matrix_entries else []
+    if entry_count > BOUNDS.matrix_entries or sum(map(len, rows)) > BOUNDS.matrix_entries:
+        raise AnswerError(f"a matrix of more than {BOUNDS.matrix_entries} entries")
     if is_transposed and len(rows) > 1 and max(map(len, rows)) > 1:
         if len(set(map(len, rows))) > 1:
             raise AnswerError(f"{quote(text)}: rows of different lengths, transposed")
@@ -115,10 +110,10 @@ def matrix_rows(tokens: Sequence[Token], text: str) -> list[list[list[Token]]]:
     Raises
     ------
     AnswerError
-        More than ``MAX_ENTRIES``, or brackets that do not match.
+        More than ``BOUNDS.matrix_entries``, or brackets that do not match.
     """
-    if sum(token.text in (*COLUMN_SIGNS, *ROW_SIGNS) for token in tokens) > MAX_ENTRIES:
-        raise AnswerError(f"a matrix of more than {MAX_ENTRIES} entries")
+    if sum(token.text in (*COLUMN_SIGNS, *ROW_SIGNS) for token in tokens) > BOUNDS.matrix_entries:
+        raise AnswerError(f"a matrix of more than {BOUNDS.matrix_entries} entries")
     return _rows(tokens, text)
 
 
@@ -201,8 +196,8 @@ def _with_diagonal(tokens: list[Token], text: str) -> list[Token]:
         entries = [entry for row in _rows(inner, text) for entry in row]
     else:
         entries = _split(inner, (",",), text)
-    if len(entries) > MAX_DIAGONAL:
-        raise AnswerError(f"a matrix of more than {MAX_DIAGONAL} rows")
+    if len(entries) > BOUNDS.diagonal_rows:
+        raise AnswerError(f"a matrix of more than {BOUNDS.diagonal_rows} rows")
     zero = [Token("number", "0", NOWHERE)]
     matrix: list[Token] = []
     for i, entry in enumerate(entries):

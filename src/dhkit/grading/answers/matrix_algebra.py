@@ -19,6 +19,7 @@ from typing import TypeAlias
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Number, Product, Sum, Token, Tree
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.latex import is_latex
 from dhkit.grading.answers.matrices import TRANSPOSES, matrix_rows, matrix_tokens
 from dhkit.grading.answers.reading import answer_tree
@@ -35,12 +36,6 @@ MatrixOf: TypeAlias = Callable[[str], Rows | None]
 TIMES, OVER = ("*", "@", "\\,"), ("/",)
 NUMPY = re.compile(r"\b(?:np|numpy)\b|\barray\s*\(")
 """Text in numpy's notation, in which * multiplies matrices entry by entry."""
-MAX_PRODUCTS = 20_000
-"""Largest number of products of two entries in an answer."""
-MAX_CHAIN = 64
-"""Largest number of products of matrices in an answer, powers written out."""
-MAX_POWER = 8
-"""Largest power of a matrix."""
 
 
 def no_names(name: str) -> Rows | None:
@@ -231,7 +226,11 @@ class _Reader:
                 power = tokens[k + 1] if k + 1 < len(tokens) else tokens[k]
                 if self._is_entrywise(tokens[k]):
                     fail(self.text, tokens[k].at, "'.^' raises entry by entry; write ^ for the power of the matrix: it")
-                if power.kind != "number" or not power.text.isdecimal() or not 1 <= int(power.text[:3]) <= MAX_POWER:
+                if (
+                    power.kind != "number"
+                    or not power.text.isdecimal()
+                    or not 1 <= int(power.text[:3]) <= BOUNDS.matrix_power
+                ):
                     fail(self.text, tokens[k].at, "a power of a matrix that is no small whole number")
                 base, result = value, value
                 for _ in range(int(power.text) - 1):
@@ -286,8 +285,10 @@ class _Reader:
             raise AnswerError(f"{quote(self.text)}: a product of matrices of {m} x {n} and {p} x {q}")
         self.chain += 1
         self.products += len(left) * len(right) * len(right[0])
-        if self.chain > MAX_CHAIN or self.products > MAX_PRODUCTS:
-            raise AnswerError(f"{quote(self.text)}: more than {MAX_CHAIN} products of matrices, or too large ones")
+        if self.chain > BOUNDS.matrix_products or self.products > BOUNDS.entry_products:
+            raise AnswerError(
+                f"{quote(self.text)}: more than {BOUNDS.matrix_products} products of matrices, or too large ones"
+            )
         columns = list(zip(*right, strict=True))
         return [[_dot(row, column) for column in columns] for row in left]
 

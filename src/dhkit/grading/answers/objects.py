@@ -14,6 +14,7 @@ import numpy as np
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Call, Number, Power, Sum, Tree
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.derivatives import product, quotient
 from dhkit.grading.answers.reading import read_answer
 from dhkit.grading.answers.vocabulary import Vocabulary
@@ -22,15 +23,6 @@ if TYPE_CHECKING:
     from dhkit.symbolic.programs.graph import Node
 
 STATES = ("q", "qd", "qdd")
-
-MAX_NODES = 20_000
-"""Largest number of nodes of an expression: a PUMA's inverse dynamics in CasADi has 1,100."""
-
-MAX_NODES_SHOWN = 500
-"""Largest number of nodes of a CasADi expression that is shown as its text."""
-
-MAX_TEXT = 1_000
-"""Largest length of the text of a CasADi expression, in characters."""
 
 
 def entries_of(value: object, n: int) -> object:
@@ -111,8 +103,8 @@ def _text(value: object) -> str:
         if _library(value) == "sympy":
             import sympy
 
-            if sum(1 for _ in islice(sympy.preorder_traversal(value), MAX_NODES + 1)) > MAX_NODES:
-                raise AnswerError(f"an expression of more than {MAX_NODES} nodes")
+            if sum(1 for _ in islice(sympy.preorder_traversal(value), BOUNDS.object_nodes + 1)) > BOUNDS.object_nodes:
+                raise AnswerError(f"an expression of more than {BOUNDS.object_nodes} nodes")
         return str(value)
     except (RecursionError, ValueError):  # of integers of thousands of digits
         raise AnswerError("nested too deep, or a number too long") from None
@@ -170,16 +162,18 @@ class _CasadiScalar:
 
         self.scalar = scalar
         self.nodes = int(casadi.n_nodes(scalar))
-        is_short = self.nodes <= MAX_NODES_SHOWN
-        self.text = str(scalar)[:MAX_TEXT] if is_short else f"a CasADi expression of {self.nodes} nodes"
+        is_short = self.nodes <= BOUNDS.shown_casadi_nodes
+        self.text = (
+            str(scalar)[: BOUNDS.shown_casadi_characters] if is_short else f"a CasADi expression of {self.nodes} nodes"
+        )
 
     def tree(self, vocabulary: Vocabulary) -> Tree:
         import casadi
 
         from dhkit.symbolic.programs.graph import Graph
 
-        if self.nodes > MAX_NODES:
-            raise AnswerError(f"{self.text}; expected at most {MAX_NODES}")
+        if self.nodes > BOUNDS.object_nodes:
+            raise AnswerError(f"{self.text}; expected at most {BOUNDS.object_nodes}")
         symbols = casadi.symvar(self.scalar)
         inputs = [read_answer(name, vocabulary) for name in _counted_from_one([x.name() for x in symbols])]
         try:

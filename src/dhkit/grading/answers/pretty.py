@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.tokens import quote
 
 MARKS = frozenset("⎛⎜⎝⎡⎢⎣─⋅")
@@ -19,12 +20,6 @@ DERIVATIVES = (("d", "dt"), ("d^(2)", "dt^(2)"))
 
 TALL_BRACKETS = {"⎛": "⎜⎝⎞⎟⎠", "⎡": "⎢⎣⎤⎥⎦"}
 """Of each upper hook: what continues it and ends it, then the upper hook, the side and the foot that close."""
-
-MAX_LINES, MAX_COLUMNS = 200, 2_000
-"""Largest size of a formula, in lines and in characters of a line."""
-
-MAX_DEPTH = 30
-"""Largest depth of fractions, powers and brackets inside one another."""
 
 
 def is_pretty(text: str) -> bool:
@@ -49,8 +44,8 @@ def in_one_line(text: str) -> str:
         return text
     lines = text.strip("\n").splitlines()
     width = max(map(len, lines))
-    if len(lines) > MAX_LINES or width > MAX_COLUMNS:
-        raise AnswerError(f"{quote(text)}: more than {MAX_LINES} lines or {MAX_COLUMNS} columns")
+    if len(lines) > BOUNDS.pretty_lines or width > BOUNDS.pretty_columns:
+        raise AnswerError(f"{quote(text)}: more than {BOUNDS.pretty_lines} lines or {BOUNDS.pretty_columns} columns")
     if any(mark in text for mark in "√╲╱⌠⎮"):
         raise AnswerError(f"{quote(text)}: a root or an integral over several lines; print it with str()")
     try:
@@ -71,8 +66,8 @@ class _Block:
     depth: int
 
     def part(self, rows: slice, columns: slice = slice(None)) -> _Block:
-        if self.depth >= MAX_DEPTH:
-            raise _LostError(f"nested more than {MAX_DEPTH} deep")
+        if self.depth >= BOUNDS.pretty_nesting:
+            raise _LostError(f"nested more than {BOUNDS.pretty_nesting} deep")
         return _Block(tuple(line[columns] for line in self.lines[rows]), self.depth + 1)
 
     @property

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dhkit.errors import AnswerError, ExpressionError
 from dhkit.expressions.syntax import Call, Name, Power, Product, Sum, Token, Tree, read_tokens
 from dhkit.expressions.trees import operands, with_operands
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.computer_algebra import from_mathematica, from_maxima, is_mathematica
 from dhkit.grading.answers.derivatives import number, quotient, time_derivative
 from dhkit.grading.answers.latex import is_latex, latex_tokens
@@ -23,8 +24,6 @@ COMMENT = re.compile(r"(?<!\\)%(?!pi\b|e\b|i\b|\s*$).*|#.*")
 STORAGE = re.compile(r",\s*storage\s*=\s*rectangular\s*(?=\)\s*$)")
 """What sympy's maple_code adds to a matrix."""
 
-MAX_MEANING = 20_000
-"""Largest number of tokens that a student's own name stands for, after the names in its meaning are replaced."""
 
 BAR = re.compile(r"-{2,}")
 
@@ -72,8 +71,8 @@ def meaning_of(text: str, vocabulary: Vocabulary) -> Meaning:
     """
     read_answer(text, vocabulary)
     plain = to_plain_grammar(answer_tokens(text, vocabulary), vocabulary, text)
-    if len(plain) > MAX_MEANING:
-        raise AnswerError(f"written out, {len(plain)} signs; expected at most {MAX_MEANING}")
+    if len(plain) > BOUNDS.meaning_tokens:
+        raise AnswerError(f"written out, {len(plain)} signs; expected at most {BOUNDS.meaning_tokens}")
     return ("(", *(token.text for token in plain), ")")
 
 

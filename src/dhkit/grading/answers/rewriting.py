@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from dhkit.expressions.syntax import Token
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.indices import without_indices
 from dhkit.grading.answers.tokens import (
     begins_with,
@@ -38,8 +39,6 @@ MATLAB = re.compile(r"\.[*/^']")
 BY_TIME = re.compile(r"\w+\s*(?:\(\s*t\s*\)|\[\s*t\s*\])")
 AMBIGUOUS = re.compile(r"(sin|cos|tan|[sScC](?=\d+[A-Za-z]))(\d+)([A-Za-z]\w*)?", re.ASCII)
 
-MAX_TOKENS = 300_000
-"""Largest number of tokens of an answer, its names written out."""
 
 SQUARED = (("^", "2"), ("^", "(", "2", ")"))
 OVER_TIME = (("/", "dt"), ("/", "d", "t"), ("/", "(", "dt", ")"))
@@ -198,8 +197,8 @@ class _Rewriting:
         """Put in what names stand for."""
         plain: list[Token] = []
         for k, token in enumerate(tokens):
-            if len(plain) > MAX_TOKENS:
-                self._fail(token, f"more than {MAX_TOKENS} signs, names written out,")
+            if len(plain) > BOUNDS.tokens:
+                self._fail(token, f"more than {BOUNDS.tokens} signs, names written out,")
             if token.kind != "name":
                 plain.append(token)
                 continue

@@ -10,12 +10,7 @@ from typing import NoReturn
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Token
-
-MAX_LENGTH = 200_000
-"""Largest length of one entry, in characters: a PUMA's first, multiplied out in numbers, has 30,000."""
-
-MAX_DEPTH = 50
-"""Largest depth of nested brackets."""
+from dhkit.grading.answers.bounds import BOUNDS
 
 TOKEN = re.compile(
     r"\s*(?:((?:\d+(?:\.(?![*/^'])\d*)?|\.\d+)(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)"
@@ -74,8 +69,8 @@ def to_ascii(text: str) -> tuple[str, list[int]]:
     AnswerError
         A character that no formula has, or too many characters.
     """
-    if len(text) > MAX_LENGTH:
-        raise AnswerError(f"an entry of {len(text)} characters; expected at most {MAX_LENGTH}")
+    if len(text) > BOUNDS.entry_characters:
+        raise AnswerError(f"an entry of {len(text)} characters; expected at most {BOUNDS.entry_characters}")
     if text.isascii():
         return text, list(range(len(text)))
     pieces: list[str] = []
@@ -136,7 +131,7 @@ def nesting(text: str) -> int:
 
 
 def check_depth(tokens: Sequence[Token], text: str) -> None:
-    """Refuse tokens whose brackets are nested deeper than :data:`MAX_DEPTH`.
+    """Refuse tokens whose brackets are nested deeper than ``BOUNDS.nesting``.
 
     Raises
     ------
@@ -146,8 +141,8 @@ def check_depth(tokens: Sequence[Token], text: str) -> None:
     depth = 0
     for token in tokens:
         depth += nesting(token.text)
-        if depth > MAX_DEPTH:
-            fail(text, token.at, f"brackets nested more than {MAX_DEPTH} deep")
+        if depth > BOUNDS.nesting:
+            fail(text, token.at, f"brackets nested more than {BOUNDS.nesting} deep")
 
 
 def closing_bracket(tokens: Sequence[Token], k: int) -> int:

@@ -12,6 +12,7 @@ from typing import TypeAlias
 from dhkit.description import Description
 from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.tokens import quote
 
 Meaning: TypeAlias = tuple[str, ...]
@@ -36,8 +37,6 @@ ANGLES = ("q", "th", "theta", "Theta", "vartheta", "t", "phi", "varphi")
 SLIDES = ("d", "r", "x", "s", "rho")
 """Letters for the variable of a sliding joint, beside those of all joints."""
 
-MAX_NAME = 64
-"""Largest length of a name that is taken apart, in characters."""
 
 RATES = re.compile(r"(?:omega|Omega)(\d+)", re.ASCII)
 DOTS = {"d": 1, "dot": 1, "p": 1, "D": 1, "dd": 2, "ddot": 2, "pp": 2, "d2": 2, "DD": 2}
@@ -289,7 +288,7 @@ class Vocabulary:
 
     def split(self, name: str) -> list[str] | None:
         """Return the known names that an unknown one is a product of, where there is one way: m2l1 is m2 l1."""
-        if len(name) > MAX_NAME:
+        if len(name) > BOUNDS.name_characters:
             return None
         fewest: dict[int, list[list[str]]] = {len(name): [[]]}
         for start in reversed(range(len(name))):
@@ -325,9 +324,9 @@ class Vocabulary:
             *FUNCTION_NAMES,
         ]
         known += [f"{kind}{i}" for i in range(1, len(self.kinds) + 1) for kind in ("q", "qd", "qdd", "c", "s")]
-        known = [other for other in known if len(other) <= MAX_NAME]
+        known = [other for other in known if len(other) <= BOUNDS.name_characters]
         close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-        own = (other for other in self.own if len(other) <= MAX_NAME and other not in self.aliases)
+        own = (other for other in self.own if len(other) <= BOUNDS.name_characters and other not in self.aliases)
         listed = [*self.further[:4:3], *own, *self.symbols, "q1", "qd1", "c1", "s1"]
         return f"did you mean {close[0]!r}?" if close else f"known are {', '.join(dict.fromkeys(listed[:12]))}"
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from dhkit.description import Description
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.documents.latex_rows import MATRIX_BEGINNING, has_symmetry_marks, marked_places, matrix_rows
 from dhkit.grading.answers.documents.latex_source import document_statements
 from dhkit.grading.answers.documents.statements import Statement, left_hand_name
@@ -17,9 +18,6 @@ from dhkit.grading.answers.sheet import source_sheet
 from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Chain, Entries, Names, Refusal
 from dhkit.grading.answers.tokens import to_ascii
 from dhkit.grading.answers.vocabulary import plain_name
-
-MAX_DEFINITIONS = 2_000
-"""Largest number of names, times 10, that one formula is made of."""
 
 VALUE_WORDS = re.compile(r"\\(?:pi|circ|[td]?frac|deg)(?![A-Za-z])|\\(?:mathrm|text|textrm|si)\s*\{[^{}]*\}")
 """What the value of a joint variable may be made of besides numbers."""
@@ -319,8 +317,8 @@ class _DocumentAnswers:
             open_names.add(name)
             waiting.append((name, definition))
             waiting += [(other, None) for other in reversed(self._names_in(definition)) if other != name]
-            if len(self.parameters) + len(waiting) > MAX_DEFINITIONS * 10:
-                return f"made of more than {MAX_DEFINITIONS} names"
+            if len(self.parameters) + len(waiting) > BOUNDS.definitions * 10:
+                return f"made of more than {BOUNDS.definitions} names"
         return ""
 
     def _shorthand_problem(self, name: str) -> str:

@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.tokens import word_set
 
 ROWS = word_set(
@@ -30,8 +31,6 @@ MARK = re.compile(
     re.DOTALL,
 )
 
-MAX_BLANK_PIECES = 8
-"""Largest number of pieces in front of a row that may all be blank: labels and line breaks."""
 
 SYSTEM = re.compile(
     r"\\left\s*\\\{\s*\\begin\s*\{(array|aligned|matrix)\}(?:\s*\{[clr@{}|]*\})?((?:(?!\\begin|\\end).)*)"
@@ -97,7 +96,7 @@ def rows_of(text: str, line: int) -> Iterator[Row]:
     for mark in MARK.finditer(text):
         pieces.append(text[at : mark.start()])
         line += text.count("\n", at, mark.start())
-        if len(pieces) <= MAX_BLANK_PIECES and not columns and not "".join(pieces).strip():
+        if len(pieces) <= BOUNDS.blank_pieces and not columns and not "".join(pieces).strip():
             start = line
         at = mark.end()
         word, begins, ends = mark[0], mark["begin"], mark["end"]

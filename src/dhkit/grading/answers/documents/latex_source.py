@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.documents.latex_rows import ROWS
 from dhkit.grading.answers.documents.latex_statements import (
     STARTS,
@@ -18,12 +19,6 @@ from dhkit.grading.answers.documents.latex_statements import (
 from dhkit.grading.answers.documents.statements import Statement
 from dhkit.grading.answers.latex import DOT_MACROS, FRACTIONS, GREEK, SIZES, SPACE_NAMES, STYLE_MACROS, SYMBOL_MACROS
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
-
-MAX_STATEMENTS = 5_000
-"""Largest number of statements of a document."""
-
-MAX_MACROS = 300
-"""Largest number of macros that a document defines."""
 
 MACRO = re.compile(
     r"\\(?:(?:re)?newcommand|providecommand|DeclareMathOperator|DeclareRobustCommand"
@@ -93,8 +88,8 @@ def document_statements(text: str) -> Iterator[Statement]:
         More statements than are read, or a command that may change the meaning of anything behind it.
     """
     for count, statement in enumerate(_statements(text)):
-        if count >= MAX_STATEMENTS:
-            raise AnswerError(f"more than {MAX_STATEMENTS} equations")
+        if count >= BOUNDS.statements:
+            raise AnswerError(f"more than {BOUNDS.statements} equations")
         yield statement
 
 
@@ -217,7 +212,7 @@ def _macros(text: str) -> dict[str, Macro]:
     Raises
     ------
     AnswerError
-        More than :data:`MAX_MACROS`.
+        More than ``BOUNDS.macros``.
     """
     macros: dict[str, Macro] = {}
     line, at = 1, 0
@@ -231,8 +226,8 @@ def _macros(text: str) -> dict[str, Macro]:
         is_symbol = SYMBOL.fullmatch(symbol) is not None and is_command
         if name in READ_MACROS and symbol not in (f"\\var{name}", f"\\{name.removeprefix('var')}"):
             is_symbol = False
-        if len(macros) > MAX_MACROS:
-            raise AnswerError(f"more than {MAX_MACROS} macros")
+        if len(macros) > BOUNDS.macros:
+            raise AnswerError(f"more than {BOUNDS.macros} macros")
         macros[name] = Macro(line, symbol if is_symbol and name not in macros else None)
     return macros
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.documents.latex_rows import Row, rows_of
 from dhkit.grading.answers.documents.statements import SPACE, Statement, left_hand_name, statement_of
 from dhkit.grading.answers.tokens import word_set
@@ -74,9 +75,6 @@ DOUBTFUL = re.compile(
 """Words that may change what a formula in front of them states."""
 
 PROSE = re.compile(r"(?:[A-Za-z~\s.,:;()'`?!]|\\[ ,]|(?<=[A-Za-z])-(?=[A-Za-z]))*", re.ASCII)
-
-MAX_ENDING = 200
-"""Number of characters at the end of a row that are searched for an operator or punctuation: bounds the time."""
 
 
 def latex_statements(text: str, line: int) -> Iterator[Statement]:
@@ -198,7 +196,7 @@ def _goes_on(last: str, depth: int, row: Row) -> bool:
         return True
     if STARTS.match(row.text) and not (has_own_left_side and has_relation(row.text)):
         return True
-    return depth > 0 or ENDS.search(last[-MAX_ENDING:]) is not None
+    return depth > 0 or ENDS.search(last[-BOUNDS.row_ending_characters :]) is not None
 
 
 def _is_ambiguous(row: Row) -> bool:
@@ -213,7 +211,7 @@ def _is_ambiguous(row: Row) -> bool:
 
 
 def _ends_statement(text: str) -> bool:
-    return re.search(rf"(?:[,;.]|\\therefore){SPACE}*$", text[-MAX_ENDING:]) is not None
+    return re.search(rf"(?:[,;.]|\\therefore){SPACE}*$", text[-BOUNDS.row_ending_characters :]) is not None
 
 
 def _nesting(bracket: re.Match[str]) -> int:

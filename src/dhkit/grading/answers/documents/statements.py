@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.latex import GREEK
 from dhkit.grading.answers.sheet import ALIASES
 from dhkit.grading.answers.vocabulary import plain_name
-
-MAX_NAME = 200
-"""Largest length of a side that may be a name, in characters."""
 
 QUANTITIES = frozenset(("M", "C", "h", "g", "tau", "K", "V", "L", "T", "J", *ALIASES))
 
@@ -96,7 +94,7 @@ def left_hand_name(side: str) -> str:
 
     ``M_{12}(q)`` is M12, ``\mathbf{g}(\theta)`` g, ``M_{10,2}`` M10_2; ``\dot V``, ``V'`` and ``M^{-1}`` are no names.
     """
-    if len(side) > MAX_NAME:
+    if len(side) > BOUNDS.side_characters:
         return ""
     text = re.sub(rf"{SPACE}+", " ", re.sub(r"\\(?:left|right|bigl?|bigr|Bigl?|Bigr)(?![A-Za-z])", "", side))
     styled = ""

@@ -18,6 +18,7 @@ from dhkit.errors import AnswerError
 from dhkit.execution.child import Child
 from dhkit.execution.isolation import Isolation
 from dhkit.execution.process import Failure, Limits, ProgramError, printable
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.programs.program_answers import answers_of, called_name
 from dhkit.grading.answers.programs.robot_names import RobotNames, is_same_number
 from dhkit.grading.answers.programs.scope import Bound, Record, Scope
@@ -44,10 +45,6 @@ LIMITS = Limits(seconds=20.0, memory=2 << 30)
 """Limits of one request: derivations by Lagrange in sympy take seconds."""
 SAMPLING_TIME = 60.0
 """Processor time for calling a function at all states, s."""
-MAX_FILE_NAME = 60
-MAX_NAMES = 2_000
-MAX_TREE_DEPTH = 6
-MAX_ROWS = 1_000
 SAME_VALUES = 1e-9
 """Relative and absolute difference up to which two functions give the same numbers."""
 KINDS = ("numpy", "sympy", "casadi")
@@ -99,7 +96,7 @@ def executed_answers(
         raise AnswerError(f"{path}: {code.suffix} files are not executed; expected {', '.join(RUNNERS)} or .ipynb")
     if code.suffix == ".m":
         code = _functions_first(code)
-    name = re.sub(r"\W", "_", path.stem, flags=re.ASCII)[:MAX_FILE_NAME] + code.suffix
+    name = re.sub(r"\W", "_", path.stem, flags=re.ASCII)[: BOUNDS.file_name_characters] + code.suffix
     with tempfile.TemporaryDirectory(prefix="dhkit-answers-") as folder:
         source = Path(folder) / name
         source.write_text(code.text, "utf-8")
@@ -526,12 +523,14 @@ def _fields(value: object) -> list[tuple[str, Any]]:
     if not isinstance(value, dict):
         return []
     return [
-        (name, one) for name, one in list(value.items())[:MAX_NAMES] if isinstance(name, str) and name.isidentifier()
+        (name, one)
+        for name, one in list(value.items())[: BOUNDS.executed_names]
+        if isinstance(name, str) and name.isidentifier()
     ]
 
 
 def _listed(value: object) -> list[dict[str, Any]]:
-    return [one for one in value[:MAX_NAMES] if isinstance(one, dict)] if isinstance(value, list) else []
+    return [one for one in value[: BOUNDS.executed_names] if isinstance(one, dict)] if isinstance(value, list) else []
 
 
 def _texts(value: object) -> tuple[str, ...]:
@@ -575,7 +574,7 @@ def _is_constant(value: Scalar) -> bool:
 
 
 def _value_of_tree(tree: object, names: Mapping[str, str], depth: int = 0) -> Value:
-    if depth > MAX_TREE_DEPTH:
+    if depth > BOUNDS.value_nesting:
         return Unread("nested too deep")
     match tree:
         case str(text):
@@ -585,8 +584,8 @@ def _value_of_tree(tree: object, names: Mapping[str, str], depth: int = 0) -> Va
             with suppress(ValueError):
                 return Scalar(text, Level.SUM, float(text) if NUMBER.fullmatch(text) else None)
         case list(rows):
-            if len(rows) > MAX_ROWS:
-                return Unread(f"a list of more than {MAX_ROWS} values")
+            if len(rows) > BOUNDS.list_values:
+                return Unread(f"a list of more than {BOUNDS.list_values} values")
             return _value_of_list([_value_of_tree(row, names, depth + 1) for row in rows])
         case {"fields": dict(fields)}:
             return Structure({name: _value_of_tree(one, names, depth + 1) for name, one in _fields(fields)})

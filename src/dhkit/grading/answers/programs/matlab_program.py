@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import accumulate
 
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.programs.library import called
 from dhkit.grading.answers.programs.matlab_tokens import (
     CHANGING,
@@ -22,7 +23,6 @@ from dhkit.grading.answers.programs.matlab_tokens import (
 )
 from dhkit.grading.answers.programs.scope import Record, Scope
 from dhkit.grading.answers.programs.values import (
-    MAX_INDEX,
     Function,
     Given,
     Index,
@@ -44,11 +44,6 @@ from dhkit.grading.answers.programs.values import (
 )
 from dhkit.grading.answers.tokens import rate_name, word_set
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, plain_name
-
-MAX_STATEMENTS = 5_000
-"""Largest number of statements that are read, those of functions each time that they are applied."""
-MAX_DEPTH = 20
-"""Largest depth of calls of the program's own functions."""
 
 BLOCK_BEGINNINGS = word_set(
     "if for while switch try parfor spmd unwind_protect do classdef methods properties events enumeration"
@@ -143,8 +138,8 @@ class MatlabProgram:
         statements = []
         for statement in matlab_statements(text, file, line_name):
             statements.append(statement)
-            if len(statements) > MAX_STATEMENTS:
-                raise AnswerError(f"{file}: more than {MAX_STATEMENTS} statements")
+            if len(statements) > BOUNDS.statements:
+                raise AnswerError(f"{file}: more than {BOUNDS.statements} statements")
         self.statements = statements
         for statement in statements:
             self.bound |= statement.assigned_names()
@@ -257,7 +252,7 @@ class MatlabProgram:
         """
         if function.name in function.definition.results:
             raise UnreadError(f"{function.name} is the name of a function and of its result, in {function.line}")
-        if self.depth >= MAX_DEPTH:
+        if self.depth >= BOUNDS.call_depth:
             raise UnreadError(f"{function.name} calls itself, or functions nested too deep")
         definition: _Definition = function.definition
         local = set(function.parameters)
@@ -327,8 +322,8 @@ class MatlabProgram:
         has_returned = False
         for statement in statements:
             self.count += 1
-            if self.count > MAX_STATEMENTS:
-                raise AnswerError(f"{self.file}: more than {MAX_STATEMENTS} statements")
+            if self.count > BOUNDS.statements:
+                raise AnswerError(f"{self.file}: more than {BOUNDS.statements} statements")
             word = statement.keyword
             line = self.line_name(statement.line)
             if word in BLOCK_BEGINNINGS:
@@ -789,7 +784,11 @@ class _Expression:
                 value = self.program.value(part, self.scope)
             except UnreadError:
                 return None
-            if not isinstance(value, Scalar) or not value.text.isdecimal() or not 0 < int(value.text[:5]) <= MAX_INDEX:
+            if (
+                not isinstance(value, Scalar)
+                or not value.text.isdecimal()
+                or not 0 < int(value.text[:5]) <= BOUNDS.index
+            ):
                 return None
             numbers.append(int(value.text) - 1)
         return tuple(numbers) if numbers else None
@@ -893,9 +892,9 @@ def _target(tokens: Tokens) -> tuple[str, Index | None]:
 def _row_or_column(left: Tokens) -> tuple[int | None, int | None] | None:
     """Return the row or the column, from 0, of the left-hand side M(1, :) or M(:, 2); None of another one."""
     match [token.text for token in left]:
-        case [_, "(", number, ",", ":", ")"] if number.isdecimal() and 0 < int(number[:5]) <= MAX_INDEX:
+        case [_, "(", number, ",", ":", ")"] if number.isdecimal() and 0 < int(number[:5]) <= BOUNDS.index:
             return int(number) - 1, None
-        case [_, "(", ":", ",", number, ")"] if number.isdecimal() and 0 < int(number[:5]) <= MAX_INDEX:
+        case [_, "(", ":", ",", number, ")"] if number.isdecimal() and 0 < int(number[:5]) <= BOUNDS.index:
             return None, int(number) - 1
     return None
 
@@ -905,7 +904,7 @@ def constant_index(inside: Tokens) -> Index | None:
     numbers, commas = inside[::2], inside[1::2]
     if len(inside) % 2 == 0 or any(token.text != "," for token in commas):
         return None
-    if not all(t.kind == "number" and t.text.isdecimal() and 0 < int(t.text[:5]) <= MAX_INDEX for t in numbers):
+    if not all(t.kind == "number" and t.text.isdecimal() and 0 < int(t.text[:5]) <= BOUNDS.index for t in numbers):
         return None
     return tuple(int(token.text) - 1 for token in numbers)
 
@@ -916,10 +915,10 @@ def _places(tokens: Tokens) -> range | str:
         case [":"]:
             return "all"
         case [low, ":", high] if (
-            low.isdecimal() and high.isdecimal() and 0 < int(low[:5]) <= int(high[:5]) <= MAX_INDEX
+            low.isdecimal() and high.isdecimal() and 0 < int(low[:5]) <= int(high[:5]) <= BOUNDS.index
         ):
             return range(int(low) - 1, int(high))
-        case [one] if one.isdecimal() and 0 < int(one[:5]) <= MAX_INDEX:
+        case [one] if one.isdecimal() and 0 < int(one[:5]) <= BOUNDS.index:
             return range(int(one) - 1, int(one))
     raise UnreadError(f"{_text(tokens)[:40]!r} as an index is not read")
 

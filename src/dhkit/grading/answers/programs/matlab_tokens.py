@@ -9,6 +9,7 @@ from itertools import accumulate
 from typing import TypeAlias
 
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.tokens import word_set
 
 TOKEN = re.compile(
@@ -21,8 +22,6 @@ TOKEN = re.compile(
 STRING = re.compile(r"""(?P<string>'(?:[^']|'')*'|"(?:[^"\\]|""|\\.)*")""")
 SPACE = re.compile(r"[ \t\f\v\r\u00a0]+")
 
-MAX_TOKENS = 200_000
-"""Largest number of tokens of one statement."""
 
 OPENING, CLOSING = "([{", ")]}"
 CHANGING = ("+=", "-=", "*=", "/=", "^=", "|=", "&=")
@@ -238,8 +237,8 @@ class _Tokenizer:
                 tokens = []
                 continue
             tokens.append(token)
-            if len(tokens) > MAX_TOKENS:
-                raise self._error(tokens[0].line, f"a statement of more than {MAX_TOKENS} signs")
+            if len(tokens) > BOUNDS.matlab_tokens:
+                raise self._error(tokens[0].line, f"a statement of more than {BOUNDS.matlab_tokens} signs")
         if self.brackets:
             sign, line = self.brackets[-1]
             raise self._error(line, f"{sign!r} does not close")

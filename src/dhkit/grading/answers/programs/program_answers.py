@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from dhkit.errors import AnswerError
-from dhkit.grading.answers.programs.scope import MAX_DEFINITIONS, Record, Scope
+from dhkit.grading.answers.bounds import BOUNDS
+from dhkit.grading.answers.programs.scope import Record, Scope
 from dhkit.grading.answers.programs.values import (
     Function,
     Given,
@@ -495,8 +496,8 @@ class _ProgramAnswers:
             if used in self.record.definitions and used not in keys:
                 name, definition = self.record.definitions[used]
                 self.parameters[name] = definition.text
-        if len(self.parameters) > MAX_DEFINITIONS:
-            raise AnswerError(f"answers are made of more than {MAX_DEFINITIONS} names")
+        if len(self.parameters) > BOUNDS.definitions:
+            raise AnswerError(f"answers are made of more than {BOUNDS.definitions} names")
         return value.text
 
     def _whole_answer(self, whole: Sequence[_Candidate], entries: Sequence[_Candidate]) -> str | Refusal:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.programs.library import SCALAR, as_matrix, called, flat, unchanged
 from dhkit.grading.answers.programs.python_changes import (
     Changes,
@@ -23,7 +24,6 @@ from dhkit.grading.answers.programs.python_changes import (
 )
 from dhkit.grading.answers.programs.scope import Record, Scope
 from dhkit.grading.answers.programs.values import (
-    MAX_INDEX,
     ONE,
     ZERO,
     Function,
@@ -65,12 +65,6 @@ NUMPY = ("numpy", "jax.numpy", "autograd.numpy", "numpy.lib.scimath", "pylab", "
 """Modules whose matrices multiply entry by entry."""
 EXPORTED_LETTERS = frozenset("EINOQSe")
 """Names of one letter that these modules export."""
-MAX_STATEMENTS = 5_000
-"""Largest number of statements that are read, those of functions each time that they are applied."""
-MAX_DEPTH = 20
-"""Largest depth of calls of the program's own functions."""
-MAX_SYMBOLS = 1_000
-"""Largest index in symbols('q1:4')."""
 
 ASSUMPTIONS = word_set("cls real positive nonnegative nonzero integer commutative finite seq")
 """Keywords of symbols that change nothing of what is judged."""
@@ -176,8 +170,8 @@ class PythonProgram:
     def _block(self, statements: Sequence[ast.stmt], scope: Scope) -> None:
         for statement in statements:
             self.statements += 1
-            if self.statements > MAX_STATEMENTS:
-                raise AnswerError(f"{self.file}: more than {MAX_STATEMENTS} statements")
+            if self.statements > BOUNDS.statements:
+                raise AnswerError(f"{self.file}: more than {BOUNDS.statements} statements")
             self._statement(statement, scope)
 
     def _statement(self, statement: ast.stmt, scope: Scope) -> None:
@@ -504,7 +498,7 @@ class PythonProgram:
         """Return what a function returns, and its local names."""
         if function.problem:
             raise UnreadError(function.problem)
-        if self.depth >= MAX_DEPTH:
+        if self.depth >= BOUNDS.call_depth:
             raise UnreadError(f"{function.name} calls itself, or functions nested too deep")
         body = function.definition
         if isinstance(body, ast.expr):
@@ -694,7 +688,7 @@ class PythonProgram:
                     raise UnreadError(f"{self._quote(index)} as an index is not read")
                 first = 0 if ends[0] is None else ends[0][0]
                 last = first + self.record.robot.n if ends[1] is None else ends[1][0]
-                return Part(name, tuple(range(first, min(last, MAX_INDEX))), is_slice=True, number=value.number)
+                return Part(name, tuple(range(first, min(last, BOUNDS.index))), is_slice=True, number=value.number)
             case Matrix(), ast.Tuple([rows, columns]) if not value.is_flat:
                 m, n = value.shape
                 i, j = _chosen(rows, m), _chosen(columns, n)
@@ -1012,7 +1006,7 @@ def constant_index(node: ast.expr) -> Index | None:
     if parts and isinstance(parts[0], ast.Constant) and parts[0].value is Ellipsis:
         parts = parts[1:]
     numbers = [part.value if isinstance(part, ast.Constant) else None for part in parts]
-    index = tuple(k for k in numbers if type(k) is int and 0 <= k <= MAX_INDEX)
+    index = tuple(k for k in numbers if type(k) is int and 0 <= k <= BOUNDS.index)
     return index if index and len(index) == len(parts) else None
 
 
@@ -1067,7 +1061,7 @@ def _symbol_names(text: str) -> list[str]:
     names: list[str] = []
     for piece in map(ascii_name, re.split(r"[\s,]+", text.strip().strip(","))):
         span = re.fullmatch(r"(\w*?)\(?(\d*):(\d+)\)?", piece)
-        if span and int(span[3][:6]) <= MAX_SYMBOLS:
+        if span and int(span[3][:6]) <= BOUNDS.symbol_index:
             names += [f"{span[1]}{k}" for k in range(int(span[2] or 0), int(span[3]))]
         else:
             names.append(piece)
