@@ -17,6 +17,7 @@ from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
 from dhkit.expressions.syntax import Tree
 from dhkit.expressions.trees import names_of
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.numeric import Evaluation
 
 if TYPE_CHECKING:
@@ -24,12 +25,8 @@ if TYPE_CHECKING:
 
 PRECISIONS = (60, 250, 1000, 6000)
 """Decimal digits in which a tree is worked out, one after the other until its value is known."""
-MAX_WORK = 1_000_000
-"""Largest product of a tree's parts and digits, beyond the first precision: about a second's work."""
 RELATIVE_DIGITS = 26
 """Known leading digits that are enough to tell a value from another one."""
-MAX_ARGUMENT_BITS, MAX_POWER_BITS = 2_000, 100_000
-"""Largest integer part of a function's argument or an exponent, and largest power, in bits."""
 TOO_LARGE = "a number too large to be worked out"
 
 Interval = Any
@@ -73,14 +70,14 @@ def enclosed(
     TooLargeError
         A number that is too large to be worked out.
     LostDigitsError
-        No precision in :data:`PRECISIONS` gives the value within :data:`MAX_WORK`: digits cancel, or a function has no
-        value nearby.
+        No precision in :data:`PRECISIONS` gives the value within ``BOUNDS.enclosure_work``: digits cancel, or a
+        function has no value nearby.
     """
     import mpmath
 
     used = names_of(tree)
     for digits in PRECISIONS:
-        if digits > PRECISIONS[0] and parts * digits > MAX_WORK:
+        if digits > PRECISIONS[0] and parts * digits > BOUNDS.enclosure_work:
             break
         iv, previous = mpmath.iv, mpmath.iv.dps
         iv.dps = digits
@@ -150,11 +147,11 @@ def _divide(x: Interval, y: Interval) -> Interval:
 def _power(base: Interval, exponent: Interval) -> Interval:
     import mpmath
 
-    if _integer_bits(exponent) > MAX_ARGUMENT_BITS:
+    if _integer_bits(exponent) > BOUNDS.argument_bits:
         raise TooLargeError(TOO_LARGE)
     size = max(map(abs, _magnitudes(base)), default=0)
     power = mpmath.mpf(exponent.mid)
-    if size * abs(power) > MAX_POWER_BITS:
+    if size * abs(power) > BOUNDS.power_bits:
         raise TooLargeError(TOO_LARGE)
     if exponent.a == exponent.b and power == int(power):
         whole = int(power)
@@ -197,7 +194,7 @@ def _functions() -> Mapping[str, Callable[..., Interval]]:
         """Return a function that refuses arguments too large to be worked out."""
 
         def apply(*arguments: Interval) -> Interval:
-            if any(_integer_bits(x) > MAX_ARGUMENT_BITS for x in arguments):
+            if any(_integer_bits(x) > BOUNDS.argument_bits for x in arguments):
                 raise TooLargeError(TOO_LARGE)
             return function(*arguments)
 

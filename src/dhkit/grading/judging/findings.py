@@ -14,6 +14,7 @@ from dhkit.expressions import CONSTANTS
 from dhkit.expressions.syntax import Number, Sum, Tree
 from dhkit.expressions.trees import names_of, parts_of
 from dhkit.grading.judging import sampling
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.enclosures import LostDigitsError, TooLargeError, enclosed
 from dhkit.grading.judging.numeric import doubles, state_arrays
 from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient, RingReader
@@ -24,8 +25,6 @@ from dhkit.symbolic.equations import latex_text, plain_text
 from dhkit.symbolic.exact.compact import shortened
 from dhkit.symbolic.ring import Element, RingError, element_array
 
-MAX_WRITTEN_TERMS = 400
-"""Largest number of terms of a difference that is written in the angles which make it shortest."""
 MAX_NAMED_DIVISORS = 3
 """Largest number of divisors that a statement names."""
 PROVED = "proved equal"
@@ -157,7 +156,7 @@ def _proof_statement(by: Comparison, divisors: Sequence[Element]) -> str:
     if not divisors:
         parameters = "" if by.condition else " and every value of the parameters"
         return f"{PROVED}{by.condition}, for every state{parameters}"
-    texts = [plain_text(readable(by.arm, x)) for x in divisors[:MAX_NAMED_DIVISORS] if len(x) <= MAX_WRITTEN_TERMS]
+    texts = [plain_text(readable(by.arm, x)) for x in divisors[:MAX_NAMED_DIVISORS] if len(x) <= BOUNDS.written_terms]
     more = " or another divisor is 0" if len(texts) < len(divisors) else ""
     zeros = " or ".join(f"{text} = 0" for text in texts) + more
     return f"{PROVED}{by.condition} wherever the answer is defined: it has no value where {zeros}"
@@ -182,12 +181,12 @@ def _difference_texts(
     arm: ExactArm, answer: Quotient, truth: Element, difference: Element | None
 ) -> tuple[str | None, str]:
     if difference is not None:
-        if len(difference) > MAX_WRITTEN_TERMS:
+        if len(difference) > BOUNDS.written_terms:
             return plain_text(difference), ""
         short = readable(arm, difference)
         return plain_text(short), latex_text(short)
     numerator, denominator = answer.numerator_of_difference(truth), answer.denominator
-    if max(len(numerator), len(denominator)) > MAX_WRITTEN_TERMS:
+    if max(len(numerator), len(denominator)) > BOUNDS.written_terms:
         return None, ""
     numerator, denominator = readable(arm, numerator), readable(arm, denominator)
     return (
@@ -242,14 +241,6 @@ def names_in(element: Element) -> set[str]:
 
 # Answers outside the ring
 
-MAX_NODES = 20_000
-"""Largest number of nodes of an answer that is tried at random states."""
-MAX_EVALUATIONS = 300_000
-"""Largest product of nodes and states."""
-MAX_WORK = 60 * MAX_EVALUATIONS
-"""Largest product of nodes and digits, over all states."""
-MIN_STATES = 15
-"""Smallest number of states: an answer too long for them cannot be judged."""
 STATES_PER_SET = 5
 """States that share parameters if an energy's zero is free: the first of them sets it, the others are compared. A small
 number leaves many sets of parameters: a difference may exist in a part of their range alone."""
@@ -262,10 +253,10 @@ def _sample(tree: Tree, truth: Element, by: Comparison, reason: str) -> Finding:
     nodes = sum(1 for _ in parts_of(tree)) + len(truth)
     if by.up_to_constant is None:
         raise AnswerError(f"outside the exact ring ({reason}), where L is not judged up to a total derivative")
-    if nodes > MAX_NODES:
+    if nodes > BOUNDS.sampled_nodes:
         raise AnswerError(f"outside the exact ring ({reason}), and too long to be tried: {nodes} terms and factors")
     with mpmath.workdps(sampling.DIGITS):
-        count = max(MIN_STATES, min(sampling.MAX_SAMPLES, MAX_EVALUATIONS // nodes))
+        count = max(BOUNDS.fewest_states, min(BOUNDS.states, BOUNDS.evaluations // nodes))
         every = STATES_PER_SET if by.up_to_constant else 1
         states = sampling.samples(by.arm, by.numbers, by.seed, every=every, count=count)
         try:
@@ -332,7 +323,7 @@ def _first_difference(
         if sampling.differ(value - shift, right):
             return differs(state, value - shift, right, f"outside the exact ring ({reason})")
         work += nodes * digits
-        if work > MAX_WORK and k + 1 >= MIN_STATES:
+        if work > BOUNDS.sampling_work and k + 1 >= BOUNDS.fewest_states:
             return k + 1
     return k + 1
 

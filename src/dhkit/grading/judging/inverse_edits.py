@@ -16,6 +16,7 @@ from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tr
 from dhkit.expressions.trees import names_of, operands, parts_of, with_operands
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.judging import changed_formulas as formulas
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.changed_formulas import applied, leaf_text, minus, square_of, times
 
 ORDER = (
@@ -57,10 +58,6 @@ ORDER = (
     "term_extra",
 )
 """Mistakes in the order in which they are tried."""
-MAX_EDITS = 4_000
-"""Largest number of changes of one formula; a PUMA's longest, of 200 nodes, has 2,500."""
-MAX_LENGTHS = 12
-"""Largest number of lengths of the robot that are tried as a missing offset."""
 POSITIONS = POSE_NAMES[:3]
 ROTATIONS = POSE_NAMES[3:]
 ARCS = ("acos", "asin", "atan")
@@ -70,8 +67,6 @@ SAME_LENGTH = 1e-9
 """Share of a length by which it differs from itself by rounding."""
 MIN_MEASURE = 10
 """Smallest number that is taken for degrees or millimetres; smaller ones are factors and exponents."""
-MAX_LAW_TERMS = 8
-"""Largest number of terms of which pairs of signs are tried."""
 MAX_ROUNDED = 0.01
 """Largest share by which a number differs from a length that it is a rounded value of."""
 
@@ -130,7 +125,7 @@ def edits(
     lengths: Lengths,
     mistakes: Collection[str] = ORDER,
 ) -> list[Edit]:
-    """Return the changes of a formula in the order in which they are tried, :data:`MAX_EDITS` at most.
+    """Return the changes of a formula in the order in which they are tried, ``BOUNDS.edits`` at most.
 
     Parameters
     ----------
@@ -150,7 +145,7 @@ def edits(
     whole = chain(_of_the_whole(tree, is_revolute, others, offsets), _with_triangle(tree, is_revolute, others, lengths))
     changes = [Edit(mistake, new, tree, new) for mistake, new in whole if mistake in mistakes]
     changes += edits_of_parts(tree, lengths, mistakes)
-    return sorted(changes, key=lambda edit: ORDER.index(edit.mistake))[:MAX_EDITS]
+    return sorted(changes, key=lambda edit: ORDER.index(edit.mistake))[: BOUNDS.edits]
 
 
 def edits_of_parts(tree: Tree, lengths: Lengths, mistakes: Collection[str] = ORDER) -> list[Edit]:
@@ -160,12 +155,12 @@ def edits_of_parts(tree: Tree, lengths: Lengths, mistakes: Collection[str] = ORD
         exchanged = formulas.with_calls_changed(tree, ("sin", "cos"), partial(_exchanged, angle))
         changes.append(Edit("term_function", exchanged, tree, exchanged))
     of_parts = _of_parts(tree, lengths, mistakes, lambda part: part, formulas.is_law(tree))
-    changes += islice(of_parts, 2 * MAX_EDITS)
+    changes += islice(of_parts, 2 * BOUNDS.edits)
     for mistake, change in renamings([tree], lengths):
         new = formulas.renamed(tree, change) if mistake in mistakes else tree
         if new is not tree:
             changes.append(Edit(mistake, new, tree, new))
-    return sorted(changes, key=lambda edit: ORDER.index(edit.mistake))[:MAX_EDITS]
+    return sorted(changes, key=lambda edit: ORDER.index(edit.mistake))[: BOUNDS.edits]
 
 
 def _angles(tree: Tree) -> list[frozenset[str]]:
@@ -193,9 +188,9 @@ def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, di
     numbers = {leaf_text(number) for number in parts if number.value.denominator != 1}  # integers are exponents
     yield from _other_angles(names)
     known = [length for length in lengths.trees if leaf_text(length) in names | numbers]
-    for first, second in combinations(known[:MAX_LENGTHS], 2):
+    for first, second in combinations(known[: BOUNDS.offset_lengths], 2):
         yield "lengths_exchanged", {leaf_text(first): second, leaf_text(second): first}
-    for place, length in enumerate(lengths.trees[:MAX_LENGTHS]):
+    for place, length in enumerate(lengths.trees[: BOUNDS.offset_lengths]):
         forgotten = "tool_length_forgotten" if lengths.is_of_tool(place) else "length_forgotten"
         for subtracted in (True, False):
             for p in POSITIONS:
@@ -222,7 +217,7 @@ def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, di
         columns |= {f"r{i}{k}": Name(f"r{i}{j}", 0) for i in "123"}
         if names & {*columns}:
             yield "tool_axis_exchanged", columns
-    for first, second in permutations(known[:MAX_LENGTHS], 2):
+    for first, second in permutations(known[: BOUNDS.offset_lengths], 2):
         for added in (True, False):
             yield "length_forgotten", {leaf_text(first): Sum(((True, first), (added, second)))}
 
@@ -298,7 +293,7 @@ def _with_triangle(
         return
     for name in others:
         c, s = applied("cos", Name(name, 0)), applied("sin", Name(name, 0))
-        for a, b in permutations(lengths.trees[:MAX_LENGTHS], 2):
+        for a, b in permutations(lengths.trees[: BOUNDS.offset_lengths], 2):
             beta = Call("atan2", (times(b, s), Sum(((True, a), (True, times(b, c))))), 0)
             for added in (False, True):
                 yield "triangle_angle_forgotten", Sum(((True, tree), (added, beta)))
@@ -344,7 +339,7 @@ def _of_parts(
 def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, Tree]]:
     """Yield mistakes in a part, each with the part corrected."""
     if isinstance(tree, Sum | Call):
-        used = [length for length in lengths.trees[:MAX_LENGTHS] if leaf_text(length) in names_of(tree)]
+        used = [length for length in lengths.trees[: BOUNDS.offset_lengths] if leaf_text(length) in names_of(tree)]
         for one, two in combinations(used, 2):
             change: dict[str, Tree] = {leaf_text(one): two, leaf_text(two): one}
             yield "lengths_exchanged", formulas.renamed(tree, change)
@@ -364,7 +359,7 @@ def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, 
                 yield "term_factor", formulas.product_of([*factors[:k], *factors[k + 1 :]])
             if not all(is_factor for is_factor, _ in factors):
                 yield "cosine_law_squares" if in_law else "square_forgotten", square_of(tree)
-                for length in lengths.trees[:MAX_LENGTHS]:
+                for length in lengths.trees[: BOUNDS.offset_lengths]:
                     for is_factor in (False, True):
                         yield "length_forgotten", Product((*factors, (is_factor, length)))
         case Sum(terms):
@@ -374,7 +369,7 @@ def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, 
 def _of_number(number: Number, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, Tree]]:
     if abs(number.value) == 1:
         return
-    for length, value in zip(lengths.trees[:MAX_LENGTHS], lengths.values, strict=False):
+    for length, value in zip(lengths.trees[: BOUNDS.offset_lengths], lengths.values, strict=False):
         if 0 < abs(float(number.value) - value) < MAX_ROUNDED * value:
             yield "rounded_length", length
     if number.value >= MIN_MEASURE:
@@ -391,7 +386,7 @@ def _of_name(text: str, lengths: Lengths) -> Iterator[tuple[str, Tree]]:
         if other != text:
             yield "term_parameter" if text in lengths.parameters else "axis_exchanged", Name(other, 0)
     if text in POSITIONS:
-        for length in lengths.trees[:MAX_LENGTHS]:
+        for length in lengths.trees[: BOUNDS.offset_lengths]:
             for added in (False, True):
                 yield "offset_forgotten", Sum(((True, Name(text, 0)), (added, length)))
 
@@ -427,11 +422,11 @@ def _of_call(call: Call, in_law: bool) -> Iterator[tuple[str, Tree]]:
 
 def _of_sum(terms: tuple[tuple[bool, Tree], ...], lengths: Lengths, in_law: bool) -> Iterator[tuple[str, Tree]]:
     yield "root_forgotten", applied("sqrt", Sum(terms))
-    for length in lengths.trees[:MAX_LENGTHS]:
+    for length in lengths.trees[: BOUNDS.offset_lengths]:
         for term in (length, square_of(length)):
             for added in (False, True):
                 yield "length_forgotten", Sum((*terms, (added, term)))
-    for count in (1, 2) if in_law and len(terms) <= MAX_LAW_TERMS else (1,):
+    for count in (1, 2) if in_law and len(terms) <= BOUNDS.law_terms else (1,):
         for chosen in combinations(range(len(terms)), count):
             changed = tuple((added ^ (k in chosen), term) for k, (added, term) in enumerate(terms))
             yield "cosine_law_sign" if in_law else "term_sign", Sum(changed)

@@ -19,17 +19,12 @@ from dhkit.description import Array, Description
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Call, Name, Number, Sum, Tree
 from dhkit.expressions.trees import equal_parts, names_of, parts_of, replaced_everywhere
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.changed_formulas import has_call, is_joint, minus, renamed, with_calls_changed
 from dhkit.grading.judging.inverse_branch import Branch
 from dhkit.grading.judging.inverse_edits import ORDER, Edit, Lengths, edits, renamings
 from dhkit.grading.judging.inverse_poses import Mask
 
-MAX_POSES = 100
-"""Largest number of poses that fail, and of poses that are reached, at which mistakes are looked for."""
-MAX_WORK = 4_000_000
-"""Largest number of changes for one answer, each times the parts of its formula: a few seconds' work."""
-MAX_PARTS = 1_000
-"""Largest number of parts of a formula in which mistakes are looked for; a PUMA's longest has 200."""
 MIN_AGREEING_SHARE = 0.5
 """Share of the poses at which the values of a change must be a solution's for the change to be followed further."""
 MIN_EXPLAINED_SHARE = 0.3
@@ -84,13 +79,13 @@ class Search:
     def __init__(self, description: Description, lengths: Lengths | None = None) -> None:
         self.revolute = [kind == "R" for kind in description.kinds]
         self.lengths = lengths or lengths_of(description)
-        self.left = MAX_WORK
+        self.left = BOUNDS.edit_work
         self.made: dict[int, set[str]] = {}
         """Mistakes that were found in each joint's formula of the branches so far."""
 
     def explanations(self, branch: Branch) -> Iterator[Explanation]:
         """Yield the mistakes of a branch; each is corrected before the next is looked for."""
-        current: Branch | None = branch.sample(MAX_POSES)
+        current: Branch | None = branch.sample(BOUNDS.edit_poses)
         while current is not None and not current.is_right:
             joint = current.wrong_joint()
             explanation = self._explain_anywhere(current) if joint is None else self._explain(current, joint)
@@ -147,7 +142,7 @@ class Search:
         names = [f"q{k + 1}" for k in same_kind]
         tree = branch.trees[joint]
         size = sum(1 for _ in parts_of(tree))
-        if size > MAX_PARTS:
+        if size > BOUNDS.edited_nodes:
             return []
         changes = edits(tree, self.revolute[joint], names, offsets, self.lengths, mistakes)
         changes = changes[: self.left // size]
@@ -185,7 +180,7 @@ class Search:
     def _explain_several(self, branch: Branch, agreeing: list[Edit]) -> Iterator[Explanation]:
         """Yield changes of the same part, or of the same names, in several formulas."""
         size = sum(1 for tree in branch.trees for _ in parts_of(tree))
-        if size > MAX_PARTS * branch.n:
+        if size > BOUNDS.edited_nodes * branch.n:
             return
         equal = equal_parts(branch.trees)
         for edit in agreeing:

@@ -19,6 +19,7 @@ import numpy as np
 
 from dhkit.expressions.syntax import Call, Name, Number, Power, Tree
 from dhkit.expressions.trees import Algebra, parts_of
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.quotients import Quotient, RingReader, varying
 from dhkit.symbolic.ring import Element, RingError
 from dhkit.symbolic.ring.elements import PolynomialRing
@@ -32,10 +33,6 @@ DOUBLE_DIGITS = 15
 """Significant digits from which a decimal is taken for a printed double."""
 DOUBLE_ALLOWANCE = Fraction(8, 2**52)
 """Relative allowance of a printed double: eight units in its last place, the loss of a few dozen operations."""
-MAX_WORK = 200_000
-"""Largest number of products of two terms in multiplying an answer out: about a second."""
-MAX_COEFFICIENTS = 2_000
-"""Largest number of coefficients with an allowance: a PUMA's longest entry in numbers has 300."""
 SOLVER_MARGIN = Fraction(1, 10**9)
 """Relative error of the linear program's doubles at the edge of an allowance."""
 DOUBLE_NOISE = 1e-15
@@ -44,7 +41,7 @@ doubles here; without such numbers they hold exactly."""
 
 
 class _TooLongError(Exception):
-    """Multiplying an answer out exceeds :data:`MAX_WORK`."""
+    """Multiplying an answer out exceeds ``BOUNDS.rounding_products``."""
 
 
 @dataclass(frozen=True)
@@ -191,7 +188,7 @@ class _Expansion(Algebra[tuple[Polynomial, Polynomial]]):
         if right is self.one:
             return left
         self.work += len(left) * len(right)
-        if self.work > MAX_WORK:
+        if self.work > BOUNDS.rounding_products:
             raise _TooLongError
         product: Polynomial = {}
         for a, x in left.items():
@@ -283,7 +280,7 @@ def rounding_share(tree: Tree, truth: Element, reader: RingReader, residuals: Re
     except RingError:
         return None
     columns = [column for column in columns if column]
-    if not columns or len(columns) > MAX_COEFFICIENTS:
+    if not columns or len(columns) > BOUNDS.rounded_coefficients:
         return None
     difference, reference = numerator - truth * denominator, truth * denominator
     is_energy = not is_quotient and not _is_plain(residuals, truth)

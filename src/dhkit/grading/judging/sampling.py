@@ -11,6 +11,7 @@ import numpy as np
 
 from dhkit.expressions import Expression
 from dhkit.expressions.exact import Atom
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.ring import Element
 
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from mpmath import mpf
 
 _Key = TypeVar("_Key")
-MAX_SAMPLES = 1_000
-"""Number of random states for one entry, unless it is long."""
 DIGITS = 50
 """Decimal digits of the arithmetic."""
 TOLERANCE, MIN_SIZE = 1e-25, 1e-3
@@ -45,7 +44,7 @@ class Sample:
 
 
 def samples(
-    arm: ExactArm, numbers: frozenset[str], seed: int, every: int = 1, count: int = MAX_SAMPLES
+    arm: ExactArm, numbers: frozenset[str], seed: int, every: int = 1, count: int = BOUNDS.states
 ) -> Iterator[Sample]:
     """Yield random states: a third within one turn, the others at scales from 1e-3 to 1e3 rad, m and their rates.
 

@@ -22,15 +22,13 @@ from dhkit.expressions.syntax import Name, Number, Product, Sum, Tree
 from dhkit.expressions.trees import names_of
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.answers.inverse_steps import GivenStep
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.inverse_branch import MISSED_SHARE, Branch
 from dhkit.grading.judging.inverse_poses import KNOWN, MATCHES, Mask
 from dhkit.grading.judging.numeric import doubles
 from dhkit.grading.judging.step_context import Part, StepContext
 from dhkit.grading.judging.step_mistakes import SolutionMistakes
 from dhkit.grading.report import Verdict, Witness
-
-MAX_HYPOTHESES = 100
-"""Largest number of ways to take earlier joints without a right solution that are followed at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +123,7 @@ class Solutions:
                 for found in self._divided(hypothesis, self.unsolved)
                 if any(np.any(choice.alive) for choice in found)
             ]
-            self._hypotheses, self.unsolved = following[:MAX_HYPOTHESES], []
+            self._hypotheses, self.unsolved = following[: BOUNDS.hypotheses], []
         return self._hypotheses
 
     def skip(self, joint: int) -> None:
