@@ -15,6 +15,7 @@ from dhkit.grading.judging.numeric import general_state, state_arrays
 from dhkit.grading.judging.quantities import Index, place_of
 from dhkit.grading.judging.quotients import varying
 from dhkit.grading.judging.truth import DYNAMICS, Truth, kinematic_quantity
+from dhkit.grading.mistakes.bounds import BOUNDS
 from dhkit.grading.mistakes.energy_variants import energy_variants, table_variants
 from dhkit.grading.mistakes.equation_variants import equation_variants, lagrangian_sum
 from dhkit.grading.mistakes.parameter_variants import parameter_variants
@@ -37,8 +38,6 @@ Key: TypeAlias = frozenset[Any]
 TEXTBOOK = {*MISTAKES, *KINEMATIC_MISTAKES}
 ROUNDED_DECIMALS = 2e-3
 """Tolerance relative to the largest entry: numbers of four decimals, multiplied and added, stay below it."""
-MAX_DERIVED_PAIRS = 150
-"""Largest number of pairs of mistakes at one link that are derived for a quantity; their changes do not add up."""
 
 
 class Variants:
@@ -246,7 +245,7 @@ class _Pairs:
         additive = self.quantity in DYNAMICS
         pairs = combinations(self.tables.textbook(self.quantity), 2)
         derived = ((a, b) for a, b in pairs if not (additive and _apart(a.made, b.made)))
-        return islice(derived, MAX_DERIVED_PAIRS)
+        return islice(derived, BOUNDS.derived_pairs)
 
     def _derived(self, wanted: Mapping[Index, Key]) -> tuple[Variant, Variant] | None:
         for keys, pair in self.derived_pairs.items():

@@ -11,6 +11,7 @@ from dhkit.description import Convention, Description, Joint
 from dhkit.errors import DhkitError
 from dhkit.expressions import ZERO, Expression
 from dhkit.grading.judging.truth import Truth
+from dhkit.grading.mistakes.bounds import BOUNDS
 from dhkit.grading.mistakes.variants import Change, Variant, make_lazily
 from dhkit.symbolic.mistakes import LINK_MISTAKES, MISTAKES, ROTOR_MISTAKES, MadeAt
 from dhkit.symbolic.ring import Element, element_array, translated
@@ -35,8 +36,6 @@ RARER = frozenset(("omega_unturned", "inertia_axes", "com_rotation_transposed", 
 """Mistakes of the textbook that are rarer than others which give the same answers."""
 INERTIA_MISTAKES = ("inertia_forgotten", "inertia_about_joint", "inertia_about_com_at_joint", "inertia_doubled")
 """Mistakes that may be made at some links alone, because the first link only turns about its own axis."""
-MAX_LINKS_OF_SUBSETS = 4
-"""Largest number of links of which all subsets are tried."""
 EXCHANGED_AXES = ((0, 1), (1, 2), (0, 2))
 
 
@@ -121,7 +120,7 @@ def _is_possible(textbook: TextbookDerivation, name: str, link: int) -> bool:
 
 def _subsets(links: Sequence[int]) -> Iterator[tuple[int, ...]]:
     """Yield the subsets of at least two links, without all of them; none of more than four links."""
-    if len(links) <= MAX_LINKS_OF_SUBSETS:
+    if len(links) <= BOUNDS.subset_links:
         for count in range(2, len(links)):
             yield from combinations(links, count)
 

@@ -19,6 +19,7 @@ from dhkit.grading.judging.quantities import Index, JudgedQuantity
 from dhkit.grading.judging.rounding import has_decimals
 from dhkit.grading.judging.truth import DYNAMICS, Truth
 from dhkit.grading.mistakes import entries, plain_causes
+from dhkit.grading.mistakes.bounds import BOUNDS
 from dhkit.grading.mistakes.diagnosis import Differences
 from dhkit.grading.mistakes.plain_causes import tables_of
 from dhkit.grading.mistakes.variants import Variant
@@ -38,9 +39,8 @@ MAX_ENTRIES_ALONE = 2
 """Largest number of entries of which a sentence says that the mistake was made in them alone."""
 MAX_LIKELY_RARITY = 1
 """Largest rarity of mistakes that are tried before slips in single terms."""
-MIN_PAIR_TERMS, MAX_PAIR_TERMS = 3, 600
-"""Range of differing terms for which pairs of mistakes are tried: with fewer terms a slip is likelier, with more the
-search takes too long."""
+MIN_PAIR_TERMS = 3
+"""Smallest number of differing terms for which pairs of mistakes are tried: with fewer terms a slip is likelier."""
 
 
 def explain(
@@ -283,7 +283,7 @@ def _pair(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQu
     """Find two mistakes of a derivation that together explain a quantity."""
     differences = quantity.differences
     terms = sum(map(len, differences.values())) if differences else 0
-    if not differences or not MIN_PAIR_TERMS <= terms <= MAX_PAIR_TERMS:
+    if not differences or not MIN_PAIR_TERMS <= terms <= BOUNDS.pair_terms:
         return []
     pair = tables_of(truth, quantity).pair(quantity.name, differences)
     if pair is None or any(_contradicted(truth, judged, variant) for variant in pair):

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from dhkit.expressions import ZERO
+from dhkit.grading.mistakes.bounds import BOUNDS
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.exact.compact import shortened_alike
@@ -16,10 +17,6 @@ from dhkit.symbolic.ring.elements import PolynomialRing
 Terms = Mapping[tuple[int, ...], Fraction]
 UNITS = frozenset((Fraction(1000), Fraction(1000) ** 2, Fraction(1, 1000), Fraction(1, 1000) ** 2))
 """Factors of terms with lengths in mm in place of m, or the reverse."""
-MAX_CHANGED = 16
-"""Largest number of terms by which an answer and the truth differ in which a slip is looked for."""
-MAX_TERMS = 4
-"""Largest number of terms that one slip changes: m2*(l1^2 + l2^2) may be multiplied out."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +92,7 @@ def _slip(answer: Element, truth: Element) -> Slip | None:
     ring, right, wrong = truth.ring, truth.terms, answer.terms
     changed = {m: wrong.get(m, Fraction(0)) - right.get(m, Fraction(0)) for m in {*right, *wrong}}
     changed = {m: c for m, c in changed.items() if c}
-    if not changed or len(changed) > MAX_CHANGED:
+    if not changed or len(changed) > BOUNDS.changed_terms:
         return None
     missing = {m: right[m] for m, c in changed.items() if m not in wrong}
     new = {m: c for m, c in changed.items() if m not in missing}
@@ -117,7 +114,7 @@ def _rescaled(ring: PolynomialRing, shared: Terms, right: Terms) -> Slip | None:
     """Return the slip if terms have another factor, the same for all of them."""
     factors = {(right[m] + c) / right[m] for m, c in shared.items()}
     # Terms with the same sines, cosines and rates are one term for a person, however many parameters multiply it.
-    is_one = len(shared) <= MAX_TERMS or len({_state_part(ring, m) for m in shared}) == 1
+    is_one = len(shared) <= BOUNDS.slip_terms or len({_state_part(ring, m) for m in shared}) == 1
     if len(factors) != 1 or not is_one or (len(shared) > 1 and len(shared) == len(right)):
         return None
     (factor,) = factors
