@@ -15,14 +15,13 @@ from pathlib import Path
 from typing import TypeAlias
 
 from dhkit.errors import DhkitError
+from dhkit.grading.bounds import BOUNDS
 from dhkit.grading.isolation import Limits, Worker, is_late, start_worker
 from dhkit.grading.report import GradeReport
 from dhkit.grading.reports.json import report_of
 from dhkit.grading.sheets import Sheet
 
 GIGABYTE = 1024**3
-MAX_REPORT_BYTES = 20_000_000
-"""Longest report that is accepted from a process, bytes."""
 
 Judge: TypeAlias = Callable[[Path], GradeReport]
 """Judges a sheet; an exception that it raises becomes the report's error."""
@@ -176,8 +175,8 @@ class _Pool:
         done = []
         for key, _ in self._selector.select(max(0.0, patience)):
             is_complete = workers[key.data].read()
-            if len(workers[key.data].received) > MAX_REPORT_BYTES:
-                done.append(self._finish(key.data, f"the judge wrote more than {MAX_REPORT_BYTES / 1e6:g} MB"))
+            if len(workers[key.data].received) > BOUNDS.report_bytes:
+                done.append(self._finish(key.data, f"the judge wrote more than {BOUNDS.report_bytes / 1e6:g} MB"))
             elif is_complete:
                 done.append(self._finish(key.data))
         self._waited = time.monotonic()

@@ -11,13 +11,8 @@ from pathlib import Path
 
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.sources import SHEET_SUFFIXES
+from dhkit.grading.bounds import BOUNDS
 
-MAX_DEPTH = 8
-MAX_LISTED = 20
-"""Largest number of unread files that are listed by name."""
-MAX_SHEETS = 10_000
-MAX_FILES = 200_000
-"""Largest number of files and folders that are visited: a student may hand in a whole disk."""
 ROBOT = re.compile(rb"^[ \t]*\[\[[ \t]*joint[ \t]*\]\]", re.MULTILINE)
 ANSWER = re.compile(rb"^[ \t]*(\[[ \t]*answer|answer[ \t.]*=)", re.MULTILINE)
 PEEK_BYTES = 1_000_000
@@ -82,8 +77,8 @@ def find_sheets(paths: Sequence[Path], exclude: Collection[Path] = ()) -> list[S
             )
         for sheet in _in_folder(path, passed_over) if path.is_dir() else [Sheet(path, _student(path, stems))]:
             found.setdefault(sheet.path.absolute(), sheet)
-            if len(found) > MAX_SHEETS:
-                raise AnswerError(f"{path}: more than {MAX_SHEETS} answer sheets")
+            if len(found) > BOUNDS.sheets:
+                raise AnswerError(f"{path}: more than {BOUNDS.sheets} answer sheets")
     return list(found.values())
 
 
@@ -117,8 +112,8 @@ def _in_folder(root: Path, passed_over: Collection[Path]) -> list[Sheet]:
 
 
 def _shorten(names: Sequence[str]) -> tuple[str, ...]:
-    more = (f"{len(names) - MAX_LISTED} more",) if len(names) > MAX_LISTED else ()
-    return (*names[:MAX_LISTED], *more)
+    more = (f"{len(names) - BOUNDS.listed_files} more",) if len(names) > BOUNDS.listed_files else ()
+    return (*names[: BOUNDS.listed_files], *more)
 
 
 UNREAD = "unread"
@@ -128,8 +123,8 @@ UNREAD = "unread"
 def _visit(root: Path) -> Iterator[Sheet]:
     inside = root.resolve()
     for looked_at, path in enumerate(_walk(root, 0)):
-        if looked_at >= MAX_FILES:
-            raise AnswerError(f"{root}: more than {MAX_FILES} files; expected a folder of answer sheets")
+        if looked_at >= BOUNDS.files:
+            raise AnswerError(f"{root}: more than {BOUNDS.files} files; expected a folder of answer sheets")
         parts = path.relative_to(root).parts
         student = path.stem if len(parts) == 1 else parts[0]
         if path.is_symlink() and (fault := _fault_of_link(path, inside)):
@@ -155,7 +150,7 @@ def _walk(folder: Path, depth: int) -> Iterator[Path]:
             continue
         path = folder / entry.name
         yield path
-        if entry.is_dir(follow_symlinks=False) and depth + 1 < MAX_DEPTH:
+        if entry.is_dir(follow_symlinks=False) and depth + 1 < BOUNDS.folder_depth:
             yield from _walk(path, depth + 1)
 
 
@@ -174,8 +169,8 @@ def _fault_of_folder(path: Path, depth: int) -> str:
     """Return why a folder is not searched; empty if it is, or for a link to a folder."""
     if path.is_symlink():
         return ""
-    if depth >= MAX_DEPTH:
-        return f"nested deeper than {MAX_DEPTH} folders; not looked into"
+    if depth >= BOUNDS.folder_depth:
+        return f"nested deeper than {BOUNDS.folder_depth} folders; not looked into"
     return "" if os.access(path, os.R_OK | os.X_OK) else "a folder that cannot be read"
 
 

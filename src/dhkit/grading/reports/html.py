@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from html import escape
 
+from dhkit.grading.bounds import BOUNDS
 from dhkit.grading.marks import Mark, Marks
 from dhkit.grading.report import Entry, GradeReport, Verdict, worst_verdict
 from dhkit.grading.reports import sentences
@@ -181,6 +182,6 @@ def _badge(verdict: Verdict) -> str:
     return f'<span class="badge {kind}">{sign} {escape(verdict.value)}</span>'
 
 
-def _text(line: str, most: int = sentences.MAX_CHARACTERS) -> str:
+def _text(line: str, most: int = BOUNDS.shown_characters) -> str:
     """Return text as HTML: one printable line, in which no character begins a tag or an entity."""
     return escape(plain(line, most))

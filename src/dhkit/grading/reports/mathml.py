@@ -6,8 +6,8 @@ import html
 import re
 from xml.etree.ElementTree import Element, SubElement, fromstring, tostring
 
-MAX_CHARACTERS = 4000
-"""Longest LaTeX of an answer that is converted: nobody reads a longer equation, and converting it takes seconds."""
+from dhkit.grading.bounds import BOUNDS
+
 NAMESPACE = re.compile(r"\{.*?\}")
 ELEMENTS = re.compile(
     "math|mrow|mi|mn|mo|mtext|mspace|mfrac|msqrt|mroot|msub|msup|msubsup|munder|mover|munderover|mtable|mtr|mtd|"
@@ -33,7 +33,7 @@ def mathml(latex: str) -> str | None:
     """
     from latex2mathml.converter import convert
 
-    if not latex.strip() or len(latex) > MAX_CHARACTERS or "<" in latex or "&lt" in latex:
+    if not latex.strip() or len(latex) > BOUNDS.converted_characters or "<" in latex or "&lt" in latex:
         return None
     try:
         root = fromstring(convert(latex, display="block"))  # noqa: S314 - no "<" in it: no declarations
