@@ -17,20 +17,13 @@ from typing import TypeAlias
 from dhkit.cached_property import cached_property
 from dhkit.display import LONGEST_LINE, plain
 from dhkit.errors import ExpressionError
+from dhkit.expressions.bounds import BOUNDS
 from dhkit.expressions.budget import spend
 from dhkit.expressions.syntax import decimal_text
 
-MAX_TERMS = 2_000
-"""Largest number of terms of a sum; the longest entry of a robot file has a few dozen."""
-MAX_EXPONENT = 64
-"""Largest whole exponent; it bounds a power's expansion and digits."""
-MAX_BITS = 8_192
-"""Largest size of a coefficient in bits. Doubles need 1,100; products of 8,192 bits still take microseconds."""
 PI_DIGITS = Fraction("3.14159265358979323846264338327950288419716939937510582097494459")
 STEPS_IN_PI = 12
 """Steps of 15 degrees in pi: multiples of 15 degrees have exact cosines."""
-MAX_ATOM_LENGTH = 4_000
-"""Longest text of a function with its arguments, characters."""
 LARGEST = 10**308
 """Nearly the largest double."""
 MAX_FRACTION_PART = 16
@@ -142,12 +135,12 @@ class Expression:
         Raises
         ------
         ExpressionError
-            The text is longer than :data:`MAX_ATOM_LENGTH`; nested functions double it with each level.
+            The text is longer than ``BOUNDS.atom_characters``; nested functions double it with each level.
         """
         if atom.arguments:
             spend(len(atom.text) // 16)
-            if len(atom.text) > MAX_ATOM_LENGTH:
-                raise ExpressionError(f"a function of more than {MAX_ATOM_LENGTH} characters")
+            if len(atom.text) > BOUNDS.atom_characters:
+                raise ExpressionError(f"a function of more than {BOUNDS.atom_characters} characters")
         return cls(((((atom, 1),), Fraction(1)),))
 
     @classmethod
@@ -284,8 +277,8 @@ class Expression:
         return _expression(other) / self
 
     def __pow__(self, exponent: int) -> Expression:
-        if abs(exponent) > MAX_EXPONENT:
-            raise ExpressionError(f"an exponent beyond {MAX_EXPONENT}")
+        if abs(exponent) > BOUNDS.exponent:
+            raise ExpressionError(f"an exponent beyond {BOUNDS.exponent}")
         if exponent < 0:
             return (1 / self) ** -exponent
         result = Expression.number(1)
@@ -354,9 +347,9 @@ def _order(term: tuple[Monomial, Fraction]) -> tuple[int, str]:
 def _collected(total: Mapping[Monomial, Fraction]) -> Expression:
     spend(1 + len(total))
     terms = [term for term in total.items() if term[1]]
-    if len(terms) > MAX_TERMS:
-        raise ExpressionError(f"an expression of more than {MAX_TERMS} terms")
-    if any(c.numerator.bit_length() + c.denominator.bit_length() > MAX_BITS for _, c in terms):
+    if len(terms) > BOUNDS.terms:
+        raise ExpressionError(f"an expression of more than {BOUNDS.terms} terms")
+    if any(c.numerator.bit_length() + c.denominator.bit_length() > BOUNDS.coefficient_bits for _, c in terms):
         raise ExpressionError("a number too long to be kept exactly")
     return Expression(tuple(sorted(terms, key=_order) if len(terms) > 1 else terms))
 
@@ -369,8 +362,8 @@ def _merged(left: Monomial, right: Monomial) -> tuple[Monomial, Expression | Non
     powers = dict(left)
     for atom, exponent in right:
         powers[atom] = powers.get(atom, 0) + exponent
-    if any(abs(exponent) > MAX_EXPONENT**2 for exponent in powers.values()):
-        raise ExpressionError(f"an exponent of more than {MAX_EXPONENT**2}")
+    if any(abs(exponent) > BOUNDS.exponent**2 for exponent in powers.values()):
+        raise ExpressionError(f"an exponent of more than {BOUNDS.exponent**2}")
     factor: Expression | None = None
     for atom, exponent in list(powers.items()):
         resolved, left_over = 0, exponent
