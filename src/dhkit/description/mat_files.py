@@ -17,6 +17,7 @@ from typing import TypeAlias
 import numpy as np
 
 from dhkit.description.arrays import Array
+from dhkit.description.bounds import BOUNDS
 from dhkit.errors import DescriptionError
 
 HEADER_LENGTH, TAG_LENGTH = 128, 8
@@ -33,11 +34,6 @@ STRUCT, OBJECT, CHARACTERS, OPAQUE = 2, 3, 4, 17
 """Classes with a layout of their own; an opaque variable is an object of one of MATLAB's own classes, as timeseries."""
 FULL_MATRICES = range(6, 16)
 COMPLEX_FLAG = 0x0800
-MAX_AXES, MAX_NAME_LENGTH = 8, 63
-MAX_DEPTH = 6
-"""Largest nesting depth of structs."""
-MAX_VARIABLES = 20_000
-"""Largest number of variables of a file, fields of structs included."""
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 DAMAGE = "ends within an element, or has one of another kind; the .mat file is damaged"
 USER_BLOCK_LENGTH = 512
@@ -163,7 +159,7 @@ class _Reader:
     def _variable(self, data: bytes, name: str | None = None, depth: int = 1) -> MatVariable:
         """Return the variable of an element; a field of a struct gets its name from the struct."""
         self.count += 1
-        if depth > MAX_DEPTH or self.count > MAX_VARIABLES:
+        if depth > BOUNDS.mat_nesting or self.count > BOUNDS.mat_variables:
             raise DescriptionError("variables nested too deep, or too many")
         parts = self.elements(data)
         flags = _next(parts).data
@@ -188,7 +184,7 @@ class _Reader:
     def value(self, variable: MatVariable) -> Value:
         dimensions, *content = variable.parts
         count = len(dimensions.data) // 4
-        _require(0 < count <= MAX_AXES and len(dimensions.data) % 4 == 0)
+        _require(0 < count <= BOUNDS.mat_axes and len(dimensions.data) % 4 == 0)
         shape = struct.unpack(f"{self.order}{count}i", dimensions.data)
         _require(min(shape) >= 0)
         if variable.kind == CLASSES[STRUCT]:
@@ -217,7 +213,7 @@ class _Reader:
         """Return the fields of each struct of an array; in the file the names precede the fields of all structs."""
         _require(len(parts) >= 2 and len(parts[0].data) == 4)
         (length,) = struct.unpack(f"{self.order}i", parts[0].data)
-        _require(0 < length <= MAX_NAME_LENGTH + 1 and len(parts[1].data) % length == 0)
+        _require(0 < length <= BOUNDS.mat_name_characters + 1 and len(parts[1].data) % length == 0)
         text = parts[1].data
         names = [_name(_Element(1, text[at : at + length].split(b"\0")[0])) for at in range(0, len(text), length)]
         fields = [part for part in parts[2:] if part.kind == MATRIX]
@@ -231,7 +227,7 @@ class _Reader:
 
 
 def _name(element: _Element) -> str:
-    name = element.data[:MAX_NAME_LENGTH].decode("latin-1")
+    name = element.data[: BOUNDS.mat_name_characters].decode("latin-1")
     return name if name.isprintable() else ascii(name)[1:-1]  # messages have one line, whatever the file holds
 
 

@@ -15,20 +15,14 @@ from pathlib import Path
 from xml.parsers import expat
 
 from dhkit.description.assets import MESH_FORMATS
+from dhkit.description.bounds import BOUNDS
 from dhkit.description.files import error_reason
 from dhkit.errors import DescriptionError
 
-MAX_MESH_BYTES = 50_000_000
-"""Largest mesh file, in bytes: a million triangles of a binary STL, more than a browser shows well."""
 STL_HEADER_LENGTH, STL_FACET_LENGTH = 84, 50
 """Bytes of a binary STL before its facets (80 of text, 4 of a count), and of each facet."""
 TEXT_END_LENGTH = 4_096
 """Bytes that are read at the beginning and at the end of a text file."""
-MAX_OBJ_HEAD_LENGTH = 1_000_000
-"""Bytes at the beginning of an OBJ file in which a vertex must stand."""
-MAX_PLY_HEADER_LENGTH = 65_536
-MAX_XML_DEPTH = 64
-"""Largest nesting depth of elements in a COLLADA file; exporters write about 12 levels."""
 PLY_SIZES = {
     **dict.fromkeys(("char", "uchar", "int8", "uint8"), 1),
     **dict.fromkeys(("short", "ushort", "int16", "uint16"), 2),
@@ -60,7 +54,7 @@ class MeshFileError(DescriptionError):
         return f"{self.path}: {self.reason}"
 
 
-def check_mesh_file(path: Path, max_bytes: int = MAX_MESH_BYTES) -> MeshHeader:
+def check_mesh_file(path: Path, max_bytes: int = BOUNDS.mesh_bytes) -> MeshHeader:
     """Return a mesh file's header, or refuse a file that cannot be the mesh that its name says.
 
     Parameters
@@ -152,14 +146,14 @@ def _stl_header(path: Path, size: int) -> MeshHeader:
 
 
 def _obj_header(path: Path, _size: int) -> MeshHeader:
-    head = _bytes_at(path, 0, MAX_OBJ_HEAD_LENGTH)
+    head = _bytes_at(path, 0, BOUNDS.obj_head_bytes)
     if b"\0" in head[:TEXT_END_LENGTH] or not VERTEX_LINE.search(head):
         raise _FaultError("no OBJ: no line 'v x y z' in its first megabyte")
     return MeshHeader("obj", None)
 
 
 def _ply_header(path: Path, size: int) -> MeshHeader:
-    header, ending, _ = _bytes_at(path, 0, MAX_PLY_HEADER_LENGTH).partition(b"end_header")
+    header, ending, _ = _bytes_at(path, 0, BOUNDS.ply_header_bytes).partition(b"end_header")
     lines = [line.split() for line in header.decode("ascii", "replace").splitlines()]
     if not ending or not lines or lines[0] != ["ply"]:
         raise _FaultError("no PLY: expected 'ply', a header and 'end_header'")
@@ -209,8 +203,8 @@ def _dae_header(path: Path, size: int) -> MeshHeader:
         nonlocal depth, root
         depth += 1
         root = root or name
-        if depth > MAX_XML_DEPTH:
-            raise _FaultError(f"elements nested more than {MAX_XML_DEPTH} deep")
+        if depth > BOUNDS.collada_nesting:
+            raise _FaultError(f"elements nested more than {BOUNDS.collada_nesting} deep")
 
     def end_element(_name: str) -> None:
         nonlocal depth

@@ -21,17 +21,10 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError
 
+from dhkit.description.bounds import BOUNDS
 from dhkit.description.parameters import PARAMETER_NAME
 from dhkit.description.toml_text import Document
-from dhkit.description.validation import (
-    BODY_NAME,
-    MAX_BODIES,
-    MAX_CONFIGURATIONS,
-    MAX_JOINTS,
-    MAX_PARAMETERS,
-    MAX_SHAPES,
-    NAME,
-)
+from dhkit.description.validation import BODY_NAME, NAME
 from dhkit.errors import DescriptionError
 
 Entry: TypeAlias = int | Decimal | str
@@ -174,7 +167,7 @@ class BallForm(Form):
 class FrameForm(Form):
     """The DH frame of a link that was locked to another, in the DH frame of that one, and its number in the link."""
 
-    body: Annotated[int, Field(ge=0, le=MAX_JOINTS)] = 0
+    body: Annotated[int, Field(ge=0, le=BOUNDS.joints)] = 0
     xyz: Triple = Field(default=[0, 0, 0])
     rpy: Triple = Field(default=[0, 0, 0])
 
@@ -205,7 +198,7 @@ class ShapeForm(Form):
 Shapes = Annotated[
     list[ShapeForm],
     BeforeValidator(_list_of_tables),
-    Field(max_length=MAX_SHAPES, default=[]),
+    Field(max_length=BOUNDS.shapes, default=[]),
     _AlsoTakes(lambda several: several["items"]),
 ]
 
@@ -225,7 +218,7 @@ class JointForm(Form):
     velocity: Number | None = None
     effort: Number | None = None
     body: BodyForm | None = None
-    bodies: Annotated[list[BodyForm], Field(min_length=1, max_length=MAX_BODIES)] | None = None
+    bodies: Annotated[list[BodyForm], Field(min_length=1, max_length=BOUNDS.bodies)] | None = None
     drive: DriveForm | None = None
     shape: Shapes
     assumed: list[Literal["a", "alpha", "d", "theta", "limits", "velocity", "effort", "body", "drive", "shape"]] = (
@@ -242,7 +235,7 @@ class JointForm(Form):
 class CouplingForm(Form):
     """Inertia of a drive that two joints turn, kg m^2, kg m or kg; joints by number, from 1."""
 
-    joints: Annotated[list[Annotated[int, Field(ge=1, le=MAX_JOINTS)]], Field(min_length=2, max_length=2)]
+    joints: Annotated[list[Annotated[int, Field(ge=1, le=BOUNDS.joints)]], Field(min_length=2, max_length=2)]
     inertia: Number
 
 
@@ -271,17 +264,17 @@ class RobotForm(Form):
     source: Text = ""
     notes: Text = ""
     drawn: bool = True
-    parameters: dict[str, Number] = Field(default={}, max_length=MAX_PARAMETERS)
-    joint: list[JointForm] = Field(min_length=1, max_length=MAX_JOINTS)
+    parameters: dict[str, Number] = Field(default={}, max_length=BOUNDS.parameters)
+    joint: list[JointForm] = Field(min_length=1, max_length=BOUNDS.joints)
     coupling: Annotated[
         list[CouplingForm],
         BeforeValidator(_list_of_tables),
-        Field(max_length=MAX_JOINTS * (MAX_JOINTS - 1) // 2, default=[]),
+        Field(max_length=BOUNDS.joints * (BOUNDS.joints - 1) // 2, default=[]),
         _AlsoTakes(lambda several: several["items"]),
     ]
     base: BaseForm = Field(default_factory=lambda: BaseForm.model_validate({}))
     tool: ToolForm = Field(default_factory=lambda: ToolForm.model_validate({}))
-    configurations: dict[str, list[Number]] = Field(default={}, max_length=MAX_CONFIGURATIONS)
+    configurations: dict[str, list[Number]] = Field(default={}, max_length=BOUNDS.configurations)
 
 
 def robot_schema() -> JsonSchema:

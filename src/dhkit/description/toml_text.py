@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from decimal import Decimal, InvalidOperation
 from typing import Any, TypeAlias
 
+from dhkit.description.bounds import BOUNDS
 from dhkit.errors import DescriptionError
 
 Document: TypeAlias = dict[str, Any]
@@ -20,10 +21,6 @@ Possessive quantifiers keep this expression itself linear."""
 LINE = re.compile(r"\(at line (\d+),")
 UNQUOTED = re.compile(r"[=,\[]\s*(?!(?:true|false|inf|nan)\b)([^\s\"'\[{,#]*[A-Za-z*/][^\"',\]}#]{0,200})")
 """A value, of a key or in a list, that is neither text nor a number."""
-MAX_HINT = 500
-"""Number of characters of a line that are searched for such a value."""
-MAX_INTEGER_BITS = 2_048
-"""Largest size of a whole number, in bits: beyond the range of a double."""
 
 
 def toml_document(text: str) -> Document:
@@ -49,7 +46,7 @@ def toml_document(text: str) -> Document:
 def _unquoted(text: str, message: str) -> str:
     """Return a hint if the parser stopped in a line with an expression or a name that lacks its quotes."""
     place = LINE.search(message)
-    value = UNQUOTED.search(text.split("\n")[int(place[1]) - 1][:MAX_HINT]) if place else None
+    value = UNQUOTED.search(text.split("\n")[int(place[1]) - 1][: BOUNDS.hint_characters]) if place else None
     return f'; names and expressions are in quotes: "{value[1].strip()[:40]}"' if value else ""
 
 
@@ -79,5 +76,5 @@ def _check_numbers(value: object) -> None:
     if isinstance(value, list):
         for entry in value:
             _check_numbers(entry)
-    elif isinstance(value, int) and value.bit_length() > MAX_INTEGER_BITS:
+    elif isinstance(value, int) and value.bit_length() > BOUNDS.integer_bits:
         raise DescriptionError("a whole number beyond the range of a double")

@@ -10,6 +10,7 @@ import numpy as np
 
 from dhkit.description.assets import MESH_FORMATS, inside
 from dhkit.description.bodies import MIN_EIGENVALUE_TOLERANCE, Body, eigenvalue_tolerance
+from dhkit.description.bounds import BOUNDS
 from dhkit.description.joint_text import violated_limit_text
 from dhkit.description.mesh_files import MeshFileError, check_mesh_file
 from dhkit.description.parameters import check_parameter_name, resolved
@@ -18,21 +19,8 @@ from dhkit.description.values import Box, Drive, Geometry, Joint, Mesh, Placemen
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import Expression, substitute
 
-MAX_JOINTS = 32
-MAX_PARAMETERS = 200
-MAX_CONFIGURATIONS = 100
-MAX_SHAPES = 200
-"""Largest number of shapes of a link: a humanoid's trunk with both arms locked has 110."""
-MAX_BODIES = 16
-"""Largest number of rigid bodies of a link."""
-MAX_NUMBER = 1e12
-"""Largest absolute value of a number, SI units: products of several such numbers are finite doubles."""
-MAX_MESSAGE_LENGTH = 300
-"""Characters kept of an expression's own message, which may quote the whole expression."""
-MAX_NAME_LENGTH = 64
-"""Longest name of a robot, joint, body or configuration, in characters."""
-NAME = re.compile(rf"[A-Za-z_][A-Za-z0-9_.\-]{{0,{MAX_NAME_LENGTH - 1}}}", re.ASCII)
-BODY_NAME = re.compile(rf"[A-Za-z_][A-Za-z0-9_.\- ]{{0,{MAX_NAME_LENGTH - 1}}}", re.ASCII)
+NAME = re.compile(rf"[A-Za-z_][A-Za-z0-9_.\-]{{0,{BOUNDS.name_characters - 1}}}", re.ASCII)
+BODY_NAME = re.compile(rf"[A-Za-z_][A-Za-z0-9_.\- ]{{0,{BOUNDS.name_characters - 1}}}", re.ASCII)
 RESERVED_NAME = re.compile(r"(world|base|tool|dh\d+|link\d+)(_fixed)?")
 """Names of links and fixed joints of our URDFs: a joint of the same name would confuse Pinocchio."""
 CONTROL_CHARACTER = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
@@ -59,9 +47,9 @@ def check(description: RobotData) -> tuple[str, ...]:
         The first fault: joint, key, what was found and what was expected.
     """
     for what, count, least, most in (
-        ("joints", description.n, 1, MAX_JOINTS),
-        ("parameters", len(description.parameters), 0, MAX_PARAMETERS),
-        ("configurations", len(description.configurations), 0, MAX_CONFIGURATIONS),
+        ("joints", description.n, 1, BOUNDS.joints),
+        ("parameters", len(description.parameters), 0, BOUNDS.parameters),
+        ("configurations", len(description.configurations), 0, BOUNDS.configurations),
     ):
         if not least <= count <= most:
             raise DescriptionError(f"{count} {what}; expected {least} to {most}")
@@ -106,9 +94,9 @@ def _number(where: str, expression: Expression, values: Mapping[str, Expression]
     try:
         number = float(substitute(expression, values))
     except ExpressionError as error:
-        raise DescriptionError(f"{where}: {str(error)[:MAX_MESSAGE_LENGTH]}") from None
-    if abs(number) > MAX_NUMBER:
-        raise DescriptionError(f"{where}: {number:.3g} in SI units; expected at most {MAX_NUMBER:g}")
+        raise DescriptionError(f"{where}: {str(error)[: BOUNDS.message_characters]}") from None
+    if abs(number) > BOUNDS.number:
+        raise DescriptionError(f"{where}: {number:.3g} in SI units; expected at most {BOUNDS.number:g}")
     return number
 
 
@@ -153,8 +141,8 @@ def _check_joint(joint: Joint, where: str, value: Value) -> Iterator[str]:
 
 
 def _check_body_names(bodies: Sequence[Body], where: str) -> None:
-    if len(bodies) > MAX_BODIES:
-        raise DescriptionError(f"{where}: {len(bodies)} bodies; expected at most {MAX_BODIES}")
+    if len(bodies) > BOUNDS.bodies:
+        raise DescriptionError(f"{where}: {len(bodies)} bodies; expected at most {BOUNDS.bodies}")
     names = [body.name for body in bodies]
     for k, name in enumerate(names, start=1):
         if name and not BODY_NAME.fullmatch(name):
@@ -255,8 +243,8 @@ def check_body(body: Body, where: str, values: Mapping[str, Expression]) -> None
 
 
 def _check_shapes(shapes: tuple[Shape, ...], where: str, value: Value, description: RobotData) -> Iterator[str]:
-    if len(shapes) > MAX_SHAPES:
-        raise DescriptionError(f"{where}: {len(shapes)} shapes; expected at most {MAX_SHAPES}")
+    if len(shapes) > BOUNDS.shapes:
+        raise DescriptionError(f"{where}: {len(shapes)} shapes; expected at most {BOUNDS.shapes}")
     for shape in shapes:
         _check_placement(shape.placement, f"{where}: shape.", value)
         _check_placement(shape.frame, f"{where}: shape.frame.", value)

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from dhkit.description import Mesh
-from dhkit.description.mesh_files import MAX_MESH_BYTES, MeshFileError, MeshHeader, check_mesh_file
+from dhkit.description.bounds import BOUNDS as ROBOT_BOUNDS
+from dhkit.description.mesh_files import MeshFileError, MeshHeader, check_mesh_file
 from dhkit.errors import ModelError
 from dhkit.model.collada import collada_mesh
 from dhkit.model.polygons import triangles_of
@@ -32,7 +33,7 @@ OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTIL
 OBJ_FACE_OR_VERTEX = re.compile(rb"^[ \t]*(?:f|v)[ \t]+([^\r\n]*)", re.MULTILINE)
 
 
-def mesh_header(path: Path, max_bytes: int = MAX_MESH_BYTES) -> MeshHeader:
+def mesh_header(path: Path, max_bytes: int = ROBOT_BOUNDS.mesh_bytes) -> MeshHeader:
     """Return a mesh file's header; see :func:`dhkit.description.mesh_files.check_mesh_file`.
 
     Raises
@@ -57,7 +58,9 @@ def _byte_order_mark_hint(path: Path) -> str:
     return "; it begins with a byte order mark: save the text as ASCII, or as UTF-8 without BOM"
 
 
-def read_mesh(path: str | Path, *, max_triangles: int = MAX_TRIANGLES, max_bytes: int = MAX_MESH_BYTES) -> TriangleMesh:
+def read_mesh(
+    path: str | Path, *, max_triangles: int = MAX_TRIANGLES, max_bytes: int = ROBOT_BOUNDS.mesh_bytes
+) -> TriangleMesh:
     """Return the triangles of an STL, OBJ, PLY or COLLADA file.
 
     Coordinates are in the file's units; those of COLLADA, which states its unit and its up axis, in metres with z up.

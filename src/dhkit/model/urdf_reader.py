@@ -16,7 +16,7 @@ import numpy as np
 
 from dhkit.description import Array, Box, Capsule, Cylinder, Geometry, Mesh, Sphere, pose
 from dhkit.description.bodies import eigenvalue_tolerance
-from dhkit.description.validation import MAX_NUMBER
+from dhkit.description.bounds import BOUNDS as ROBOT_BOUNDS
 from dhkit.errors import ModelError
 from dhkit.expressions import exact
 from dhkit.model.urdf_tree import (
@@ -163,8 +163,8 @@ class _Reader:
     def _joint_origin(self, where: str, origin: Element | None) -> Array:
         T = self._origin(where, origin)
         largest = float(np.abs(T[:3, 3]).max())
-        if largest > MAX_NUMBER:
-            raise ModelError(f"{where}: <origin xyz>: found {largest:.3g} m; expected at most {MAX_NUMBER:g}")
+        if largest > ROBOT_BOUNDS.number:
+            raise ModelError(f"{where}: <origin xyz>: found {largest:.3g} m; expected at most {ROBOT_BOUNDS.number:g}")
         return T
 
     def _origin(self, where: str, origin: Element | None) -> Array:

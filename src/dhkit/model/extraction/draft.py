@@ -30,7 +30,8 @@ from dhkit.description import (
     world_to_frames,
 )
 from dhkit.description.bodies import Vector, eigenvalue_tolerance
-from dhkit.description.validation import MAX_NAME_LENGTH, RESERVED_NAME
+from dhkit.description.bounds import BOUNDS
+from dhkit.description.validation import RESERVED_NAME
 from dhkit.expressions import PI, ZERO, Expression, exact, exact_angle
 from dhkit.model.extraction.table import Table
 from dhkit.model.urdf_chain import Chain
@@ -215,7 +216,7 @@ def _joint_names(names: Sequence[str]) -> list[str]:
         stem, count = name, 1
         while name in allowed:
             count += 1
-            name = f"{stem[: MAX_NAME_LENGTH - 4]}_{count}"
+            name = f"{stem[: BOUNDS.name_characters - 4]}_{count}"
         allowed.append(name)
     return allowed
 
@@ -225,5 +226,7 @@ def allowed_name(name: str, prefix: str) -> str:
 
     A name without a letter at its beginning gets the prefix.
     """
-    plain = re.sub(r"[^A-Za-z0-9_.\-]", "_", name)[:MAX_NAME_LENGTH]
-    return plain if re.match(r"[A-Za-z_]", plain) else f"{prefix}_{plain}"[:MAX_NAME_LENGTH].rstrip("_")
+    plain = re.sub(r"[^A-Za-z0-9_.\-]", "_", name)[: BOUNDS.name_characters]
+    if re.match(r"[A-Za-z_]", plain):
+        return plain
+    return f"{prefix}_{plain}"[: BOUNDS.name_characters].rstrip("_")

@@ -11,9 +11,10 @@ import numpy as np
 
 from dhkit.description import Array, Convention, Description, Mesh, Shape
 from dhkit.description.assets import inside
+from dhkit.description.bounds import BOUNDS as ROBOT_BOUNDS
 from dhkit.description.mesh_files import check_mesh_file
 from dhkit.description.table import DHTable
-from dhkit.description.validation import MAX_JOINTS, MAX_SHAPES, SHAPE_LEFT_OUT
+from dhkit.description.validation import SHAPE_LEFT_OUT
 from dhkit.display import html_block, html_lines, html_table, repr_line
 from dhkit.errors import DhkitError, ModelError
 from dhkit.model.extraction.axes import Axes
@@ -148,8 +149,8 @@ def extracted(
     ModelError
         The chain makes no description.
     """
-    if not 1 <= len(chain.joints) <= MAX_JOINTS:
-        raise ModelError(f"{chain.path}: {len(chain.joints)} joints; expected 1 to {MAX_JOINTS}")
+    if not 1 <= len(chain.joints) <= ROBOT_BOUNDS.joints:
+        raise ModelError(f"{chain.path}: {len(chain.joints)} joints; expected 1 to {ROBOT_BOUNDS.joints}")
     notes = [*chain.notes]
     original, changes = Original(chain), chain.tree.changes
     if not changes:
@@ -188,11 +189,11 @@ def _shapes(chain: Chain, meshes: MeshFinder, notes: list[str]) -> tuple[tuple[t
     groups = []
     for group in chain.groups:
         shapes = [shape for link in group for shape in _link_shapes(chain, link, meshes, left_out, has_visuals)]
-        if len(shapes) > MAX_SHAPES:
+        if len(shapes) > ROBOT_BOUNDS.shapes:
             notes.append(
-                f"link {group[0]!r}: shape {MAX_SHAPES + 1} of {len(shapes)} and all behind it{SHAPE_LEFT_OUT}"
+                f"link {group[0]!r}: shape {ROBOT_BOUNDS.shapes + 1} of {len(shapes)} and all behind it{SHAPE_LEFT_OUT}"
             )
-        groups.append(tuple(shapes[:MAX_SHAPES]))
+        groups.append(tuple(shapes[: ROBOT_BOUNDS.shapes]))
     notes += left_out[:MAX_LISTED_MESHES]
     if len(left_out) > MAX_LISTED_MESHES:
         notes.append(f"{len(left_out) - MAX_LISTED_MESHES} more meshes, as above{SHAPE_LEFT_OUT}")
