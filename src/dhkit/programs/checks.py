@@ -12,7 +12,8 @@ from dhkit.description import Array, Robot, description_of
 from dhkit.display import listed
 from dhkit.errors import AnswerError, DhkitError
 from dhkit.execution.process import ProgramError
-from dhkit.programs.caller import LENGTH_UNITS, MAX_DETAILS, POSE_TOLERANCE, Caller
+from dhkit.programs.bounds import BOUNDS
+from dhkit.programs.caller import LENGTH_UNITS, POSE_TOLERANCE, Caller
 from dhkit.programs.inverse import score_inverse
 from dhkit.programs.program import Program
 from dhkit.programs.random_poses import random_states
@@ -189,7 +190,9 @@ def _score_controller(
     try:
         result = arm.simulate(call, motion, rate=task.rate, plant=plant)
     except DhkitError as error:
-        yield Part("follows", 0.0, most, "the run failed", (*call.failure_texts(), str(error))[:MAX_DETAILS])
+        yield Part(
+            "follows", 0.0, most, "the run failed", (*call.failure_texts(), str(error))[: BOUNDS.listed_failures]
+        )
         return
     errors = np.abs(result.q - result.reference_q)
     peak = float(errors.max())

@@ -13,7 +13,8 @@ from dhkit.description import Array
 from dhkit.display import listed
 from dhkit.execution.process import ProgramError
 from dhkit.kinematics import classify
-from dhkit.programs.caller import LENGTH_UNITS, MAX_DETAILS, POSE_TOLERANCE, Caller
+from dhkit.programs.bounds import BOUNDS
+from dhkit.programs.caller import LENGTH_UNITS, POSE_TOLERANCE, Caller
 from dhkit.programs.random_poses import poses_out_of_reach, random_states, regular_states, singular_states
 from dhkit.programs.report import Part, share_within
 from dhkit.programs.rubric import CheckRubric
@@ -22,8 +23,6 @@ SAME_SOLUTION = 1e-5
 """Largest difference of joint values, rad and m, of one solution; near singular poses they are less exact."""
 MIN_SINGULAR_POSES = 10
 """Smallest number of singular poses, or the number of samples if that is smaller."""
-MAX_JOINT_VALUE = 1e6
-"""Largest joint value of a solution, rad and m."""
 RANK_TOLERANCE = 1e-9
 """Largest singular value of a Jacobian, m, that counts as zero."""
 UNIT_POSES = 3
@@ -169,7 +168,7 @@ class PoseJudge:
 
     def details(self) -> tuple[str, ...]:
         """Return the program's errors, the most frequent first, and an example."""
-        errors = [f"{text} ({count} poses)" for text, count in self._errors.most_common(MAX_DETAILS)]
+        errors = [f"{text} ({count} poses)" for text, count in self._errors.most_common(BOUNDS.listed_failures)]
         unsolved = [f"no solution for {self._unsolved} poses that are in reach"] if self._unsolved else []
         return (*self.call.failure_texts(), *errors, *unsolved, *([self._example] if self._example else []))
 
@@ -179,9 +178,9 @@ class PoseJudge:
             rows = self.call(T, self.arm.n)
         except ProgramError:
             return None, True
-        finite = np.isfinite(rows).all(axis=1) & (np.abs(rows) < MAX_JOINT_VALUE).all(axis=1)
+        finite = np.isfinite(rows).all(axis=1) & (np.abs(rows) < BOUNDS.joint_value).all(axis=1)
         if not finite.all():
-            found = f"NaN, infinity or a value above {MAX_JOINT_VALUE:.0e} was returned"
+            found = f"NaN, infinity or a value above {BOUNDS.joint_value:.0e} was returned"
             self._errors[f"{found}; expected no row where there is no solution"] += 1
         return rows[finite], bool(finite.all())
 
