@@ -10,10 +10,10 @@ from typing import cast
 
 from dhkit.description.assets import MESH_FORMATS, inside
 from dhkit.errors import DescriptionError, ModelError
+from dhkit.model.bounds import BOUNDS
 
 LEFT_OUT = -1
 """Key of a mapping from links to parts for the parts that belong to no link."""
-MAX_FILES = 500
 MAX_LISTED_NAMES = 12
 """Largest number of names that a message lists."""
 BASE = re.compile(r"(?<![a-z])(base|pedestal|foot|fixed)(?![a-z])", re.IGNORECASE)
@@ -37,7 +37,7 @@ def mesh_file_names(folder: Path) -> tuple[str, ...]:
     Raises
     ------
     ModelError
-        No such folder, more files than :data:`MAX_FILES`, or a symbolic link to a file outside the folder.
+        No such folder, more files than ``BOUNDS.cad_files``, or a symbolic link to a file outside the folder.
     """
     try:
         if not folder.is_dir():
@@ -45,8 +45,8 @@ def mesh_file_names(folder: Path) -> tuple[str, ...]:
         names = _visible_names(folder, MESH_FORMATS)
     except OSError as error:
         raise ModelError(f"{folder}: {error.strerror or error}") from None
-    if len(names) > MAX_FILES:
-        raise ModelError(f"{folder}: {len(names)} mesh files; expected at most {MAX_FILES}")
+    if len(names) > BOUNDS.cad_files:
+        raise ModelError(f"{folder}: {len(names)} mesh files; expected at most {BOUNDS.cad_files}")
     for name in names:
         file_inside(folder, name)
     return names

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.shells import Shells
 from dhkit.model.triangle_mesh import TriangleMesh, area_vectors, component_labels, same_vertices
 
@@ -21,8 +22,6 @@ MERGE_DISTANCE = 1e-6
 """Distance, as a share of a mesh's size, below which vertices of an open mesh are merged: files round each corner."""
 MAX_CAP_AREA = 0.02
 """Largest area of the caps over all holes, as a share of the whole area: with larger holes the shape is unknown."""
-MAX_SHELLS = 400
-"""Largest number of shells that are tested for lying inside others."""
 MIN_VOLUME = 1e-13
 """Smallest enclosed volume, as a share of the mesh's size cubed; a wire of 1 m length and 1 um width has 1e-12."""
 DOUBLED = "warning: the surface lies over itself, and the material inside counts twice"
@@ -212,7 +211,7 @@ def outwards(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
     if shells.count == 1:
         is_doubled = _has_crowded_edges(mesh) and shells.doubled()
         return mesh, (*inversion, *([DOUBLED] if is_doubled else []))
-    if shells.count > MAX_SHELLS:
+    if shells.count > BOUNDS.shells:
         return mesh, (*inversion, f"{shells.count} shells: which of them lie in others was not looked at")
     # The shells around a cavity have a winding number of 1; any other shell of negative volume is inside out.
     shells.turn(shells.inside_out())

@@ -16,14 +16,11 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.errors import ModelError
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.polygons import triangles_of
 from dhkit.model.triangle_mesh import TriangleMesh, joined_meshes
 
 Element = ElementTree.Element
-MAX_PIECES = 5_000
-"""Largest number of geometries that a file's nodes may place: nodes can repeat each other without a limit."""
-MAX_NODE_DEPTH = 64
-"""Largest nesting depth of nodes, nodes that name other nodes included."""
 TO_Z_UP = {
     "X_UP": np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]),
     "Y_UP": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
@@ -41,7 +38,7 @@ def collada_mesh(content: bytes) -> TriangleMesh:
     Raises
     ------
     ModelError
-        A reference to nothing, a number that is none, or more pieces than :data:`MAX_PIECES`.
+        A reference to nothing, a number that is none, or more pieces than ``BOUNDS.collada_pieces``.
     """
     return _Document(content).mesh()
 
@@ -104,8 +101,8 @@ class _Document:
 
     def _node(self, node: Element, T: Array, depth: int) -> Iterator[TriangleMesh]:
         """Yield the geometries of a node and the nodes in it, T the pose of the node around it."""
-        if depth > MAX_NODE_DEPTH:
-            raise ModelError(f"nodes that name each other more than {MAX_NODE_DEPTH} deep")
+        if depth > BOUNDS.collada_nesting:
+            raise ModelError(f"nodes that name each other more than {BOUNDS.collada_nesting} deep")
         for element in node:
             T = T @ _transform(element)
         linear = T[:3, :3]
@@ -113,8 +110,8 @@ class _Document:
             colours = self._material_colours(instance)
             for symbol, mesh in self._geometry(self._named(instance)):
                 self.pieces += 1
-                if self.pieces > MAX_PIECES:
-                    raise ModelError(f"more than {MAX_PIECES} pieces")
+                if self.pieces > BOUNDS.collada_pieces:
+                    raise ModelError(f"more than {BOUNDS.collada_pieces} pieces")
                 placed = mesh.turned() if np.linalg.det(linear) < 0 else mesh
                 colour = colours.get(symbol)
                 face_colours = None if colour is None else np.tile(colour, (len(mesh.faces), 1))

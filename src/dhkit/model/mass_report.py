@@ -14,13 +14,11 @@ import numpy as np
 from dhkit.description.files import read_bounded
 from dhkit.display import repr_line
 from dhkit.errors import ModelError
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.cad_units import UNITS
 from dhkit.model.shape_inertia import MassProperties
 from dhkit.model.solidworks_report import REPORT, read_solidworks_report
 
-MAX_BYTES = 1_000_000
-MAX_ROWS = 200
-"""Largest number of lines of a table, and of reports in a text."""
 COLUMNS = ("link", "mass", "com_x", "com_y", "com_z", "Ixx", "Iyy", "Izz", "Ixy", "Iyz", "Ixz")
 HEADING = re.compile(r"\s*(\w+)\s*(?:\[([^\]]*)\])?\s*")
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
@@ -64,7 +62,7 @@ def read_mass_report(path: str | Path) -> tuple[ReportedMass, ...]:
         It cannot be read: one line with file, line, what was found and what was expected.
     """
     path = Path(path)
-    content = read_bounded(path, MAX_BYTES, "a report of mass properties", ModelError)
+    content = read_bounded(path, BOUNDS.report_bytes, "a report of mass properties", ModelError)
     try:
         text = content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
     except UnicodeDecodeError:
@@ -72,8 +70,8 @@ def read_mass_report(path: str | Path) -> tuple[ReportedMass, ...]:
     if path.suffix.lower() == ".csv":
         return _table_parts(path, text)
     starts = [match.start() for match in REPORT.finditer(text)] or [0]
-    if len(starts) > MAX_ROWS:
-        raise ModelError(f"{path}: {len(starts)} reports; expected at most {MAX_ROWS}")
+    if len(starts) > BOUNDS.report_rows:
+        raise ModelError(f"{path}: {len(starts)} reports; expected at most {BOUNDS.report_rows}")
     reports = []
     for start, end in zip(starts, [*starts[1:], len(text)], strict=True):
         first_line = text.count("\n", 0, start) + 1
@@ -91,8 +89,8 @@ def _table_parts(path: Path, text: str) -> tuple[ReportedMass, ...]:
             sign = match[1]
         elif line.strip() and not line.lstrip().startswith("#"):
             lines.append((f"{path}, line {number}", line))
-    if len(lines) < 2 or len(lines) > MAX_ROWS:
-        raise ModelError(f"{path}: {len(lines)} lines; expected a heading and 1 to {MAX_ROWS - 1} rows")
+    if len(lines) < 2 or len(lines) > BOUNDS.report_rows:
+        raise ModelError(f"{path}: {len(lines)} lines; expected a heading and 1 to {BOUNDS.report_rows - 1} rows")
     separator = ";" if ";" in lines[0][1] else ","
     factors: Mapping[str, float] = {}
     parts = []

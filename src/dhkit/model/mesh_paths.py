@@ -9,10 +9,8 @@ from pathlib import Path, PurePosixPath
 from xml.etree import ElementTree
 
 from dhkit.errors import ModelError
+from dhkit.model.bounds import BOUNDS
 
-MAX_PARENTS = 20
-"""Largest number of folders above a URDF that are searched for a package.xml."""
-MAX_PACKAGE_BYTES = 100_000
 SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.\-]*:")
 
 
@@ -94,10 +92,10 @@ class MeshFinder:
 def _packages_above(folder: Path) -> list[tuple[Path, str]]:
     """Return the folders at and above a folder that are packages, with their names, the nearest first."""
     packages = []
-    for parent in (folder, *folder.parents)[:MAX_PARENTS]:
+    for parent in (folder, *folder.parents)[: BOUNDS.parent_folders]:
         manifest = parent / "package.xml"
         try:
-            if not manifest.is_file() or manifest.stat().st_size > MAX_PACKAGE_BYTES:
+            if not manifest.is_file() or manifest.stat().st_size > BOUNDS.package_bytes:
                 continue
             packages.append((parent, _package_name(manifest.read_text(encoding="utf-8", errors="replace"))))
         except OSError:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.triangle_mesh import TriangleMesh, area_vectors, component_labels, unit_normals
 
 if TYPE_CHECKING:
@@ -30,8 +31,6 @@ TOUCHING_DEPTH = 1e-6
 """Depth to which touching shells may overlap, as a share of the mesh's size: files round their vertices."""
 MAX_SHARED_VOLUME = 1e-3
 """Volume that two shells may share, relative to the smaller one: round parts that fit overlap by their facets."""
-MAX_BOOLEAN_TRIANGLES = 3_000_000
-"""Largest number of triangles given to manifold3d in all; for more, the test points alone decide."""
 OBLIQUE_ROTATION = np.linalg.qr(np.array([[0.61, 0.23, 0.37], [0.17, 0.71, 0.53], [0.43, 0.31, 0.67]]))[0]
 OBLIQUE_ROTATION *= np.linalg.det(OBLIQUE_ROTATION)
 """A rotation that maps no usual direction of a machine part to z."""
@@ -106,7 +105,7 @@ class Shells:
         low, high = self._bounds
         near = np.asarray(((low[:, None] < high[None]) & (low[None] < high[:, None])).all(axis=2))
         sizes = np.diff(self._ends)
-        if int((near @ sizes).sum() - sizes.sum()) > MAX_BOOLEAN_TRIANGLES:
+        if int((near @ sizes).sum() - sizes.sum()) > BOUNDS.boolean_triangles:
             return 0.0, 0
         twice, reaching, solids = 0.0, 0, dict[int, "Manifold | None"]()
         order = np.argsort(-np.abs(self.volume), kind="stable")

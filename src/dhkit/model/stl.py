@@ -9,6 +9,7 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.errors import ModelError
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.triangle_mesh import unit_normals
 
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
@@ -20,8 +21,6 @@ DECIMAL_COMMA = re.compile(rb"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 FACET_END = re.compile(rb"\bendfacet\b", re.IGNORECASE)
 NAME_LINE = re.compile(rb"^[ \t]*(?:end)?solid\b[^\r\n]*", re.IGNORECASE | re.MULTILINE)
 """Line with the name of a solid, which may have keywords in it."""
-MAX_DIGITS = 64
-"""Longest text of a coordinate; 17 significant digits, a sign and an exponent have 24 characters."""
 
 
 def binary_corners(content: bytes) -> Array:
@@ -70,9 +69,9 @@ def coordinates(rows: Sequence[tuple[bytes, bytes, bytes]]) -> Array:
         A text that is not a number.
     """
     for text in (text for row in rows for text in row):
-        if len(text) > MAX_DIGITS or b"_" in text:
+        if len(text) > BOUNDS.coordinate_characters or b"_" in text:
             raise ValueError(f"found {text[:20].decode('ascii', 'replace')!r}, {len(text)} characters long")
-    return np.array(rows, dtype=f"S{MAX_DIGITS}").astype(np.float64).reshape(-1, 3)
+    return np.array(rows, dtype=f"S{BOUNDS.coordinate_characters}").astype(np.float64).reshape(-1, 3)
 
 
 def binary_stl(title: str, corners: Array) -> bytes:

@@ -19,6 +19,7 @@ from dhkit.description.bodies import eigenvalue_tolerance
 from dhkit.description.bounds import BOUNDS as ROBOT_BOUNDS
 from dhkit.errors import ModelError
 from dhkit.expressions import exact
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.urdf_tree import (
     AXIS_KINDS,
     ElementName,
@@ -32,16 +33,10 @@ from dhkit.model.urdf_tree import (
 )
 from dhkit.model.urdf_xml import Element, child_name, number, numbers, parse_urdf
 
-MAX_LINKS = 500
-"""Largest number of links, and of joints: thousands of fixed joints in a row crash Pinocchio."""
-MAX_SHAPES = 2_000
-"""Largest number of visual or collision elements of a link."""
 UNIT_LENGTH_TOLERANCE = 1e-6
 """Largest difference of an axis' length from 1 without a warning: other axes were hardly meant as unit vectors."""
 QUATERNION_TOLERANCE = 1e-4
 """Largest difference of a quaternion's length from 1; it is normalized."""
-MAX_SHAPE_DISTANCE = 1e6
-"""Largest size and distance of a shape, m."""
 NO_LIMIT = -1
 """Speed or effort that stands for "no limit" in files of some exporters, as 0 does."""
 OWN_PREFIX = "dhkit:"
@@ -265,8 +260,8 @@ class _Reader:
         return Inertial(mass, T[:3, 3], T[:3, :3] @ tensor @ T[:3, :3].T)
 
     def _shapes(self, name: ElementName, elements: Sequence[Element], colors: Mapping[str, str]) -> Iterator[UrdfShape]:
-        if len(elements) > MAX_SHAPES:
-            raise ModelError(f"{name} has {len(elements)} shapes; expected {MAX_SHAPES} at most")
+        if len(elements) > BOUNDS.shape_elements:
+            raise ModelError(f"{name} has {len(elements)} shapes; expected {BOUNDS.shape_elements} at most")
         for element in elements:
             T = self._origin(f"{name}: {element.tag}", element.find("origin"))
             color, material = None, element.find("material")
@@ -275,8 +270,8 @@ class _Reader:
             geometry, size = self._geometry(name, element)
             if geometry is None:
                 self._warn(name, f": {element.tag} has no geometry that dhkit knows; left out")
-            elif max(size, np.abs(T[:3, 3]).max()) > MAX_SHAPE_DISTANCE:
-                text = f": {element.tag} is larger than {MAX_SHAPE_DISTANCE:g} m or farther away; left out"
+            elif max(size, np.abs(T[:3, 3]).max()) > BOUNDS.shape_distance:
+                text = f": {element.tag} is larger than {BOUNDS.shape_distance:g} m or farther away; left out"
                 self._warn(name, text)
             else:
                 yield UrdfShape(geometry, T, color)
@@ -311,8 +306,8 @@ class _Reader:
 def _by_name(robot: Element, tag: str) -> dict[str, Element]:
     """Return a robot's links or joints by name; refuse too many, invalid names and repeated ones."""
     elements = robot.findall(tag)
-    if len(elements) > MAX_LINKS:
-        raise ModelError(f"{len(elements)} {tag}s; expected {MAX_LINKS} at most")
+    if len(elements) > BOUNDS.links:
+        raise ModelError(f"{len(elements)} {tag}s; expected {BOUNDS.links} at most")
     named: dict[str, Element] = {}
     for element in elements:
         name = element.get("name", "")

@@ -13,16 +13,10 @@ from xml.parsers import expat
 from dhkit.description.files import error_reason
 from dhkit.description.quantities import NUMBER
 from dhkit.errors import ModelError
+from dhkit.model.bounds import BOUNDS
 
 Element = ElementTree.Element
 
-MAX_BYTES = 5_000_000
-MAX_DEPTH = 64
-"""Largest nesting depth of elements."""
-MAX_ELEMENTS = 100_000
-"""Largest number of elements; a humanoid with hands has 5,000."""
-MAX_ATTRIBUTE_LENGTH = 1_000
-"""Longest attribute, in characters: a name, a path or a list of numbers."""
 RUN_XACRO = "run xacro on it first, and give its output"
 DECLARED_ENCODING = re.compile(rb"\s*<\?xml[^>]{0,100}?encoding\s*=\s*[\"']([A-Za-z0-9_.\-]{1,40})[\"']")
 REFUSED_ENCODINGS = {"idna", "punycode"}
@@ -44,11 +38,11 @@ def parse_urdf(path: Path) -> Element:
         if not stat.S_ISREG(mode):
             raise ModelError(f"{'a folder' if stat.S_ISDIR(mode) else 'not a regular file'}; expected a URDF")
         with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
+            content = file.read(BOUNDS.urdf_bytes + 1)
     except (OSError, ValueError) as error:
         raise ModelError(error_reason(error)) from None
-    if len(content) > MAX_BYTES:
-        raise ModelError(f"more than {MAX_BYTES // 1_000_000} MB; expected a URDF")
+    if len(content) > BOUNDS.urdf_bytes:
+        raise ModelError(f"more than {BOUNDS.urdf_bytes // 1_000_000} MB; expected a URDF")
     text = _decoded(content).lstrip()  # blank lines before <?xml, which other readers skip
     try:
         robot = _BoundedTree().read(text)
@@ -104,12 +98,12 @@ class _BoundedTree:
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         self._depth += 1
         self._count += 1
-        if self._depth > MAX_DEPTH:
-            raise ModelError(f"elements nested more than {MAX_DEPTH} deep")
-        if self._count > MAX_ELEMENTS:
-            raise ModelError(f"more than {MAX_ELEMENTS} elements; expected a URDF")
+        if self._depth > BOUNDS.xml_nesting:
+            raise ModelError(f"elements nested more than {BOUNDS.xml_nesting} deep")
+        if self._count > BOUNDS.xml_elements:
+            raise ModelError(f"more than {BOUNDS.xml_elements} elements; expected a URDF")
         for key, value in attributes.items():
-            if len(value) > MAX_ATTRIBUTE_LENGTH:
+            if len(value) > BOUNDS.attribute_characters:
                 raise ModelError(f"<{tag[:40]} {key[:40]}> has {len(value)} characters; expected fewer")
         self._builder.start(tag, attributes)
 

@@ -17,6 +17,7 @@ from dhkit.description.table import DHTable
 from dhkit.description.validation import SHAPE_LEFT_OUT
 from dhkit.display import html_block, html_lines, html_table, repr_line
 from dhkit.errors import DhkitError, ModelError
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.extraction.axes import Axes
 from dhkit.model.extraction.draft import UNROUNDED, Draft, Rounding, allowed_name
 from dhkit.model.extraction.residual import Original, Residual
@@ -33,8 +34,6 @@ MAX_TOOL_ROUNDING_ERROR = 5e-11
 """The same for the tool's pose, m and rotation entries."""
 MAX_LISTED_MESHES = 5
 """Largest number of omitted meshes that are named one by one."""
-MAX_NOTES_LENGTH = 20_000
-"""Characters of notes that a robot file holds."""
 SAME_ERROR = 1.5
 """Factor up to which the errors of two tables count as equal."""
 LENGTH_RESOLUTION = 1e-9
@@ -171,7 +170,7 @@ def extracted(
         lengths = np.concatenate([description.numbers.a, description.numbers.d])
         if recommendation := _smaller_as_designed(chain, convention, int(np.count_nonzero(lengths))):
             notes.append(recommendation)
-    description = replace(description, notes="\n".join(notes)[:MAX_NOTES_LENGTH])
+    description = replace(description, notes="\n".join(notes)[: BOUNDS.notes_characters])
     return Extraction(description, residual, tuple(notes), changes, decimals, turned)
 
 
