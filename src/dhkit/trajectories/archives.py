@@ -13,11 +13,10 @@ from numpy.lib import format as npy
 
 from dhkit.description import mat_files
 from dhkit.errors import DescriptionError
+from dhkit.trajectories.bounds import BOUNDS
 from dhkit.trajectories.labels import TEXTS, FileKind
 
 ARCHIVES = (".npz", ".mat")
-MAX_FORMAT_BYTES = 1_000
-"""Largest size of the text ``format``, bytes."""
 SAVED = "expected one that dhkit saved"
 
 
@@ -61,7 +60,7 @@ def archive_format(suffix: str, content: bytes, most: int) -> str:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             info = archive.getinfo("format.npy")
-            return str(_npy(archive.read(info), "format")) if info.file_size <= MAX_FORMAT_BYTES else ""
+            return str(_npy(archive.read(info), "format")) if info.file_size <= BOUNDS.format_bytes else ""
     except (KeyError, zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError, ValueError, DescriptionError):
         return ""
 

@@ -17,6 +17,7 @@ from dhkit.description.joint_text import degrees_hint, joint_text
 from dhkit.errors import DescriptionError
 from dhkit.symbolic import Friction
 from dhkit.trajectories.archives import ARCHIVES, archive_bytes, archive_format, read_archive
+from dhkit.trajectories.bounds import BOUNDS
 from dhkit.trajectories.labels import FileKind, checked_suffix, decoded
 from dhkit.trajectories.matlab_samples import MATRICES, matlab_table
 from dhkit.trajectories.ros_yaml import MESSAGE, POINT, ROWS, TIMES, parse_message, trajectory_text
@@ -40,8 +41,6 @@ COMMENTS_LENGTH = 2_000
 BESIDE = re.compile(r"^\s*#\s*(payload|friction)\s*:(.*)$", re.MULTILINE)
 FIRST_LINE = 200
 """Number of bytes that hold the first line of a table."""
-MAX_COEFFICIENTS = 65
-"""Largest number of coefficients of a polynomial; evaluating a motion takes time in proportion."""
 DEFAULT_RATE = 1000.0
 """Samples per second if no rate is given."""
 TURNS = 3
@@ -52,8 +51,6 @@ NANOSECONDS = 1_000_000_000
 """Nanoseconds per second."""
 LEFT_OUT: tuple[object, ...] = (None, "", [])
 """Values of a row that a message's point leaves out."""
-MAX_DIGITS = 20
-"""Largest number of digits of seconds or nanoseconds."""
 
 
 def save_trajectory(trajectory: Trajectory, path: str | Path, rate: float | None = None) -> Path:
@@ -266,9 +263,9 @@ class _FileSamples:
 def _from_archive(values: dict[str, Any], description: Description | None) -> Trajectory:
     robot = TRAJECTORY.robot_of_archive(values, description)
     breaks, coefficients = values["breaks"], values["coefficients"]
-    if coefficients.ndim > 1 and coefficients.shape[1] > MAX_COEFFICIENTS:
+    if coefficients.ndim > 1 and coefficients.shape[1] > BOUNDS.coefficients:
         found = f"polynomials of degree {coefficients.shape[1] - 1}"
-        raise ValueError(f"{found}; expected at most {MAX_COEFFICIENTS - 1}")
+        raise ValueError(f"{found}; expected at most {BOUNDS.coefficients - 1}")
     if robot.n == 1 and coefficients.ndim == 2:
         coefficients = coefficients[..., None]  # MATLAB drops a last axis of length 1
     if breaks.ndim == 2:
@@ -412,7 +409,7 @@ def _seconds(value: Any, k: int) -> float:
 
 
 def _whole(text: Any, k: int) -> int:
-    if not isinstance(text, str) or len(text) > MAX_DIGITS or not text.isascii() or not text.isdigit():
+    if not isinstance(text, str) or len(text) > BOUNDS.digits or not text.isascii() or not text.isdigit():
         raise DescriptionError(f"points[{k}].time_from_start: found {str(text)[:40]!r}; expected a whole number")
     return int(text)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dhkit.description.schema import titled_schema
-from dhkit.trajectories.files import LEFT_OUT, MAX_DIGITS
+from dhkit.trajectories.bounds import BOUNDS
+from dhkit.trajectories.files import LEFT_OUT
 from dhkit.trajectories.ros_yaml import ROWS, TIMES
 
 NUMBER = {
@@ -14,8 +15,8 @@ NUMBER = {
 WHOLE = {
     "type": ["integer", "string"],
     "minimum": 0,
-    "maximum": 10**MAX_DIGITS - 1,
-    "pattern": f"^[0-9]{{1,{MAX_DIGITS}}}$",
+    "maximum": 10**BOUNDS.digits - 1,
+    "pattern": f"^[0-9]{{1,{BOUNDS.digits}}}$",
 }
 ROW = {"type": "array", "items": NUMBER, "minItems": 1}
 ROW_OR_NONE = {"anyOf": [ROW, {"enum": [*LEFT_OUT]}]}

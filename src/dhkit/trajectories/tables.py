@@ -10,8 +10,8 @@ import numpy as np
 from dhkit.description import Array, Description
 from dhkit.description.quantities import is_plain_number
 from dhkit.errors import DescriptionError
+from dhkit.trajectories.bounds import BOUNDS
 
-MOST_COLUMNS = 1000
 TIMES = ("t", "time", "time_s", "time [s]", "t [s]", "timestamp", "tout")
 """Names of a column of times; the last is Simulink's."""
 PREFIXES = (("q", "pos", "position"), ("qd", "dq", "vel", "velocity"), ("qdd", "ddq", "acc", "acceleration"))
@@ -43,10 +43,10 @@ def read_table(text: str) -> Table:
         line = raw.strip()
         if not line or line.startswith("#"):
             continue
-        cells = [cell.strip().strip('"') for cell in line.split(",", MOST_COLUMNS)]
+        cells = [cell.strip().strip('"') for cell in line.split(",", BOUNDS.columns)]
         if names is None:
-            if len(cells) > MOST_COLUMNS:
-                raise DescriptionError(f"line {number}: more than {MOST_COLUMNS} columns")
+            if len(cells) > BOUNDS.columns:
+                raise DescriptionError(f"line {number}: more than {BOUNDS.columns} columns")
             if all(map(_is_number, cells)):
                 raise DescriptionError(NO_HEADER)
             if len(set(cells)) < len(cells):
