@@ -25,13 +25,12 @@ from dhkit.symbolic.exact.dependencies import MissingReciprocalError, independen
 from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow
 from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof, lagrangian
 from dhkit.symbolic.ring import Constant, Element, Elements, Ring, RingError, translated
+from dhkit.symbolic.ring.bounds import BOUNDS
 
 SECOND = {"XX": (0, 0), "XY": (0, 1), "XZ": (0, 2), "YY": (1, 1), "YZ": (1, 2), "ZZ": (2, 2)}
 MOMENT = {"MX": 0, "MY": 1, "MZ": 2}
 READABLE, LONGEST_DEFINITION = 30, 200
 """Number of definitions, and characters of a definition, that a notebook shows."""
-MAX_TERMS = 60_000
-"""Largest number of terms of M in all inertial parameters: three times the Jaco's, a minute in sympy's rings."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -113,9 +112,10 @@ def base_parameters(description: Description) -> BaseParameters:
     needed: tuple[Expression, ...] = ()
     for _ in range(description.n):
         full = lagrangian(description, "inertial", needed)
-        if (terms := sum(len(element) for element in full.M.flat)) > MAX_TERMS:
+        if (terms := sum(len(element) for element in full.M.flat)) > BOUNDS.inertial_terms:
             raise RingError(
-                f"{description.name}: M of {terms} terms is too long for base parameters; at most {MAX_TERMS}"
+                f"{description.name}: M of {terms} terms is too long for base parameters; "
+                f"at most {BOUNDS.inertial_terms}"
             )
         definitions = _regroup(full.arm)
         try:

@@ -15,10 +15,8 @@ import numpy as np
 
 from dhkit.symbolic.exact.exact_arm import ExactArm
 from dhkit.symbolic.ring import Element, Elements, Ring, translated
+from dhkit.symbolic.ring.bounds import BOUNDS
 from dhkit.symbolic.ring.polynomials import Monomial
-
-MAX_CHOICES = 24
-"""Largest number of choices of angles that are tried for an entry."""
 
 
 def parallel_runs(arm: ExactArm) -> list[tuple[int, ...]]:
@@ -70,7 +68,9 @@ def shortened_alike(arm: ExactArm, elements: Sequence[Element]) -> list[Element]
 def _rings_in_other_angles(ring: Ring, runs: tuple[tuple[int, ...], ...]) -> list[tuple[Ring, dict[int, Element]]]:
     """Return rings in other angles, each with the sines and cosines of the given ring's joints in its own."""
     sums = [run[a:b] for run in runs for a in range(len(run)) for b in range(a + 1, len(run) + 1)]
-    rings = [Ring(ring.kinds, ring.given, angles, sums) for angles in islice(_choices_of_angles(runs), MAX_CHOICES)]
+    rings = [
+        Ring(ring.kinds, ring.given, angles, sums) for angles in islice(_choices_of_angles(runs), BOUNDS.angle_choices)
+    ]
     return [(other, _sines_and_cosines(ring, other)) for other in rings]
 
 

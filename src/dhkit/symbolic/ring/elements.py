@@ -18,15 +18,12 @@ from dhkit.display import LONGEST_LINE, plain, repr_line
 from dhkit.errors import DhkitError
 from dhkit.expressions import Expression, exact
 from dhkit.formats import format_function
+from dhkit.symbolic.ring.bounds import BOUNDS
 from dhkit.symbolic.ring.polynomials import Monomial, Polynomials, Relation
 
 READABLE = 200
 """Longest element, in terms, that is printed without being asked for."""
-MAX_TERMS = 300_000
-"""Largest number of terms of a product: ten times the longest of the library's robots (Jaco, symbols="inertial")."""
 TOO_LONG = "too long to be derived exactly; numbers in place of symbols, or fewer joints (lock), make it shorter"
-MAX_PAIRS = 500_000
-"""Largest number of pairs of terms that one product multiplies: six times the Jaco's, some seconds in sympy's rings."""
 
 
 class RingError(DhkitError):
@@ -100,11 +97,11 @@ class Element:
         factor = self._coerced(other)
         if len(factor) == 0:
             return Element(self.ring, factor)
-        if len(self.polynomial) * len(factor) > MAX_PAIRS:
+        if len(self.polynomial) * len(factor) > BOUNDS.pairs:
             raise RingError(f"a product of {len(self.polynomial)} by {len(factor)} terms: {TOO_LONG}")
         product = Element(self.ring, self.polynomial * factor).reduced()
-        if len(product.polynomial) > MAX_TERMS:
-            raise RingError(f"an expression of {len(product.polynomial)} terms, beyond {MAX_TERMS}: {TOO_LONG}")
+        if len(product.polynomial) > BOUNDS.terms:
+            raise RingError(f"an expression of {len(product.polynomial)} terms, beyond {BOUNDS.terms}: {TOO_LONG}")
         return product
 
     __rmul__ = __mul__
