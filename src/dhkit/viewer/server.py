@@ -24,6 +24,7 @@ from tornado.netutil import bind_sockets
 from tornado.web import Application
 
 from dhkit.errors import DhkitError, ModelError
+from dhkit.viewer.bounds import BOUNDS
 from dhkit.viewer.handlers import File, Page, Refused
 from dhkit.viewer.page import page_files
 from dhkit.viewer.protocol import Samples, encode_state, stamped
@@ -41,24 +42,16 @@ BEAT_PERIOD = 2.0
 """Time between two signs of life to a page, s; the page gives the server up when three are missing."""
 PING_PERIOD = 15.0
 """Time between two pings, s: a browser that vanished without closing its connection is dropped."""
-MAX_MESSAGE = 1_000_000
-"""Largest message from a page, bytes."""
-MAX_BODY = 1_000
-"""Largest body of an HTTP request, bytes: requests of our pages have none."""
-MAX_BUFFER = 2 * MAX_MESSAGE
-"""Largest number of bytes that are read ahead of a connection."""
 IDLE_TIMEOUT = 60.0
 """Longest time that a connection may take to send a further request, s."""
 FIRST_REQUEST_TIMEOUT = 10.0
 """Longest time that a connection may take until it has shown the token, s."""
-MAX_CONNECTIONS = 150
-"""Largest number of connections at a time, those of pages included."""
 POLL_PERIOD = 0.005
 """Time between two looks at whether pages have drawn everything, s."""
 
 
 class BoundedServer(HTTPServer):
-    """A server of at most MAX_CONNECTIONS connections: each needs a descriptor, of which a process has few.
+    """A server of at most BOUNDS.connections connections: each needs a descriptor, of which a process has few.
 
     Everybody on the machine can connect. Of connections that have not shown the token, the oldest makes room for a new
     one, and each is closed after a short time: so strangers do not keep the owner out.
@@ -72,7 +65,7 @@ class BoundedServer(HTTPServer):
 
     def handle_stream(self, stream: IOStream, address: tuple[str, int]) -> None:
         """Serve a connection; of too many, close the oldest that has not shown the token, or else this one."""
-        if self._open >= MAX_CONNECTIONS:
+        if self._open >= BOUNDS.connections:
             oldest = next(iter(self._strangers), stream)
             self._close_stranger(oldest)
             if oldest is stream:
@@ -316,11 +309,14 @@ class ViewerServer:
             default_handler_args={"server": self},
             log_function=lambda handler: LOG.debug("%s %s", handler.get_status(), handler.request.method),
             websocket_ping_interval=PING_PERIOD,
-            websocket_max_message_size=MAX_MESSAGE,
+            websocket_max_message_size=BOUNDS.message_bytes,
         )
         self.sockets = bind_sockets(self._requested_port, ADDRESS)
         self._http = http = BoundedServer(
-            application, max_body_size=MAX_BODY, max_buffer_size=MAX_BUFFER, idle_connection_timeout=IDLE_TIMEOUT
+            application,
+            max_body_size=BOUNDS.body_bytes,
+            max_buffer_size=BOUNDS.buffer_bytes,
+            idle_connection_timeout=IDLE_TIMEOUT,
         )
         http.add_sockets(self.sockets)
         self.port = self.sockets[0].getsockname()[1]
