@@ -9,8 +9,8 @@ from dhkit.errors import DescriptionError
 
 MESH_FORMATS = (".stl", ".obj", ".dae", ".ply")
 
-PACKAGE = Path(__file__).resolve().parents[1]
-CHECKOUT = PACKAGE.parents[1]
+_PACKAGE = Path(__file__).resolve().parents[1]
+_CHECKOUT = _PACKAGE.parents[1]
 """Root of the repository when dhkit runs from its sources; otherwise a folder without assets of dhkit."""
 
 
@@ -23,7 +23,7 @@ def asset(name: str) -> Path:
         The package has no such file.
     """
     if name.split("/")[0] in ("urdf", "meshes") and ".." not in PurePosixPath(name).parts:
-        for root in (PACKAGE, CHECKOUT):
+        for root in (_PACKAGE, _CHECKOUT):
             if (root / name).exists():
                 return root / name
     raise DescriptionError(f"no packaged file {name!r}; there are urdf/NAME.urdf and meshes/NAME/LINK.stl")

@@ -85,13 +85,13 @@ class _AlsoTakes:
         return {"anyOf": [own, self.other(own)]}
 
 
-NUMBER = {"type": ["number", "string"]}
-ROW = {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3}
-THREE_BY_THREE = ROW | {"items": ROW}
+_NUMBER = {"type": ["number", "string"]}
+_ROW = {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3}
+_THREE_BY_THREE = _ROW | {"items": _ROW}
 Number = Annotated[
     Entry,
     PlainValidator(_entry),
-    WithJsonSchema(NUMBER | {"description": "a number in the file's units, or text in SI"}),
+    WithJsonSchema(_NUMBER | {"description": "a number in the file's units, or text in SI"}),
 ]
 Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
@@ -122,7 +122,7 @@ class InertiaForm(Form):
     xz: Number = 0
 
 
-InertiaEntry = Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _AlsoTakes(lambda _: THREE_BY_THREE)]
+_InertiaEntry = Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _AlsoTakes(lambda _: _THREE_BY_THREE)]
 
 
 class BodyForm(Form):
@@ -131,7 +131,7 @@ class BodyForm(Form):
     name: Text = ""
     mass: Number
     com: Triple = Field(default=[0, 0, 0])
-    inertia: Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _AlsoTakes(lambda _: THREE_BY_THREE)] = (
+    inertia: Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _AlsoTakes(lambda _: _THREE_BY_THREE)] = (
         InertiaForm()
     )
     unphysical: bool = False
@@ -147,7 +147,7 @@ class DriveForm(Form):
         list[Number],
         BeforeValidator(_one_or_two),
         Field(min_length=1, max_length=2),
-        _AlsoTakes(lambda _: NUMBER),
+        _AlsoTakes(lambda _: _NUMBER),
     ] = [0]
 
 
@@ -176,7 +176,7 @@ class ShapeForm(Form):
     """One of mesh, box, cylinder, capsule and sphere, placed in the link's DH frame, or in ``frame``."""
 
     mesh: Text | None = None
-    scale: Annotated[Triple, BeforeValidator(_one_or_three), _AlsoTakes(lambda _: NUMBER)] = [1, 1, 1]
+    scale: Annotated[Triple, BeforeValidator(_one_or_three), _AlsoTakes(lambda _: _NUMBER)] = [1, 1, 1]
     box: Triple | None = None
     cylinder: RoundForm | None = None
     capsule: RoundForm | None = None

@@ -29,7 +29,7 @@ LARGEST = 10**308
 MAX_FRACTION_PART = 16
 """Fractions with parts up to this are printed as fractions (l1/12), others as decimals (0.4318*l1)."""
 
-Scalar: TypeAlias = "Expression | int | Fraction"
+_Scalar: TypeAlias = "Expression | int | Fraction"
 
 
 @dataclass(frozen=True)
@@ -195,7 +195,7 @@ class Expression:
                 base = atom.value()
                 if exponent < 0 and (base == 0 or _is_rounding(atom, base)):
                     raise ExpressionError(
-                        f"{plain(self.text, SHOWN_LENGTH)} divides by zero" + (", to rounding" if base else "")
+                        f"{plain(self.text, _SHOWN_LENGTH)} divides by zero" + (", to rounding" if base else "")
                     )
                 value *= _power(base, exponent)
             total += value
@@ -205,7 +205,7 @@ class Expression:
         try:
             return float(self.value())
         except OverflowError:
-            raise ExpressionError(f"{plain(self.text, SHOWN_LENGTH)} is no finite double") from None
+            raise ExpressionError(f"{plain(self.text, _SHOWN_LENGTH)} is no finite double") from None
 
     @property
     def text(self) -> str:
@@ -238,23 +238,23 @@ class Expression:
 
     # Arithmetic
 
-    def __add__(self, other: Scalar) -> Expression:
+    def __add__(self, other: _Scalar) -> Expression:
         return Expression.sum((self, _expression(other)))
 
     def __neg__(self) -> Expression:
         return Expression(tuple((monomial, -coefficient) for monomial, coefficient in self.terms))
 
-    def __sub__(self, other: Scalar) -> Expression:
+    def __sub__(self, other: _Scalar) -> Expression:
         return self + -_expression(other)
 
-    def __rsub__(self, other: Scalar) -> Expression:
+    def __rsub__(self, other: _Scalar) -> Expression:
         return -self + other
 
-    def __mul__(self, other: Scalar) -> Expression:
+    def __mul__(self, other: _Scalar) -> Expression:
         total: dict[Monomial, Fraction] = {}
         unresolved = ZERO
         right = _expression(other).terms
-        spend(len(self.terms) * len(right) * (1 + (_bits(self.terms) + _bits(right)) // BITS_PER_WORK))
+        spend(len(self.terms) * len(right) * (1 + (_bits(self.terms) + _bits(right)) // _BITS_PER_WORK))
         for left_monomial, left in self.terms:
             for right_monomial, coefficient in right:
                 monomial, factor = _merged(left_monomial, right_monomial)
@@ -268,12 +268,12 @@ class Expression:
     __radd__ = __add__
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Scalar) -> Expression:
+    def __truediv__(self, other: _Scalar) -> Expression:
         divisor = _expression(other)
         ratio = _ratio(self, divisor)
         return self * _reciprocal(divisor) if ratio is None else Expression.number(ratio)
 
-    def __rtruediv__(self, other: Scalar) -> Expression:
+    def __rtruediv__(self, other: _Scalar) -> Expression:
         return _expression(other) / self
 
     def __pow__(self, exponent: int) -> Expression:
@@ -304,26 +304,26 @@ def _power(base: Fraction, exponent: int) -> Fraction:
 
 def _shortened(value: Fraction) -> Fraction:
     size = value.numerator.bit_length() - value.denominator.bit_length()
-    if value.numerator.bit_length() + value.denominator.bit_length() <= 2 * POWER_BITS:
+    if value.numerator.bit_length() + value.denominator.bit_length() <= 2 * _POWER_BITS:
         return value
-    scale = Fraction(2) ** (POWER_BITS - size)
+    scale = Fraction(2) ** (_POWER_BITS - size)
     return Fraction(round(value * scale)) / scale
 
 
-BITS_PER_WORK = 256
+_BITS_PER_WORK = 256
 """Size of two coefficients, bits, whose product takes as long as adding a term; a budget counts both."""
-POWER_BITS = 400
+_POWER_BITS = 400
 """Precision of powers of pi and functions, bits: 120 digits, twice those of pi."""
-SHOWN_LENGTH = 120
+_SHOWN_LENGTH = 120
 """Longest expression in a message, characters."""
-CANCELLED = Fraction(1, 10**14)
+_CANCELLED = Fraction(1, 10**14)
 """A sum of rounded values may be zero if it is below this share of its terms' sizes; each is rounded to 1e-16."""
 
 ZERO = Expression()
 PI = Expression.of_atom(Atom("pi"))
 
 
-def _expression(value: Scalar) -> Expression:
+def _expression(value: _Scalar) -> Expression:
     return value if isinstance(value, Expression) else Expression.number(value)
 
 
@@ -390,7 +390,7 @@ def _is_rounding(atom: Atom, value: Fraction) -> bool:
     if atom.name != "group":
         return False
     terms = sum(abs(Expression((term,)).value()) for term in atom.arguments[0].terms)
-    return abs(value) <= CANCELLED * terms
+    return abs(value) <= _CANCELLED * terms
 
 
 def _reciprocal(divisor: Expression) -> Expression:

@@ -24,10 +24,10 @@ from typing import NamedTuple, NoReturn, TypeAlias
 from dhkit.errors import ExpressionError
 from dhkit.expressions.bounds import BOUNDS
 
-TOKEN = re.compile(r"\s*(?:((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*/^(),]))", re.ASCII)
+_TOKEN = re.compile(r"\s*(?:((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*/^(),]))", re.ASCII)
 
 
-DECIMAL_DIGITS = 4_096
+_DECIMAL_DIGITS = 4_096
 """Precision of printed decimals: more than any coefficient of an exact expression needs."""
 
 
@@ -150,7 +150,7 @@ def decimal_text(value: Fraction) -> str | None:
             denominator //= prime
     if denominator != 1:
         return None
-    digits = Context(prec=DECIMAL_DIGITS)
+    digits = Context(prec=_DECIMAL_DIGITS)
     return str(digits.divide(Decimal(value.numerator), Decimal(value.denominator))).lower()
 
 
@@ -158,7 +158,7 @@ def _tokens(text: str) -> list[Token]:
     tokens, at = [], 0
     end = len(text.rstrip())
     while at < end:
-        match = TOKEN.match(text, at)
+        match = _TOKEN.match(text, at)
         if match is None:
             at += len(text[at:]) - len(text[at:].lstrip())
             raise ExpressionError(f"{_shown(text)}: unexpected character {text[at]!r} at position {at + 1}")
