@@ -19,7 +19,7 @@ from dhkit.model.mat_parts import mat_parts
 from dhkit.model.mesh_reader import mesh_header, read_mesh
 from dhkit.model.triangle_mesh import TriangleMesh
 
-MIN_TRIANGLES = 4
+_MIN_TRIANGLES = 4
 """Smallest number of triangles that a part may be simplified to."""
 
 log = logging.getLogger(__name__)
@@ -69,8 +69,8 @@ def cad_parts(
         See :func:`dhkit.model.cad_files.assign_parts` and :func:`dhkit.model.mesh_reader.read_mesh`; a file with too
         many triangles, judged by its header.
     """
-    if simplify is not None and simplify < MIN_TRIANGLES:
-        raise ModelError(f"simplify is {simplify}; expected the number of triangles to keep, {MIN_TRIANGLES} at least")
+    if simplify is not None and simplify < _MIN_TRIANGLES:
+        raise ModelError(f"simplify is {simplify}; expected the number of triangles to keep, {_MIN_TRIANGLES} at least")
     is_mat = folder.suffix.lower() == ".mat" and not folder.is_dir()
     mat = folder if is_mat else mat_file(folder)
     if mat is not None:

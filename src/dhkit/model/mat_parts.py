@@ -23,8 +23,8 @@ from dhkit.model.mesh_reader import check_coordinates
 from dhkit.model.polygons import triangles_of
 from dhkit.model.triangle_mesh import TriangleMesh
 
-EXPORT_ADVICE = "save it with save('robot.mat', 's1', ..., '-v7')"
-FIELD = re.compile(r"([FVC]|faces|vertices|facevertexcdata)(\d{0,3})", re.IGNORECASE)
+_EXPORT_ADVICE = "save it with save('robot.mat', 's1', ..., '-v7')"
+_FIELD = re.compile(r"([FVC]|faces|vertices|facevertexcdata)(\d{0,3})", re.IGNORECASE)
 """Names of fields: the course's, and those of MATLAB's patch and isosurface."""
 
 
@@ -38,7 +38,7 @@ def mat_parts(path: Path) -> dict[str, TriangleMesh]:
     """
     content = read_bounded(path, BOUNDS.mat_bytes, "a MAT file", ModelError)
     try:
-        variables = read_mat(content, BOUNDS.mat_unpacked_bytes, advice=EXPORT_ADVICE)
+        variables = read_mat(content, BOUNDS.mat_unpacked_bytes, advice=_EXPORT_ADVICE)
         parts: dict[str, TriangleMesh] = {}
         for name, mesh in _parts(variables):
             if name in parts:
@@ -60,7 +60,7 @@ def _parts(variables: Mapping[str, MatVariable]) -> Iterator[tuple[str, Triangle
         if not isinstance(records, tuple):
             continue
         for k, record in enumerate(records, start=1):
-            matches = [(FIELD.fullmatch(field), value) for field, value in record.items()]
+            matches = [(_FIELD.fullmatch(field), value) for field, value in record.items()]
             fields = {_field_letter(match) + match[2]: value for match, value in matches if match}
             numbers = sorted({field[1:] for field in fields}, key=lambda text: int(text or 0))
             for number in numbers:

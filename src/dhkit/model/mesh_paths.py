@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from dhkit.errors import ModelError
 from dhkit.model.bounds import BOUNDS
 
-SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.\-]*:")
+_SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.\-]*:")
 
 
 class MeshFinder:
@@ -82,7 +82,7 @@ class MeshFinder:
             if not folders:
                 raise ModelError(f"{mesh}: no package {package!r}; package_dirs names the folder it lies in")
             return folders[0] / inner
-        if SCHEME.match(name):
+        if _SCHEME.match(name):
             raise ModelError(f"{mesh}: expected package:// or a path relative to the URDF")
         if PurePosixPath(name).is_absolute():
             raise ModelError(f"{mesh} is an absolute path; expected one relative to the URDF")

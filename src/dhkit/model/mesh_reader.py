@@ -25,8 +25,8 @@ from dhkit.model.shapes import Part
 from dhkit.model.stl import ascii_corners, binary_corners, coordinates
 from dhkit.model.triangle_mesh import TriangleMesh
 
-OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
-OBJ_FACE_OR_VERTEX = re.compile(rb"^[ \t]*(?:f|v)[ \t]+([^\r\n]*)", re.MULTILINE)
+_OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+_OBJ_FACE_OR_VERTEX = re.compile(rb"^[ \t]*(?:f|v)[ \t]+([^\r\n]*)", re.MULTILINE)
 
 
 def mesh_header(path: Path, max_bytes: int = ROBOT_BOUNDS.mesh_bytes) -> MeshHeader:
@@ -151,7 +151,7 @@ def _obj_mesh(content: bytes) -> TriangleMesh:
     """Return an OBJ file's faces as triangles, in the file's units; a material file that it names is not opened."""
     content = content.replace(b"\\\n", b" ").replace(b"\\\r\n", b" ")
     try:
-        vertices = coordinates(OBJ_VERTEX.findall(content))
+        vertices = coordinates(_OBJ_VERTEX.findall(content))
         polygons = _obj_polygons(content, len(vertices))
     except ValueError as error:
         raise ModelError(f"{' '.join(str(error).split())[:80]}; expected a number") from None
@@ -164,7 +164,7 @@ def _obj_polygons(content: bytes, count: int) -> list[list[int]]:
     """Return the vertices of each face, from 0; a negative index counts back from the vertices above the face."""
     polygons: list[list[int]] = []
     vertices_above = 0
-    for line in OBJ_FACE_OR_VERTEX.finditer(content):
+    for line in _OBJ_FACE_OR_VERTEX.finditer(content):
         if line.group().lstrip().startswith(b"v"):
             vertices_above += 1
             continue

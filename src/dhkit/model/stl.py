@@ -12,14 +12,14 @@ from dhkit.errors import ModelError
 from dhkit.model.bounds import BOUNDS
 from dhkit.model.triangle_mesh import unit_normals
 
-FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
-HEADER_LENGTH = 84
-NORMAL_DECIMALS = 6
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
+_HEADER_LENGTH = 84
+_NORMAL_DECIMALS = 6
 """Decimals of the normals that are written: sines of different machines agree to far more."""
-VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
-DECIMAL_COMMA = re.compile(rb"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
-FACET_END = re.compile(rb"\bendfacet\b", re.IGNORECASE)
-NAME_LINE = re.compile(rb"^[ \t]*(?:end)?solid\b[^\r\n]*", re.IGNORECASE | re.MULTILINE)
+_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
+_DECIMAL_COMMA = re.compile(rb"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
+_FACET_END = re.compile(rb"\bendfacet\b", re.IGNORECASE)
+_NAME_LINE = re.compile(rb"^[ \t]*(?:end)?solid\b[^\r\n]*", re.IGNORECASE | re.MULTILINE)
 """Line with the name of a solid, which may have keywords in it."""
 
 
@@ -31,9 +31,9 @@ def binary_corners(content: bytes) -> Array:
     ModelError
         No whole number of facets.
     """
-    if len(content) < HEADER_LENGTH or (len(content) - HEADER_LENGTH) % FACET.itemsize:
-        raise ModelError(f"{len(content)} bytes; expected a header of {HEADER_LENGTH} and facets of {FACET.itemsize}")
-    return np.frombuffer(content, dtype=FACET, offset=HEADER_LENGTH)["corners"].astype(np.float64)
+    if len(content) < _HEADER_LENGTH or (len(content) - _HEADER_LENGTH) % _FACET.itemsize:
+        raise ModelError(f"{len(content)} bytes; expected a header of {_HEADER_LENGTH} and facets of {_FACET.itemsize}")
+    return np.frombuffer(content, dtype=_FACET, offset=_HEADER_LENGTH)["corners"].astype(np.float64)
 
 
 def ascii_corners(content: bytes) -> Array:
@@ -44,15 +44,15 @@ def ascii_corners(content: bytes) -> Array:
     ModelError
         A facet without three vertices, or a coordinate that is no number.
     """
-    content = NAME_LINE.sub(b"", content)
-    vertices = VERTEX.findall(content)
-    facets = len(FACET_END.findall(content))
+    content = _NAME_LINE.sub(b"", content)
+    vertices = _VERTEX.findall(content)
+    facets = len(_FACET_END.findall(content))
     if len(vertices) != 3 * facets:
         raise ModelError(f"{facets} facets with {len(vertices)} vertices; expected 3 each")
     try:
         numbers = coordinates(vertices)
     except ValueError as error:
-        if comma := next((text for row in vertices for text in row if DECIMAL_COMMA.fullmatch(text)), None):
+        if comma := next((text for row in vertices for text in row if _DECIMAL_COMMA.fullmatch(text)), None):
             raise ModelError(
                 f"found {comma[:20].decode()!r}: decimal commas are not read; export 1.5 for 1,5"
             ) from None
@@ -79,8 +79,8 @@ def binary_stl(title: str, corners: Array) -> bytes:
 
     The normal of a triangle without area is 0.
     """
-    facets = np.zeros(len(corners), dtype=FACET)
-    facets["normal"] = np.round(unit_normals(corners), NORMAL_DECIMALS) + 0.0
+    facets = np.zeros(len(corners), dtype=_FACET)
+    facets["normal"] = np.round(unit_normals(corners), _NORMAL_DECIMALS) + 0.0
     facets["corners"] = corners
     # The title must be ASCII and must not begin with "solid": many readers would take the file for a text.
     header = title.encode("ascii", "replace")[:80].ljust(80, b"\0")

@@ -28,9 +28,9 @@ JointNames: TypeAlias = tuple[str, ...]
 
 BASE_FRAME, TIP_FRAME = "dhkit:base", "dhkit:tip"
 """Links that are added for Pinocchio: links and joints of a URDF may share a name, these names are unique."""
-CONVENTIONAL_TIPS = ("tool", "tool0")
+_CONVENTIONAL_TIPS = ("tool", "tool0")
 """Names of tool frames: dhkit's own, and that of ROS-Industrial's robots (REP 199)."""
-UNLIMITED = 1e3
+_UNLIMITED = 1e3
 """rad or m: limits of joints that a URDF leaves unlimited, since Pinocchio requires numbers."""
 
 
@@ -193,7 +193,7 @@ def tool_frame(leaves: Sequence[str]) -> str | None:
     """Return the tool among several frames behind the same joint: the only one, or the one of a conventional name."""
     if len(leaves) == 1:
         return leaves[0]
-    return next((name for name in CONVENTIONAL_TIPS if name in leaves), None)
+    return next((name for name in _CONVENTIONAL_TIPS if name in leaves), None)
 
 
 def only_tip(tree: UrdfTree, base: str) -> str | None:
@@ -205,7 +205,7 @@ def only_tip(tree: UrdfTree, base: str) -> str | None:
     longest = max(tips, key=len, default=())
     tip = tool_frame(tips[longest]) if tips else None
     chains = {*tips, *_mimic_chains(tree, base)}
-    if len(chains) > 1 and (tip not in CONVENTIONAL_TIPS or any(longest[: len(chain)] != chain for chain in chains)):
+    if len(chains) > 1 and (tip not in _CONVENTIONAL_TIPS or any(longest[: len(chain)] != chain for chain in chains)):
         return None
     return tip
 
@@ -457,8 +457,8 @@ def _make_movable(joint: Element, axis: Array) -> None:
     if joint.get("type") == JointKind.CONTINUOUS:
         joint.set("type", JointKind.REVOLUTE)
     _remove_all(joint, "limit", "safety_controller", "calibration")
-    limits = dict.fromkeys(("upper", "effort", "velocity"), f"{UNLIMITED}")
-    ElementTree.SubElement(joint, "limit", {"lower": f"{-UNLIMITED}"} | limits)
+    limits = dict.fromkeys(("upper", "effort", "velocity"), f"{_UNLIMITED}")
+    ElementTree.SubElement(joint, "limit", {"lower": f"{-_UNLIMITED}"} | limits)
 
 
 def _shortened(names: Collection[str], max_length: int) -> str:

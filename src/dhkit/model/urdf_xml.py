@@ -17,9 +17,9 @@ from dhkit.model.bounds import BOUNDS
 
 Element = ElementTree.Element
 
-RUN_XACRO = "run xacro on it first, and give its output"
-DECLARED_ENCODING = re.compile(rb"\s*<\?xml[^>]{0,100}?encoding\s*=\s*[\"']([A-Za-z0-9_.\-]{1,40})[\"']")
-REFUSED_ENCODINGS = {"idna", "punycode"}
+_RUN_XACRO = "run xacro on it first, and give its output"
+_DECLARED_ENCODING = re.compile(rb"\s*<\?xml[^>]{0,100}?encoding\s*=\s*[\"']([A-Za-z0-9_.\-]{1,40})[\"']")
+_REFUSED_ENCODINGS = {"idna", "punycode"}
 """Encodings of names, not of texts: long ones take quadratic time."""
 
 
@@ -47,10 +47,10 @@ def parse_urdf(path: Path) -> Element:
     try:
         robot = _BoundedTree().read(text)
     except expat.ExpatError as error:
-        hint = f"; {RUN_XACRO}" if "xacro:" in text else ""
+        hint = f"; {_RUN_XACRO}" if "xacro:" in text else ""
         raise ModelError(f"not well-formed XML: {error}{hint}") from None
     if any(element.tag.startswith("xacro:") for element in robot.iter()):
-        raise ModelError(f"has elements of xacro; {RUN_XACRO}")
+        raise ModelError(f"has elements of xacro; {_RUN_XACRO}")
     if robot.tag != "robot":
         raise ModelError(f"found <{robot.tag[:40]}>; expected <robot>")
     return robot
@@ -59,9 +59,9 @@ def parse_urdf(path: Path) -> Element:
 def _decoded(content: bytes) -> str:
     """Return the text of an XML file: by its byte order mark, as UTF-8, or in the encoding that it declares."""
     begins = {codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16", b"<\0": "utf-16-le", b"\0<": "utf-16-be"}
-    declared = DECLARED_ENCODING.match(content)
+    declared = _DECLARED_ENCODING.match(content)
     encodings = [name for begin, name in begins.items() if content.startswith(begin)] or ["utf-8-sig"]
-    if declared and declared[1].decode().lower() not in REFUSED_ENCODINGS:
+    if declared and declared[1].decode().lower() not in _REFUSED_ENCODINGS:
         encodings.append(declared[1].decode())
     for encoding in encodings:
         try:
