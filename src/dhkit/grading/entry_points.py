@@ -23,7 +23,7 @@ from dhkit.grading.sheet_judge import judge_sheet
 
 MAX_PREPARED_JOINTS = 4
 """Largest arm whose mistakes are all derived ahead; for larger arms that takes longer than most sheets need."""
-IDENTITY = [["1" if i == j else "0" for j in range(4)] for i in range(4)]
+_IDENTITY = [["1" if i == j else "0" for j in range(4)] for i in range(4)]
 
 
 def grade(
@@ -207,7 +207,7 @@ def prepare(description: Description | None, report: GradeReport | None = None) 
         derived.
     """
     if report is None:
-        judge_sheet(description or library_robot("planar2r"), sheet_of({"answer": {"A1": IDENTITY}}))
+        judge_sheet(description or library_robot("planar2r"), sheet_of({"answer": {"A1": _IDENTITY}}))
         import mpmath  # noqa: F401
         import scipy.optimize  # noqa: F401
 

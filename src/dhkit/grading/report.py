@@ -15,7 +15,7 @@ from dhkit.grading.remarks import Note
 
 NO_STEP = "no step finds"
 """How the statement of an entry begins that stands for a joint without a step."""
-MAX_ENTRIES_NAMED = 6
+_MAX_ENTRIES_NAMED = 6
 """Entries that a message names; of more, the rest is counted."""
 
 
@@ -177,9 +177,9 @@ class Diagnosis:
     @property
     def place(self) -> str:
         """The entries in a few words, for messages."""
-        if len(self.entries) > MAX_ENTRIES_NAMED:
-            named = ", ".join(self.entries[: MAX_ENTRIES_NAMED - 1])
-            return f"{named} and {len(self.entries) - MAX_ENTRIES_NAMED + 1} more"
+        if len(self.entries) > _MAX_ENTRIES_NAMED:
+            named = ", ".join(self.entries[: _MAX_ENTRIES_NAMED - 1])
+            return f"{named} and {len(self.entries) - _MAX_ENTRIES_NAMED + 1} more"
         return ", ".join(self.entries) or self.where
 
     def __repr__(self) -> str:

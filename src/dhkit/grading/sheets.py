@@ -13,9 +13,9 @@ from dhkit.errors import AnswerError
 from dhkit.grading.answers.sources import SHEET_SUFFIXES
 from dhkit.grading.bounds import BOUNDS
 
-ROBOT = re.compile(rb"^[ \t]*\[\[[ \t]*joint[ \t]*\]\]", re.MULTILINE)
-ANSWER = re.compile(rb"^[ \t]*(\[[ \t]*answer|answer[ \t.]*=)", re.MULTILINE)
-PEEK_BYTES = 1_000_000
+_ROBOT = re.compile(rb"^[ \t]*\[\[[ \t]*joint[ \t]*\]\]", re.MULTILINE)
+_ANSWER = re.compile(rb"^[ \t]*(\[[ \t]*answer|answer[ \t.]*=)", re.MULTILINE)
+_PEEK_BYTES = 1_000_000
 """Length of the beginning of a file by which robot files are recognized, bytes."""
 
 
@@ -94,7 +94,7 @@ def _in_folder(root: Path, passed_over: Collection[Path]) -> list[Sheet]:
     for sheet in _visit(root):
         if not sheet.error and sheet.path.resolve() in passed_over:
             continue
-        if sheet.error == UNREAD:
+        if sheet.error == _UNREAD:
             unread.setdefault(sheet.student, []).append(sheet.path)
         else:
             sheets.setdefault(sheet.student, []).append(sheet)
@@ -116,7 +116,7 @@ def _shorten(names: Sequence[str]) -> tuple[str, ...]:
     return (*names[: BOUNDS.listed_files], *more)
 
 
-UNREAD = "unread"
+_UNREAD = "unread"
 """Marks, in :func:`_visit`, a file with another suffix; it is replaced by a message for the student."""
 
 
@@ -134,7 +134,7 @@ def _visit(root: Path) -> Iterator[Sheet]:
                 yield Sheet(path, student, fault)
         elif path.suffix.lower() not in SHEET_SUFFIXES or _is_robot(path):
             if len(parts) > 1 or path.suffix.lower() not in SHEET_SUFFIXES:
-                yield Sheet(path, student, UNREAD)
+                yield Sheet(path, student, _UNREAD)
         else:
             yield Sheet(path, student, "" if path.is_file() else "not a regular file")
 
@@ -180,7 +180,7 @@ def _is_robot(path: Path) -> bool:
         return False
     try:
         with path.open("rb") as file:
-            start = file.read(PEEK_BYTES)
+            start = file.read(_PEEK_BYTES)
     except OSError:
         return False
-    return bool(ROBOT.search(start)) and not ANSWER.search(start)
+    return bool(_ROBOT.search(start)) and not _ANSWER.search(start)

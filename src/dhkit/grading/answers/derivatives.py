@@ -10,7 +10,7 @@ from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tr
 from dhkit.expressions.trees import node_count
 from dhkit.grading.answers.bounds import BOUNDS
 
-VARIABLE = re.compile(r"(q|qd|qdd)(\d+)")
+_VARIABLE = re.compile(r"(q|qd|qdd)(\d+)")
 
 
 def number(value: int, at: int) -> Number:
@@ -51,7 +51,7 @@ def _derivative(tree: Tree) -> Tree | None:
         case Number():
             return None
         case Name(text, at):
-            match = VARIABLE.fullmatch(text)
+            match = _VARIABLE.fullmatch(text)
             if match and match[1] == "qdd":
                 raise AnswerError(f"a time derivative of an acceleration, {text}")
             return Name(f"{match[1]}d{match[2]}", at) if match else None

@@ -33,13 +33,13 @@ LEFT_EMPTY = "left empty"
 """Error of an entry that was not handed in."""
 
 
-KINETIC = frozenset(("T", "Ek", "Ec", "Ekin"))
+_KINETIC = frozenset(("T", "Ek", "Ec", "Ekin"))
 """Other names of the kinetic energy; T is a quantity of its own too."""
 
-BRACKETED = re.compile(r"\s*(?:\w+\s*(?:\([^()]*\))?\s*=)?\s*(?:\[|⎡|\{\s*\{|\w*[Mm]atrix|\w+\.|\\begin|sym\()")
+_BRACKETED = re.compile(r"\s*(?:\w+\s*(?:\([^()]*\))?\s*=)?\s*(?:\[|⎡|\{\s*\{|\w*[Mm]atrix|\w+\.|\\begin|sym\()")
 """How the one entry of a matrix begins that stands in brackets."""
 
-SYSTEM = re.compile(
+_SYSTEM = re.compile(
     r"\\begin\s*\{(?:cases|align|aligned|alignat|split|gather|gathered|eqnarray|IEEEeqnarray|multline)\*?\}"
 )
 """Environments whose rows are statements."""
@@ -191,7 +191,7 @@ def given_quantity(
                 size = " x ".join(map(str, shape))
                 raise AnswerError(f"{name}: found {Target(name, index)}; expected {size} entries, counted from 1")
         entries = [(index, value.texts.get(index, "")) for index in places]
-    elif isinstance(value, str) and shape and (len(places) != 1 or BRACKETED.match(value)):
+    elif isinstance(value, str) and shape and (len(places) != 1 or _BRACKETED.match(value)):
         given = _from_one_text(name, _without_head(name, value), shape, vocabulary, matrix_of)
         return _mirrored(given) if name == "M" else given
     elif isinstance(value, str) and is_algebra(_without_head(name, value), vocabulary, matrix_of):
@@ -239,7 +239,7 @@ def _refused(refusal: Refusal) -> str:
 
 def _system(name: str, text: str, names: QuantityNames) -> str | Chain | Entries:
     """Return the entries that a system of equations in one text states; the text itself where it is none."""
-    if not SYSTEM.search(text):
+    if not _SYSTEM.search(text):
         return text
     entries: dict[tuple[int, ...], str | Chain | Refusal] = {}
     for statement in statements_of(text):
@@ -267,7 +267,7 @@ def _without_name(target: Target, text: str, names: QuantityNames) -> str | Chai
     AnswerError
         Several statements, or one about something else.
     """
-    if not (SYSTEM.search(text) or has_relation(text)):
+    if not (_SYSTEM.search(text) or has_relation(text)):
         return text
     statements = statements_of(text, "")
     if len(statements) != 1 or statements[0].problem:
@@ -286,7 +286,7 @@ def _without_name(target: Target, text: str, names: QuantityNames) -> str | Chai
 
 def _may_stand_for(name: str, target: Target, names: QuantityNames) -> bool:
     """Whether a name may stand in front of an entry: its own, its quantity's, or one that means nothing else."""
-    if name in KINETIC:
+    if name in _KINETIC:
         return target.quantity == "K"
     entries = names.entries(name)
     if target in entries or names.quantity(name) == target.quantity:

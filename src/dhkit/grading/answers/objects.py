@@ -22,7 +22,7 @@ from dhkit.grading.answers.vocabulary import Vocabulary
 if TYPE_CHECKING:
     from dhkit.symbolic.programs.graph import Node
 
-STATES = ("q", "qd", "qdd")
+_STATES = ("q", "qd", "qdd")
 
 
 def entries_of(value: object, n: int) -> object:
@@ -140,10 +140,10 @@ def _casadi_entries(value: Any, n: int) -> Any:
     import casadi
 
     if isinstance(value, casadi.Function):
-        if value.n_in() > len(STATES) or value.n_out() != 1:
+        if value.n_in() > len(_STATES) or value.n_out() != 1:
             raise AnswerError(f"{value.name()}: expected a function of (q), (q, qd) or (q, qd, qdd) with one result")
         try:
-            value = value(*(casadi.SX.sym(name, n) for name in STATES[: value.n_in()]))
+            value = value(*(casadi.SX.sym(name, n) for name in _STATES[: value.n_in()]))
         except RuntimeError as error:
             raise AnswerError(f"{value.name()}: {str(error).splitlines()[-1][:200]}") from None
     if isinstance(value, casadi.DM):
@@ -198,7 +198,7 @@ def _counted_from_one(names: Sequence[str]) -> list[str]:
     ]
 
 
-TREES: dict[str, Callable[..., Tree]] = {
+_TREES: dict[str, Callable[..., Tree]] = {
     "negate": lambda a: Sum(((False, a),)),
     "add": lambda a, b: Sum(((True, a), (True, b))),
     "subtract": lambda a, b: Sum(((True, a), (False, b))),
@@ -220,8 +220,8 @@ def _tree_of(node: Node, arguments: Sequence[Tree], inputs: Sequence[Tree]) -> T
         return _decimal(node.value)
     if operation == "input":
         return inputs[node.arguments[1]]
-    if operation in TREES:
-        return TREES[operation](*arguments)
+    if operation in _TREES:
+        return _TREES[operation](*arguments)
     if operation in FUNCTIONS:
         return Call(FUNCTIONS[operation], tuple(arguments), 0)
     raise AnswerError(f"CasADi's {operation} is not read")

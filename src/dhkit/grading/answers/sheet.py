@@ -69,7 +69,7 @@ JACOBIAN_ROWS = ("vx", "vy", "vz", "wx", "wy", "wz")
 QUANTITY = re.compile(r"M|C|h|g|tau|K|V|L|T|J|dh|ik|A[1-9][0-9]?")
 """Names of quantities."""
 
-PACKAGE = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,60}", re.ASCII)
+_PACKAGE = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,60}", re.ASCII)
 """Name of a package."""
 
 ALIASES = dict(D="M", G="g", KE="K", PE="V", U="V", P="V", Tau="tau", N="g", Jac="J", Lagrangian="L")
@@ -318,7 +318,7 @@ def _requirements(checker: _Checker, data: Mapping[str, object]) -> Requirements
 def _packages(checker: _Checker, data: Mapping[str, object]) -> tuple[str, ...]:
     packages = checker.texts(data.get("packages", []), "task.packages", 'a list of packages such as ["numpy", "sympy"]')
     for name in packages:
-        if not PACKAGE.fullmatch(name):
+        if not _PACKAGE.fullmatch(name):
             raise checker.error("task.packages", name, "the name of an installed package")
     return packages
 

@@ -58,16 +58,16 @@ ORDER = (
     "term_extra",
 )
 """Mistakes in the order in which they are tried."""
-POSITIONS = POSE_NAMES[:3]
-ROTATIONS = POSE_NAMES[3:]
-ARCS = ("acos", "asin", "atan")
-ROOTS = ("sqrt", "acos", "asin")
+_POSITIONS = POSE_NAMES[:3]
+_ROTATIONS = POSE_NAMES[3:]
+_ARCS = ("acos", "asin", "atan")
+_ROOTS = ("sqrt", "acos", "asin")
 """Functions that give one of two signs."""
-SAME_LENGTH = 1e-9
+_SAME_LENGTH = 1e-9
 """Share of a length by which it differs from itself by rounding."""
-MIN_MEASURE = 10
+_MIN_MEASURE = 10
 """Smallest number that is taken for degrees or millimetres; smaller ones are factors and exponents."""
-MAX_ROUNDED = 0.01
+_MAX_ROUNDED = 0.01
 """Largest share by which a number differs from a length that it is a rounded value of."""
 
 
@@ -114,7 +114,7 @@ class Lengths:
 
     def is_of_tool(self, k: int) -> bool:
         """Whether the length of ``trees[k]`` is one behind the last joint."""
-        return any(abs(self.values[k] - size) <= SAME_LENGTH * size for size in self.of_tool)
+        return any(abs(self.values[k] - size) <= _SAME_LENGTH * size for size in self.of_tool)
 
 
 def edits(
@@ -181,7 +181,7 @@ def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, di
     names = set().union(*map(names_of, trees))
     if any(f"r{i}{j}" in names for i in "123" for j in "123" if i != j):
         yield "rotation_matrix_transposed", {f"r{i}{j}": Name(f"r{j}{i}", 0) for i in "123" for j in "123"}
-    for a, b in combinations(POSITIONS, 2):
+    for a, b in combinations(_POSITIONS, 2):
         if names & {a, b}:
             yield "axis_exchanged", {a: Name(b, 0), b: Name(a, 0)}
     parts = [part for tree in trees for part in parts_of(tree) if isinstance(part, Number)]
@@ -193,23 +193,23 @@ def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, di
     for place, length in enumerate(lengths.trees[: BOUNDS.offset_lengths]):
         forgotten = "tool_length_forgotten" if lengths.is_of_tool(place) else "length_forgotten"
         for subtracted in (True, False):
-            for p in POSITIONS:
+            for p in _POSITIONS:
                 if p in names:
                     yield "offset_forgotten", {p: Sum(((True, Name(p, 0)), (not subtracted, length)))}
             for column in "123":
                 tool: dict[str, Tree] = {
                     p: Sum(((True, Name(p, 0)), (not subtracted, times(length, Name(f"r{i}{column}", 0)))))
-                    for i, p in enumerate(POSITIONS, start=1)
+                    for i, p in enumerate(_POSITIONS, start=1)
                 }
-                if names & {*POSITIONS}:
+                if names & {*_POSITIONS}:
                     yield forgotten, tool
-                if names & {*POSITIONS} and lengths.is_of_tool(place) and leaf_text(length) in names | numbers:
-                    twice = {p: times(Number(Fraction(2), "2", 0), length) for p in POSITIONS}
+                if names & {*_POSITIONS} and lengths.is_of_tool(place) and leaf_text(length) in names | numbers:
+                    twice = {p: times(Number(Fraction(2), "2", 0), length) for p in _POSITIONS}
                     yield (
                         "tool_length_added",
                         {
                             p: Sum(((True, Name(p, 0)), (not subtracted, times(twice[p], Name(f"r{i}{column}", 0)))))
-                            for i, p in enumerate(POSITIONS, start=1)
+                            for i, p in enumerate(_POSITIONS, start=1)
                         },
                     )
     for j, k in combinations("123", 2):
@@ -245,8 +245,10 @@ def with_signs_changed(tree: Tree) -> Iterator[Tree]:
     alone = Lengths((), ())
     for edit in _of_parts(tree, alone, ("elbow_sign",), lambda part: part, in_law=False):
         yield edit.tree
-    if formulas.has_call(tree, ROOTS):
-        yield formulas.with_calls_changed(tree, ROOTS, lambda call: call if formulas.is_constant(call) else minus(call))
+    if formulas.has_call(tree, _ROOTS):
+        yield formulas.with_calls_changed(
+            tree, _ROOTS, lambda call: call if formulas.is_constant(call) else minus(call)
+        )
 
 
 # Changes of a whole formula
@@ -268,12 +270,12 @@ def _of_the_whole(
         for chosen in combinations(others, count):
             for added in (False, True):
                 yield "earlier_joints_forgotten", Sum(((True, tree), *((added, Name(name, 0)) for name in chosen)))
-    for arc in ARCS:
+    for arc in _ARCS:
         yield "arc_function_forgotten", applied(arc, tree)
         yield "arc_function_forgotten", minus(applied(arc, tree))
     yield "root_forgotten", applied("sqrt", tree)
     for mistake, functions, change in (
-        ("elbow_sign", ROOTS, lambda call: call if formulas.is_constant(call) else minus(call)),
+        ("elbow_sign", _ROOTS, lambda call: call if formulas.is_constant(call) else minus(call)),
         ("atan2_arguments", ("atan2",), formulas.exchange_arguments),
     ):
         new = formulas.with_calls_changed(tree, functions, change)
@@ -288,7 +290,7 @@ def _with_triangle(
 
     beta = atan2(b sin q, a + b cos q) where q is the joint between them.
     """
-    arcs = sum(isinstance(part, Call) and part.function in ("atan2", *ARCS) for part in parts_of(tree))
+    arcs = sum(isinstance(part, Call) and part.function in ("atan2", *_ARCS) for part in parts_of(tree))
     if not is_revolute or arcs != 1:
         return
     for name in others:
@@ -301,11 +303,11 @@ def _with_triangle(
 
 # Changes of one part
 
-Rebuild = Callable[[Tree], Tree]
+_Rebuild = Callable[[Tree], Tree]
 
 
 def _of_parts(
-    tree: Tree, lengths: Lengths, mistakes: Collection[str], rebuild: Rebuild, in_law: bool
+    tree: Tree, lengths: Lengths, mistakes: Collection[str], rebuild: _Rebuild, in_law: bool
 ) -> Iterator[Edit]:
     """Yield changes of a part and of the parts in it.
 
@@ -370,22 +372,22 @@ def _of_number(number: Number, lengths: Lengths, in_law: bool) -> Iterator[tuple
     if abs(number.value) == 1:
         return
     for length, value in zip(lengths.trees[: BOUNDS.offset_lengths], lengths.values, strict=False):
-        if 0 < abs(float(number.value) - value) < MAX_ROUNDED * value:
+        if 0 < abs(float(number.value) - value) < _MAX_ROUNDED * value:
             yield "rounded_length", length
-    if number.value >= MIN_MEASURE:
+    if number.value >= _MIN_MEASURE:
         yield "degrees_for_radians", times(number, Name("deg", 0))
         yield "millimetres_for_metres", times(number, Name("mm", 0))
     yield "cosine_law_squares" if in_law else "square_forgotten", square_of(number)
 
 
 def _of_name(text: str, lengths: Lengths) -> Iterator[tuple[str, Tree]]:
-    if text in ROTATIONS:
+    if text in _ROTATIONS:
         yield "rotation_matrix_transposed", Name(f"r{text[2]}{text[1]}", 0)
-    family = next((family for family in (POSITIONS, ROTATIONS, lengths.parameters) if text in family), ())
+    family = next((family for family in (_POSITIONS, _ROTATIONS, lengths.parameters) if text in family), ())
     for other in family:
         if other != text:
             yield "term_parameter" if text in lengths.parameters else "axis_exchanged", Name(other, 0)
-    if text in POSITIONS:
+    if text in _POSITIONS:
         for length in lengths.trees[: BOUNDS.offset_lengths]:
             for added in (False, True):
                 yield "offset_forgotten", Sum(((True, Name(text, 0)), (added, length)))

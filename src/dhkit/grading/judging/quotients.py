@@ -15,12 +15,12 @@ from dhkit.expressions.trees import Algebra
 from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.symbolic.ring import Direction, Element, Ring, RingError
 
-WEIGHTED_BITS = 256
+_WEIGHTED_BITS = 256
 """Size of a coefficient, in bits, from which a pair of terms counts as more than one."""
-CHECK_INTERVAL = 64
+_CHECK_INTERVAL = 64
 """Terms of a sum after which the size of its coefficients is measured."""
-NUMBER_TOO_LONG = "a number too long to be kept exactly"
-TOO_MANY_TERMS = "it multiplies out to too many terms"
+_NUMBER_TOO_LONG = "a number too long to be kept exactly"
+_TOO_MANY_TERMS = "it multiplies out to too many terms"
 
 
 class OutsideTheRingError(Exception):
@@ -102,7 +102,7 @@ class RingReader(Algebra[Quotient]):
         try:
             return self.of(tree)
         except RingError:
-            raise OutsideTheRingError(TOO_MANY_TERMS) from None
+            raise OutsideTheRingError(_TOO_MANY_TERMS) from None
 
     def element(self, tree: Tree) -> Element | None:
         """Return a syntax tree as an element of the ring; None if it is none, or cannot be read."""
@@ -164,7 +164,7 @@ class RingReader(Algebra[Quotient]):
                 polynomials = Quotient(polynomials.numerator, one, polynomials.bits + quotient.bits)
             else:
                 fractions = signed if fractions is None else self._add_fractions(fractions, signed)
-            if k % CHECK_INTERVAL == 0 or k == len(terms):
+            if k % _CHECK_INTERVAL == 0 or k == len(terms):
                 total = self.ring.sum([polynomials.numerator, *pending])
                 polynomials = self._bound_coefficients(Quotient(total, one, polynomials.bits))
                 pending = []
@@ -222,7 +222,7 @@ class RingReader(Algebra[Quotient]):
                 Quotient(quotient.numerator, quotient.denominator, BOUNDS.coefficient_bits + 1)
             )
             if quotient.bits * power > 4 * BOUNDS.coefficient_bits:
-                raise OutsideTheRingError(NUMBER_TOO_LONG)
+                raise OutsideTheRingError(_NUMBER_TOO_LONG)
         numerator, denominator = (self._raise(part, power) for part in (quotient.numerator, quotient.denominator))
         if exponent < 0:
             self._note_divisor(quotient.numerator)
@@ -241,7 +241,7 @@ class RingReader(Algebra[Quotient]):
             return quotient
         bits = max(_bits(quotient.numerator), _bits(quotient.denominator))
         if bits > BOUNDS.coefficient_bits:
-            raise OutsideTheRingError(NUMBER_TOO_LONG)
+            raise OutsideTheRingError(_NUMBER_TOO_LONG)
         return Quotient(quotient.numerator, quotient.denominator, bits)
 
     def _raise(self, element: Element, exponent: int) -> Element:
@@ -266,12 +266,12 @@ class RingReader(Algebra[Quotient]):
         if right is self.ring.one:
             return left
         pairs = len(left) * len(right)
-        self._work += pairs + (pairs * _bits(right) // WEIGHTED_BITS if pairs > CHECK_INTERVAL else 0)
+        self._work += pairs + (pairs * _bits(right) // _WEIGHTED_BITS if pairs > _CHECK_INTERVAL else 0)
         if self._work > BOUNDS.reading_work:
-            raise OutsideTheRingError(TOO_MANY_TERMS)
+            raise OutsideTheRingError(_TOO_MANY_TERMS)
         product = left * right
         if len(product) > BOUNDS.product_terms:
-            raise OutsideTheRingError(TOO_MANY_TERMS)
+            raise OutsideTheRingError(_TOO_MANY_TERMS)
         return product
 
     def exponent(self, tree: Tree) -> int:

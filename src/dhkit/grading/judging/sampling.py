@@ -23,7 +23,7 @@ DIGITS = 50
 """Decimal digits of the arithmetic."""
 TOLERANCE, MIN_SIZE = 1e-25, 1e-3
 """Relative tolerance for taking two numbers for equal, and the smallest size that it is relative to."""
-NEAR_SIZES = {"q": 3.0, "qd": 2.0, "qdd": 2.0}
+_NEAR_SIZES = {"q": 3.0, "qd": 2.0, "qdd": 2.0}
 """Ranges of the states within one turn, in rad or m and their derivatives by time in s."""
 
 
@@ -79,7 +79,7 @@ def samples(
         names = dict(parameters)
         common = 10.0 ** rng.uniform(-3.0, 3.0)
         for i in range(arm.n):
-            for kind, near in NEAR_SIZES.items():
+            for kind, near in _NEAR_SIZES.items():
                 size = (near, common, 10.0 ** rng.uniform(-3.0, 3.0))[k % 3]
                 names[f"{kind}{i + 1}"] = mpmath.mpf(rng.uniform(-size, size))
         yield Sample(names, _generators(arm, names))

@@ -61,7 +61,7 @@ Hypothesis: TypeAlias = tuple[Choice, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class _Trial:
     """The formulas of a step, tried after each choice of a hypothesis.
 
     Attributes
@@ -234,7 +234,7 @@ class Solutions:
 
     # Formulas
 
-    def _trial(self, hypothesis: Hypothesis, step: GivenStep, in_pairs: bool = False) -> Trial:
+    def _trial(self, hypothesis: Hypothesis, step: GivenStep, in_pairs: bool = False) -> _Trial:
         values: list[list[Array]] = []
         following: list[list[Choice]] = []
         shares = np.ones((2, len(step.solutions), len(hypothesis)))
@@ -252,7 +252,7 @@ class Solutions:
                         share[k, c] = np.mean(after.rows[rows])
                 values[-1].append(x)
                 following[-1].append(after)
-        return Trial(hypothesis, values, following, shares[0], shares[1], in_pairs)
+        return _Trial(hypothesis, values, following, shares[0], shares[1], in_pairs)
 
     def _evaluated(self, tree: Tree, choice: Choice) -> Array:
         given = {f"q{j + 1}": column for j, column in enumerate(choice.q.T)}
@@ -269,7 +269,7 @@ class Solutions:
         q[:, joint] = np.where(alive.any(axis=1), x, np.nan)
         return Choice(alive, q, choice.root if root is None else root)
 
-    def _reached(self, trial: Trial) -> bool:
+    def _reached(self, trial: _Trial) -> bool:
         """Whether there are poses at which the formulas were tried."""
         return any(np.any(choice.rows & self.context.within_limits) for choice in trial.choices)
 
@@ -299,7 +299,7 @@ class Solutions:
 
     # Mistakes
 
-    def _wrong(self, trial: Trial, step: GivenStep, before: Sequence[int]) -> Part:
+    def _wrong(self, trial: _Trial, step: GivenStep, before: Sequence[int]) -> Part:
         own, inside = step.joint, self.context.within_limits
         k = int(np.argmin(np.mean(trial.right_within_limits, axis=1)))
         which = f"solution {k + 1}" if len(step.solutions) > 1 else "solution"

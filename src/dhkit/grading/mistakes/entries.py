@@ -21,7 +21,7 @@ from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.exact.compact import shortened_alike
 from dhkit.symbolic.ring import Element
 
-MAX_NAMED_TERMS = 3
+_MAX_NAMED_TERMS = 3
 """Largest number of terms of each kind that a description names."""
 
 
@@ -175,5 +175,5 @@ def compare_terms(arm: ExactArm, answer: Element, truth: Element) -> tuple[str, 
 
 
 def _few(terms: Sequence[str]) -> str:
-    more = f" and {len(terms) - MAX_NAMED_TERMS} more" if len(terms) > MAX_NAMED_TERMS else ""
-    return ", ".join(terms[:MAX_NAMED_TERMS]) + more
+    more = f" and {len(terms) - _MAX_NAMED_TERMS} more" if len(terms) > _MAX_NAMED_TERMS else ""
+    return ", ".join(terms[:_MAX_NAMED_TERMS]) + more

@@ -12,7 +12,7 @@ from dhkit.grading.reports import sentences
 from dhkit.grading.reports.mathml import mathml
 from dhkit.grading.reports.sentences import plain, points, points_of
 
-BADGES = {
+_BADGES = {
     Verdict.CORRECT: ("right", "✓"),
     Verdict.ROUNDED: ("right", "≈"),
     Verdict.SAMPLED: ("open", "∼"),
@@ -22,7 +22,7 @@ BADGES = {
     Verdict.UNREADABLE: ("unread", "!"),
 }
 """CSS class of a verdict's badge, and a sign for readers who cannot tell its colours apart."""
-POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 """Content security policy of the pages."""
 STYLE = """
 :root { color-scheme: light dark; --ink: #1b1f24; --paper: #fff; --faint: #57606a; --line: #d8dee4;
@@ -76,7 +76,7 @@ def _page(title: str, body: str) -> str:
     """Return a page around a body that is HTML already."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{_text(title, 200)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{_text(title, 200)}</h1>\n"
         f"{body}\n</body>\n</html>\n"
@@ -178,7 +178,7 @@ def _sheet_name(report: GradeReport, number: int) -> str:
 
 
 def _badge(verdict: Verdict) -> str:
-    kind, sign = BADGES[verdict]
+    kind, sign = _BADGES[verdict]
     return f'<span class="badge {kind}">{sign} {escape(verdict.value)}</span>'
 
 

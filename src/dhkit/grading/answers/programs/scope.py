@@ -37,7 +37,7 @@ from dhkit.grading.answers.rewriting import DERIVATIVES, MODULES
 from dhkit.grading.answers.tokens import word_set
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Meaning, plain_name
 
-NOT_NAMES = word_set("t T top pi e Matrix array matrix sym simplify transpose DM SX")
+_NOT_NAMES = word_set("t T top pi e Matrix array matrix sym simplify transpose DM SX")
 """Words that the reader of formulas takes for something else than a name."""
 
 
@@ -130,7 +130,7 @@ class Record:
 
     def _is_free(self, name: str, text: str) -> bool:
         plain = plain_name(name)
-        is_special = name in FUNCTION_NAMES or name in NOT_NAMES or name in MODULES or name in DERIVATIVES
+        is_special = name in FUNCTION_NAMES or name in _NOT_NAMES or name in MODULES or name in DERIVATIVES
         vocabulary = self.robot.vocabulary
         is_known = vocabulary.is_state(plain) or self.robot.is_vector(plain) or self.robot.quantities.is_parameter(name)
         is_name = re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) is not None

@@ -314,7 +314,7 @@ def _calculated(left: float | None, sign: str, right: float | None) -> float | N
         return None
 
 
-def negated(scalar: Scalar) -> Scalar:
+def _negated(scalar: Scalar) -> Scalar:
     """Return a scalar with a minus in front."""
     value = None if scalar.number is None else -scalar.number
     return Scalar(f"-{scalar.at_least(Level.PRODUCT)}", Level.SIGNED, value, scalar.uses)
@@ -464,7 +464,7 @@ def _power_of_matrix(base: Matrix, exponent: Scalar, power: str) -> Value:
 def opposite(value: Value) -> Value:
     """Return a value with a minus in front."""
     if isinstance(value, Scalar):
-        return negated(value)
+        return _negated(value)
     if isinstance(value, Matrix) and not value.is_list:
-        return value.mapped(negated)
+        return value.mapped(_negated)
     raise UnreadError("a minus in front of what is not a number or a matrix is not read")
