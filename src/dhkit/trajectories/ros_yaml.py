@@ -22,8 +22,8 @@ POINT = (*ROWS, "effort", "time_from_start")
 TIMES = (("sec", "nanosec"), ("secs", "nsecs"))
 """Keys of a duration, whole seconds and nanoseconds: of ROS 2, which is written, and of ROS 1."""
 
-PLAIN = re.compile(r"[A-Za-z][\w.-]*")
-NO_TEXT = {"true", "false", "yes", "no", "on", "off", "y", "n", "null", "nan", "inf"}
+_PLAIN = re.compile(r"[A-Za-z][\w.-]*")
+_NO_TEXT = {"true", "false", "yes", "no", "on", "off", "y", "n", "null", "nan", "inf"}
 """Plain scalars that YAML does not read as text."""
 
 
@@ -130,4 +130,4 @@ def _number(value: float) -> str:
 
 
 def _name(name: str) -> str:
-    return name if PLAIN.fullmatch(name) and name.lower() not in NO_TEXT else f"'{name}'"
+    return name if _PLAIN.fullmatch(name) and name.lower() not in _NO_TEXT else f"'{name}'"

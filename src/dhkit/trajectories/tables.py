@@ -17,7 +17,7 @@ TIMES = ("t", "time", "time_s", "time [s]", "t [s]", "timestamp", "tout")
 PREFIXES = (("q", "pos", "position"), ("qd", "dq", "vel", "velocity"), ("qdd", "ddq", "acc", "acceleration"))
 """What columns of values, rates and accelerations begin with, before a joint's number, or end with, behind its name."""
 
-NO_HEADER = "no header: the first line has numbers; expected the names of the columns in it, such as t,q1,q2"
+_NO_HEADER = "no header: the first line has numbers; expected the names of the columns in it, such as t,q1,q2"
 Table = tuple[tuple[str, ...], Array]
 """Column names, and numbers, shape (N, columns)."""
 
@@ -48,7 +48,7 @@ def read_table(text: str) -> Table:
             if len(cells) > BOUNDS.columns:
                 raise DescriptionError(f"line {number}: more than {BOUNDS.columns} columns")
             if all(map(_is_number, cells)):
-                raise DescriptionError(NO_HEADER)
+                raise DescriptionError(_NO_HEADER)
             if len(set(cells)) < len(cells):
                 raise DescriptionError(f"line {number}: a column's name stands there twice; expected different names")
             names = tuple(cells)
@@ -139,7 +139,7 @@ def select_columns(
     names |= {ours: table[0].index(place_of_name(theirs, table[0])) for ours, theirs in (columns or {}).items()}
     time = next((names[name] for name in TIMES if name in names), None)
     if time is None and all(is_plain_number(name) for name in table[0]):
-        raise DescriptionError(NO_HEADER)
+        raise DescriptionError(_NO_HEADER)
     if time is None:
         raise DescriptionError(f"no column of times: found {', '.join(table[0])[:80]}; expected t or time")
     chosen: list[Array] = []

@@ -44,7 +44,7 @@ LENGTH = struct.Struct("<I")
 MAX_SEQUENCE = 2**32
 VISIBLE_FLAG, GHOST_FLAG = 1, 2
 """Flags of a message: the frames or the tool's path are drawn; a ghost moves along."""
-WORD = 4
+_WORD = 4
 """Bytes of a float: samples begin at a multiple of them."""
 
 
@@ -212,7 +212,7 @@ class Samples:
     def encoded(self) -> bytes:
         """Return the samples as a message."""
         text = _json({"name": self.name, "columns": self.columns, "restart": self.restart})
-        text += b" " * (-len(text) % WORD)
+        text += b" " * (-len(text) % _WORD)
         return _message(MessageType.SAMPLES, LENGTH.pack(len(text)), text, self.rows)
 
 

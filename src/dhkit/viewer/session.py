@@ -8,7 +8,7 @@ from enum import IntEnum
 from dhkit.viewer.bounds import BOUNDS
 from dhkit.viewer.protocol import Samples, stamped
 
-MAX_SLOT = 1_000
+_MAX_SLOT = 1_000
 """A bound above all slots, so that messages are sent by their age after the scene."""
 
 
@@ -76,7 +76,7 @@ class Session:
         if slot == Slot.SCENE:
             for other in OF_ONE_ARM:
                 self._waiting.pop(other, None)
-        new_turn = slot if slot == Slot.SCENE else MAX_SLOT + sequence
+        new_turn = slot if slot == Slot.SCENE else _MAX_SLOT + sequence
         turn, _, waiting = self._waiting.get(slot, (new_turn, 0, None))
         if isinstance(message, Samples) and isinstance(waiting, Samples):
             message = waiting.followed_by(message)
