@@ -34,13 +34,13 @@ WAITING_FACTOR = 4.0
 
 On a busy machine a process waits for its turns, which must not change what is found; one that sleeps ends all the same.
 """
-EXIT_DELAY = 0.3
+_EXIT_DELAY = 0.3
 """Longest time from the end of a program's answers to its own end, s."""
-WATCH_PERIOD = 0.05
+_WATCH_PERIOD = 0.05
 """Time between two looks at memory and processes, s."""
-LAST_WORDS_TIME = 1.0
+_LAST_WORDS_TIME = 1.0
 """Longest time for the printed output of a program that has ended, s: children may hold it open."""
-BLOCK_BYTES = 512
+_BLOCK_BYTES = 512
 """Unit of ``st_blocks``."""
 
 
@@ -291,7 +291,7 @@ class Process:
             Failure.GARBAGE: "wrote what is no answer",
         }
         if self.failure is Failure.ENDED:
-            self._drained.wait(LAST_WORDS_TIME)  # its last words may come after the news of its end
+            self._drained.wait(_LAST_WORDS_TIME)  # its last words may come after the news of its end
         lines = self.output().strip().splitlines() if self.failure is Failure.ENDED else []
         last_line = f": {printable(lines[-1])[:200]}" if lines else ""
         return ProgramError(texts[self.failure] + last_line, self.failure)
@@ -299,7 +299,7 @@ class Process:
     def _exit_status_text(self) -> str:
         """Return the status or the signal that the program ended with, as text; empty if it still runs."""
         with suppress(subprocess.TimeoutExpired):
-            status = self._process.wait(EXIT_DELAY)
+            status = self._process.wait(_EXIT_DELAY)
             number = -status if status < 0 else status - 128  # bubblewrap tells a signal as a shell does
             if number > 0:
                 with suppress(ValueError):
@@ -338,7 +338,7 @@ class Process:
 
     def _watch(self) -> None:
         """Watch processor time, memory, number and files of the processes, and end the process beyond its limits."""
-        while not self._closed.wait(WATCH_PERIOD):
+        while not self._closed.wait(_WATCH_PERIOD):
             self._find_descendants()
             memory = 0
             for process in list(self._descendants.values()):
@@ -392,7 +392,7 @@ def _written_bytes(folder: Path, processes: Sequence[int]) -> int:
     for place, folders, names in os.walk(folder):
         for name in (*folders, *names):
             with suppress(OSError):
-                total += BLOCK_BYTES * os.lstat(os.path.join(place, name)).st_blocks  # noqa: PTH118 - many files
+                total += _BLOCK_BYTES * os.lstat(os.path.join(place, name)).st_blocks  # noqa: PTH118 - many files
     unnamed: dict[tuple[int, int], int] = {}
     for pid in processes:
         with suppress(OSError):
@@ -400,7 +400,7 @@ def _written_bytes(folder: Path, processes: Sequence[int]) -> int:
                 with suppress(OSError):
                     status = os.stat(f"/proc/{pid}/fd/{descriptor}")  # noqa: PTH116 - many files
                     if stat.S_ISREG(status.st_mode) and status.st_nlink == 0:
-                        unnamed[status.st_dev, status.st_ino] = BLOCK_BYTES * status.st_blocks
+                        unnamed[status.st_dev, status.st_ino] = _BLOCK_BYTES * status.st_blocks
     return total + sum(unnamed.values())
 
 

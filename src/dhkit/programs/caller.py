@@ -15,7 +15,7 @@ LENGTH_UNITS = {"mm": 1e3, "cm": 1e2, "inches": 1 / 0.0254}
 """Units of length that programs may use in place of metres, and how many a metre has."""
 POSE_TOLERANCE = 1e-6
 """Largest difference of poses that agree: entries of rotations, and positions as shares of the arm's reach."""
-FATAL = {Failure.LATE, Failure.MEMORY, Failure.PROCESSES, Failure.FILES, Failure.ENDED, Failure.GARBAGE}
+_FATAL = {Failure.LATE, Failure.MEMORY, Failure.PROCESSES, Failure.FILES, Failure.ENDED, Failure.GARBAGE}
 
 
 class Caller:
@@ -56,7 +56,7 @@ class Caller:
             value: Array = getattr(self.program, self.function)(*arguments)
         except ProgramError as error:
             self.failures[str(error)] += 1
-            self._fatal = self._fatal + 1 if error.failure in FATAL else 0
+            self._fatal = self._fatal + 1 if error.failure in _FATAL else 0
             raise
         self._fatal = 0
         self.seconds.append(time.perf_counter() - begin)
