@@ -71,7 +71,8 @@ class Bounds:
     statements: int = 5_000
     """Statements of a document or a program; those of a function count each time that it is applied."""
     definitions: int = 2_000
-    """Names that the answers of one file are made of, and a tenth of those of one formula: each takes about a ms."""
+    """Names that the answers of one file are made of: reading each takes about a millisecond. Definitions that are
+    looked through for one formula may be ten times as many."""
     macros: int = 300
     """Macros that a document defines."""
     blank_pieces: int = 8
