@@ -12,17 +12,17 @@ from typing import Any
 
 LONGEST_LINE = 120
 """Largest length of a repr, characters."""
-SHORTEST_NAME = 40
+_SHORTEST_NAME = 40
 """Length that a name keeps in a repr in any case, characters."""
 MOST_ROWS = 12
 """Largest number of rows of a table in a notebook."""
-LONGEST_CELL = 80
+_LONGEST_CELL = 80
 """Largest length of a cell of a table, characters."""
-MOST_LINES = 6
+_MOST_LINES = 6
 """Largest number of lines below a table."""
-LONGEST_TEXT = 200
+_LONGEST_TEXT = 200
 """Largest length of a heading and of a line below a table, characters."""
-ALIGNMENTS = {"l": "left", "r": "right"}
+_ALIGNMENTS = {"l": "left", "r": "right"}
 
 
 def plain(text: str, most: int) -> str:
@@ -64,7 +64,7 @@ def repr_line(kind: str, name: str = "", summary: str = "") -> str:
     '<Samples of puma560: 500 from 0 to 2 s>'
     """
     room = LONGEST_LINE - len(f"<{kind} of : {summary}>")
-    of = f" of {plain(name, max(room, SHORTEST_NAME))}" if name else ""
+    of = f" of {plain(name, max(room, _SHORTEST_NAME))}" if name else ""
     return f"<{plain(kind + of + (f': {summary}' if summary else ''), LONGEST_LINE - 2)}>"
 
 
@@ -89,7 +89,7 @@ def html_table(
     *,
     count: int | None = None,
     most: int = MOST_ROWS,
-    longest: int = LONGEST_CELL,
+    longest: int = _LONGEST_CELL,
 ) -> str:
     """Return a table of texts as HTML, without colours, so that it suits light and dark pages.
 
@@ -116,7 +116,7 @@ def html_table(
 
     def line(cells: Sequence[str], tag: str) -> str:
         shown = (
-            f'<{tag} style="text-align:{ALIGNMENTS[align[min(k, len(align) - 1)]]}">{_escaped(cell, longest)}</{tag}>'
+            f'<{tag} style="text-align:{_ALIGNMENTS[align[min(k, len(align) - 1)]]}">{_escaped(cell, longest)}</{tag}>'
             for k, cell in enumerate(cells)
         )
         return f"<tr>{''.join(shown)}</tr>"
@@ -127,21 +127,21 @@ def html_table(
         width = max(len(headings), max(map(len, rows), default=1))
         body.append(f'<tr><td colspan="{width}" style="text-align:left">… and {hidden} more</td></tr>')
     head = f"<thead>{line(headings, 'th')}</thead>" if headings else ""
-    title = f'<caption style="text-align:left">{_escaped(caption, LONGEST_TEXT)}</caption>' if caption else ""
+    title = f'<caption style="text-align:left">{_escaped(caption, _LONGEST_TEXT)}</caption>' if caption else ""
     return f"<table>{title}{head}<tbody>{''.join(body)}</tbody></table>"
 
 
 def html_lines(lines: Sequence[str]) -> str:
     """Return texts as an HTML list; empty without texts."""
-    shown = [_escaped(line, LONGEST_TEXT) for line in lines[:MOST_LINES]]
-    if len(lines) > MOST_LINES:
-        shown.append(f"… and {len(lines) - MOST_LINES} more")
+    shown = [_escaped(line, _LONGEST_TEXT) for line in lines[:_MOST_LINES]]
+    if len(lines) > _MOST_LINES:
+        shown.append(f"… and {len(lines) - _MOST_LINES} more")
     return f"<ul>{''.join(f'<li>{line}</li>' for line in shown)}</ul>" if shown else ""
 
 
 def html_block(heading: str, *parts: str) -> str:
     """Return HTML parts below a heading, which MathJax does not change, so that LaTeX is shown as source."""
-    head = f"<b>{_escaped(heading, LONGEST_TEXT)}</b>"
+    head = f"<b>{_escaped(heading, _LONGEST_TEXT)}</b>"
     return f'<div class="mathjax_ignore tex2jax_ignore">{head}{"".join(parts)}</div>'
 
 

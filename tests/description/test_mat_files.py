@@ -9,7 +9,8 @@ from hypothesis import given, strategies as st
 from scipy.io import savemat
 from scipy.sparse import csc_matrix
 
-from dhkit.description.mat_files import MAX_DEPTH, read_mat
+from dhkit.description.bounds import BOUNDS
+from dhkit.description.mat_files import read_mat
 from dhkit.errors import DescriptionError
 
 MOST = 1_000_000
@@ -69,7 +70,7 @@ def test_what_is_not_read_says_what_it_is(value, kind):
 
 def test_depth_is_bounded():
     value = {"x": 1.0}
-    for _ in range(MAX_DEPTH):
+    for _ in range(BOUNDS.mat_nesting):
         value = {"x": value}
     with pytest.raises(DescriptionError, match="nested too deep"):
         read_all(read(saved(s=value)).values())

@@ -13,6 +13,7 @@ import pytest
 
 from dhkit.errors import AnswerError
 from dhkit.grading.batch import GIGABYTE, grade_all
+from dhkit.grading.bounds import BOUNDS
 from dhkit.grading.isolation import Limits
 from dhkit.grading.report import Entry, GradeReport, Verdict
 from dhkit.grading.sheets import Sheet, find_sheets
@@ -363,6 +364,6 @@ def test_no_sheets_and_too_many(tmp_path, monkeypatch):
         find_sheets([tmp_path])
     for k in range(4):
         (tmp_path / f"{k}.toml").touch()
-    monkeypatch.setattr("dhkit.grading.sheets.MAX_SHEETS", 3)
+    monkeypatch.setattr("dhkit.grading.sheets.BOUNDS", replace(BOUNDS, sheets=3))
     with pytest.raises(AnswerError, match="more than 3 answer sheets"):
         find_sheets([tmp_path])

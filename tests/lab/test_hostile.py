@@ -33,15 +33,15 @@ from dhkit.errors import ModelError
 from dhkit.lab import live as live_module
 from dhkit.lab.live import MAX_PUSHES, Live
 from dhkit.lab.serving import kept_token
-from dhkit.viewer.handlers import MAX_PAGES, MAX_REQUESTS
-from dhkit.viewer.protocol import HEADER, MAX_SAMPLE_NUMBERS, Samples
+from dhkit.viewer.bounds import BOUNDS
+from dhkit.viewer.protocol import HEADER, Samples
 from lab.test_requests import BAD, states
 from viewer.messages import decode_header
 from waiting import HANGS, wait_for
 
 LATE = 4.0
 """s within which a slider is answered whatever others do; 0.01 s on an idle machine, 0.3 s in a flood."""
-FLOOD = 10_000 if ACCEPTING else 20 * MAX_REQUESTS
+FLOOD = 10_000 if ACCEPTING else 20 * BOUNDS.requests
 CYCLES_BEFORE, CYCLES = (200, 2_000) if ACCEPTING else (50, 100)
 GROWTH = 20e6
 """Bytes that the process may grow by: the allocator's slack; one kept page is 0.4 MB, one kept message 1 MB."""
@@ -386,7 +386,7 @@ def test_frames_that_are_no_websocket_end_their_page(lab, data):
 def test_a_page_that_only_shows_says_so_however_often_it_is_asked():
     async def ask(url):
         async with page(url) as client:
-            return {(await client.ask("python"))["error"] for _ in range(2 * MAX_REQUESTS)}
+            return {(await client.ask("python"))["error"] for _ in range(2 * BOUNDS.requests)}
 
     with Arm.load("planar2r").view() as view:
         assert run(ask(view.url)) == {"this page only shows; it has nothing to ask for"}
@@ -413,7 +413,7 @@ def test_a_flood_of_requests_is_answered_or_refused(lab):
 
     kinds = run(both())
     assert kinds["answer"] >= 1
-    assert max(most) <= MAX_REQUESTS
+    assert max(most) <= BOUNDS.requests
 
 
 def fill(connection, message, url):
@@ -445,7 +445,7 @@ def test_a_page_that_takes_no_answers_is_not_read_from(lab):
         connection = raw_socket(lab)
         assert fill(connection, message, lab.url) < MUCH
         assert memory() - before < GROWTH
-        assert all(page._unanswered <= MAX_REQUESTS for page in lab.view._live().pages)
+        assert all(page._unanswered <= BOUNDS.requests for page in lab.view._live().pages)
         connection.close()
 
 
@@ -492,7 +492,7 @@ def test_many_pages_at_once_are_each_answered_and_see_the_same(lab):
 def test_more_pages_than_can_be_served_are_turned_away(lab):
     async def crowd():
         async with contextlib.AsyncExitStack() as stack:
-            for _ in range(MAX_PAGES):
+            for _ in range(BOUNDS.pages):
                 await stack.enter_async_context(page(lab.url))
             with pytest.raises(HTTPClientError, match="503"):
                 await stack.enter_async_context(page(lab.url))
@@ -557,7 +557,7 @@ def test_what_waits_for_a_page_that_never_acknowledges_is_bounded(lab):
     waiting = slow.session._waiting
     assert len(waiting) <= len(server._state)
     for kept in (waiting, server._state):
-        assert all(m.rows.size <= MAX_SAMPLE_NUMBERS for *_, m in kept.values() if isinstance(m, Samples))
+        assert all(m.rows.size <= BOUNDS.sample_numbers for *_, m in kept.values() if isinstance(m, Samples))
     assert not slow.ws_connection.stream.writing() or len(slow.ws_connection.stream._write_buffer) < 2e6
     run(slider_works(lab.url))
     lab.answer("control.stop", {})

@@ -13,8 +13,8 @@ import pytest
 from dhkit import Arm
 from dhkit.errors import ModelError
 from dhkit.model import extract_dh
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.urdf_chain import read_chain
-from dhkit.model.urdf_xml import MAX_BYTES
 
 INERTIA = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
 BODY = f'<inertial><mass value="1"/>{INERTIA}</inertial>'
@@ -59,7 +59,7 @@ REFUSED = {
     "xacro left in": (arm(origin='<origin xyz="${x} 0 0"/>'), "joint 'j': <origin xyz>: found '${x}'"),
     "another format": ('<sdf version="1.6"/>', "found <sdf>; expected <robot>"),
     "xacro": ('<robot xmlns:xacro="x"><xacro:macro name="m"/></robot>', "has elements of xacro; run xacro on it first"),
-    "too large": ("<robot>" + " " * MAX_BYTES + "</robot>", "more than 5 MB"),
+    "too large": ("<robot>" + " " * BOUNDS.urdf_bytes + "</robot>", "more than 5 MB"),
     "many elements": ("<robot>" + "<a/>" * 150_000 + "</robot>", "more than 100000 elements"),
     "a long attribute": (f'<robot name="{"x" * 2000}"/>', "<robot name> has 2000 characters"),
     "no links": ('<robot name="r"/>', "no links; expected a robot"),

@@ -2,6 +2,7 @@
 
 import contextlib
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from acceptance import ACCEPTING
 from dhkit.description import from_dh, library_robot, read_robot, world_to_frames
 from dhkit.errors import DhkitError, ModelError
 from dhkit.model import mat_parts, pinocchio_model
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.cad_assembly import import_cad
 from dhkit.model.cad_files import link_number
 from dhkit.model.mesh_reader import read_mesh
@@ -513,7 +515,7 @@ BAD_MATS = {
 @pytest.mark.parametrize("case", BAD_MATS)
 def test_a_bad_mat_file_is_refused_in_a_line(tmp_path, monkeypatch, case):
     if not ACCEPTING:
-        monkeypatch.setattr(mat_parts, "MAX_UNPACKED_BYTES", BOMB - 1)
+        monkeypatch.setattr(mat_parts, "BOUNDS", replace(BOUNDS, mat_unpacked_bytes=BOMB - 1))
     write, complaint = BAD_MATS[case]
     path = tmp_path / "robot.mat"
     write(path)

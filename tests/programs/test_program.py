@@ -8,6 +8,7 @@ import sys
 import tempfile
 import threading
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from shutil import copytree, ignore_patterns
 
@@ -24,6 +25,7 @@ from dhkit.execution.bubblewrap import package_paths
 from dhkit.execution.isolation import Isolation, IsolationError, Kind, find_isolation
 from dhkit.execution.process import Failure, Limits, ProgramError
 from dhkit.programs import check
+from dhkit.programs.bounds import BOUNDS
 from dhkit.programs.caller import Caller
 from dhkit.programs.program import Program
 from waiting import HANGS, wait_for
@@ -408,7 +410,7 @@ def fk(q):
 
 
 def test_all_calls_together_are_limited_by_processor_time(program, monkeypatch):
-    monkeypatch.setattr("dhkit.programs.caller.MAX_TIME", 0.5)
+    monkeypatch.setattr("dhkit.programs.caller.BOUNDS", replace(BOUNDS, time=0.5))
     monkeypatch.setattr("dhkit.programs.caller.WAITING_FACTOR", HANGS)  # of the clock, on a busy machine
     busy = program(BUSY)
     caller = Caller(busy, "fk")

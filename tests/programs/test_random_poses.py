@@ -7,7 +7,8 @@ from dhkit import Arm
 from dhkit.description import robots
 from dhkit.execution.process import Failure, ProgramError
 from dhkit.kinematics import classify, singular_values
-from dhkit.programs.caller import MAX_FATAL_FAILURES, Caller
+from dhkit.programs.bounds import BOUNDS
+from dhkit.programs.caller import Caller
 from dhkit.programs.inverse import SOLUTION_ORDERS
 from dhkit.programs.random_poses import poses_out_of_reach, random_states, regular_states, singular_states
 
@@ -53,8 +54,8 @@ def test_a_function_that_fails_for_good_is_not_called_again():
 
     program = Ended()
     caller = Caller(program, "fk")
-    for _ in range(MAX_FATAL_FAILURES + 2):
+    for _ in range(BOUNDS.fatal_failures + 2):
         with pytest.raises(ProgramError):
             caller(np.zeros(2))
-    assert program.calls == MAX_FATAL_FAILURES
-    assert caller.failure_texts() == (f"the program ended ({MAX_FATAL_FAILURES} times)",)
+    assert program.calls == BOUNDS.fatal_failures
+    assert caller.failure_texts() == (f"the program ended ({BOUNDS.fatal_failures} times)",)

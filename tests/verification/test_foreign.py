@@ -14,8 +14,8 @@ from dhkit import Arm
 from dhkit.cli import main
 from dhkit.description import asset, library_robot
 from dhkit.errors import ModelError
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.urdf_chain import read_chain
-from dhkit.model.urdf_xml import MAX_BYTES
 from dhkit.verification import verify_urdf
 
 
@@ -127,7 +127,7 @@ BAD = {
         + "</robot>",
         "4000 links; expected 500 at most",
     ),
-    "too large": ("<robot>" + " " * MAX_BYTES + "</robot>", "more than 5 MB"),
+    "too large": ("<robot>" + " " * BOUNDS.urdf_bytes + "</robot>", "more than 5 MB"),
     "sliding": (simple("prismatic"), "joints j are P; expected R as in"),
 }
 

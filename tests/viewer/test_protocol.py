@@ -10,7 +10,8 @@ from hypothesis.extra.numpy import arrays
 from dhkit.description import library_robot
 from dhkit.model.shapes import link_parts
 from dhkit.viewer import protocol
-from dhkit.viewer.protocol import MAX_SAMPLE_NUMBERS, MessageType, ProtocolError, Samples, encode_state
+from dhkit.viewer.bounds import BOUNDS
+from dhkit.viewer.protocol import MessageType, ProtocolError, Samples, encode_state
 from dhkit.viewer.requests import Request, Shown, decode_message
 from dhkit.viewer.scene import build_scene
 from viewer import messages
@@ -173,7 +174,7 @@ def test_requests_states_and_samples_come_back():
     found = decode_samples(both.encoded())
     assert (found.name, found.columns, found.restart, found.rows.shape) == ("control", ("t", "e1"), True, (4, 2))
     assert np.array_equal(found.rows, both.rows)
-    many = both.followed_by(Samples("control", ("t", "e1"), np.zeros((MAX_SAMPLE_NUMBERS, 2), np.float32)))
-    assert many.rows.size == MAX_SAMPLE_NUMBERS
+    many = both.followed_by(Samples("control", ("t", "e1"), np.zeros((BOUNDS.sample_numbers, 2), np.float32)))
+    assert many.rows.size == BOUNDS.sample_numbers
     anew = both.followed_by(Samples("control", ("t", "e1", "e2"), np.zeros((1, 3), np.float32)))
     assert anew.restart and anew.rows.shape == (1, 3)

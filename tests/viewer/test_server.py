@@ -13,10 +13,10 @@ from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import websocket_connect
 
 from dhkit.errors import ModelError
-from dhkit.viewer.handlers import MAX_PAGES
+from dhkit.viewer.bounds import BOUNDS
 from dhkit.viewer.page import MODULES
 from dhkit.viewer.protocol import encode_frames
-from dhkit.viewer.server import MAX_CONNECTIONS, ViewerServer
+from dhkit.viewer.server import ViewerServer
 from dhkit.viewer.session import Slot
 from viewer.messages import decode_header
 from waiting import HANGS
@@ -222,7 +222,7 @@ def test_strangers_do_not_keep_the_owner_out(server, text):
     async def owner():
         async with connect(server) as page:
             decode_header(await page.read_message())
-            with strangers(server, MAX_CONNECTIONS + 20, text) as opened:
+            with strangers(server, BOUNDS.connections + 20, text) as opened:
                 for _ in range(3):
                     assert (await asyncio.to_thread(get, server, f"/{server.token}/"))[0] == 200
                 while opened[0].recv(10_000):  # refused or closed
@@ -312,4 +312,4 @@ def test_a_page_is_told_good_bye(server):
 
 
 def test_pages_leave_connections_for_files():
-    assert MAX_PAGES < MAX_CONNECTIONS
+    assert BOUNDS.pages < BOUNDS.connections

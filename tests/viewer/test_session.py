@@ -2,7 +2,8 @@
 
 from hypothesis import given, strategies as st
 
-from dhkit.viewer.session import MAX_PANEL_MESSAGES, OF_ONE_ARM, Session, Slot
+from dhkit.viewer.bounds import BOUNDS
+from dhkit.viewer.session import OF_ONE_ARM, Session, Slot
 
 PANELS = [Slot.PANELS + k for k in range(20)]
 SLOTS = [*(slot for slot in Slot if slot < Slot.PANELS), *PANELS]
@@ -21,7 +22,7 @@ def test_the_latest_wins_and_few_are_under_way(steps, replayed):
             slot, sequence = sent[message]
             lane = under_way["panel shown" if slot in PANELS else "picture shown"]
             lane.append(sequence)
-            assert len(lane) <= (MAX_PANEL_MESSAGES if slot in PANELS else 1)
+            assert len(lane) <= (BOUNDS.panel_messages if slot in PANELS else 1)
             if slot == Slot.SCENE:
                 for other in OF_ONE_ARM:
                     page.pop(other, None)

@@ -12,10 +12,10 @@ from dhkit.bench.contenders import Task, Workload
 from dhkit.description import Array
 from dhkit.display import value_line
 
-TOLERANCE = 1e-9
+_TOLERANCE = 1e-9
 """Largest error of answers that agree. Errors of ik are in m or rotation entries; all others are divided by the largest
 entry of dhkit's results over the compared items, if that is above 1."""
-CHECKED_ITEMS = 32
+_CHECKED_ITEMS = 32
 """Items that are compared: enough to meet every branch, few enough for a solver that takes 50 ms."""
 
 
@@ -40,7 +40,7 @@ class Verdict:
     @property
     def ok(self) -> bool:
         """Whether the two agree."""
-        return self.error is not None and self.error <= TOLERANCE
+        return self.error is not None and self.error <= _TOLERANCE
 
     def __str__(self) -> str:
         error = "no answer" if self.error is None else f"{self.error:.0e}"
@@ -51,7 +51,7 @@ class Verdict:
 
 def judge(workload: Workload, quantity: str, task: Task) -> Verdict:
     """Compare the first answers of a task with dhkit's own."""
-    count = min(CHECKED_ITEMS, len(workload.q))
+    count = min(_CHECKED_ITEMS, len(workload.q))
     answers = task.answers(count)
     if quantity == "ik":
         return _judge_solutions(workload, answers)
@@ -66,7 +66,7 @@ def _judge_solutions(workload: Workload, answers: Sequence[Array]) -> Verdict:
     errors = np.abs(workload.arm.fk(q) - poses)
     if not _meets_whole_poses(workload.arm):
         errors = errors[:, :3, 3:]
-    closed = int(np.sum(errors.max(axis=(1, 2)) <= TOLERANCE)) if len(q) else 0
+    closed = int(np.sum(errors.max(axis=(1, 2)) <= _TOLERANCE)) if len(q) else 0
     return Verdict(_worst(errors), closed / len(counts))
 
 

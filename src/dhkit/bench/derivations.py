@@ -22,8 +22,8 @@ from dhkit.symbolic.exact.exact_arm import exact_arm
 
 PEER = "sympy.physics.mechanics LagrangesMethod"
 CASADI = "dhkit, CasADi functions, all of them"
-EXACT = "dhkit, exact M, C, g, tau in numbers"
-INERTIAL = "dhkit, exact, all inertial parameters symbols"
+_EXACT = "dhkit, exact M, C, g, tau in numbers"
+_INERTIAL = "dhkit, exact, all inertial parameters symbols"
 PROOFS = "dhkit, both proofs of that"
 INVERSE_DYNAMICS = "inverse dynamics"
 FUNCTIONS = ("mass_matrix", "coriolis_matrix", "gravity_torque", "inverse_dynamics", "forward_dynamics", "lagrange")
@@ -111,7 +111,7 @@ def derivations(arm: Arm, limit: float) -> list[Derivation]:
         if not (lag.prove_euler_lagrange(derive(description, symbols="inertial")) and lag.prove_skew_symmetry()):
             raise AssertionError("the two derivations differ")
 
-    own = ((CASADI, casadi), (EXACT, exact("none")), (INERTIAL, exact("inertial")), (PROOFS, proofs))
+    own = ((CASADI, casadi), (_EXACT, exact("none")), (_INERTIAL, exact("inertial")), (PROOFS, proofs))
     timed = [Derivation(arm.name, what, _seconds(run), limit) for what, run in own]
     peers = [Arm.load(name) for name in ("planar2r", "planar3r")]
     peers += [] if arm.name in ("planar2r", "planar3r") else [arm]

@@ -10,7 +10,7 @@ from dhkit.bench.contenders import UnavailableError
 from dhkit.description import Array, Description, world_to_frames, world_to_tool
 from dhkit.description.frames import carrying
 
-AXIS_TOLERANCE = 1e-9
+_AXIS_TOLERANCE = 1e-9
 """Largest distance, m, or sine of axes that count as meeting, parallel or perpendicular."""
 
 
@@ -93,7 +93,7 @@ def _wrist_centre(axes: JointAxes) -> Array | None:
     projectors = np.eye(3) - directions[:, :, None] * directions[:, None, :]
     centre = np.linalg.lstsq(projectors.sum(axis=0), np.einsum("kij,kj->i", projectors, points), rcond=None)[0]
     distances = np.linalg.norm(np.einsum("kij,kj->ki", projectors, centre - points), axis=1)
-    return centre if distances.max() < AXIS_TOLERANCE else None
+    return centre if distances.max() < _AXIS_TOLERANCE else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +141,7 @@ class OrthoParallel:
         centre = _wrist_centre(axes)
         h = axes.directions
         cosines = [abs(h[i] @ h[i + 1]) for i in (0, 2, 3, 4)]
-        if centre is None or max(cosines) > AXIS_TOLERANCE or np.linalg.norm(np.cross(h[1], h[2])) > AXIS_TOLERANCE:
+        if centre is None or max(cosines) > _AXIS_TOLERANCE or np.linalg.norm(np.cross(h[1], h[2])) > _AXIS_TOLERANCE:
             raise UnavailableError("takes an ortho-parallel basis with a spherical wrist; this arm is built otherwise")
         return _fit_upright(description)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from dhkit.display import repr_line
 from dhkit.kernels import kernel_mode
 
-FLAGS = ("sse4_2", "avx", "avx2", "fma", "avx512f", "avx512dq", "avx512vl", "asimd", "sve")
+_FLAGS = ("sse4_2", "avx", "avx2", "fma", "avx512f", "avx512dq", "avx512vl", "asimd", "sve")
 PACKAGES = (
     "dhkit",
     "numpy",
@@ -75,7 +75,7 @@ class Machine:
         return cls(
             processor=facts.get("model name") or platform.processor() or platform.machine(),
             cores=cores(),
-            flags=tuple(flag for flag in FLAGS if flag in present),
+            flags=tuple(flag for flag in _FLAGS if flag in present),
             system=f"{platform.system()} {platform.machine()}",
             python=f"{platform.python_implementation()} {platform.python_version()}",
             packages={name: found for name in PACKAGES if (found := _version(name))},

@@ -28,11 +28,11 @@ from dhkit.bench.rounds import lasting, repeated, rounds
 from dhkit.description import write_robot
 from dhkit.display import value_line
 
-BLOCK, BLOCKS = bytes(256 * 1024), 128
+_BLOCK, _BLOCKS = bytes(256 * 1024), 128
 """The block that the control loop hashes, which stays in the core's cache, and how many times."""
-MAX_PROCESS_TIME = 120.0
+_MAX_PROCESS_TIME = 120.0
 """Longest time of a new process, s."""
-WARM_PROCESSES = 3
+_WARM_PROCESSES = 3
 """New processes with a warm cache, of which the median time counts."""
 
 
@@ -157,8 +157,8 @@ def thread_scaling(workload: Workload, quantity: str, repeats: int) -> ThreadSca
         calls = (
             repeated(on(1), times),
             repeated(on(2), times),
-            lambda: _hash_blocks(BLOCKS),
-            lambda: list(pool.map(_hash_blocks, (BLOCKS // 2, BLOCKS // 2))),
+            lambda: _hash_blocks(_BLOCKS),
+            lambda: list(pool.map(_hash_blocks, (_BLOCKS // 2, _BLOCKS // 2))),
         )
         seconds = np.array(list(rounds(calls, repeats)))
     one, two, control_one, control_two = np.median(seconds, axis=0)
@@ -169,7 +169,7 @@ def _hash_blocks(count: int) -> None:
     """Compute without memory traffic and without Python's global lock, which hashlib releases."""
     digest = hashlib.sha256()
     for _ in range(count):
-        digest.update(BLOCK)
+        digest.update(_BLOCK)
 
 
 def peak_memory(workload: Workload, quantity: str, called: str) -> PeakMemory:
@@ -252,7 +252,7 @@ def first_call(workload: Workload, quantity: str) -> FirstCall:
             _python(code, robot, str(len(workload.q)), environment=cache)
             return perf_counter() - start
 
-        return FirstCall(quantity, seconds(), median(seconds() for _ in range(WARM_PROCESSES)))
+        return FirstCall(quantity, seconds(), median(seconds() for _ in range(_WARM_PROCESSES)))
 
 
 def _robot_file(arm: Arm, folder: str) -> str:
@@ -269,7 +269,7 @@ def _python(code: str, *arguments: str, environment: Mapping[str, str]) -> str:
             command,
             capture_output=True,
             text=True,
-            timeout=MAX_PROCESS_TIME,
+            timeout=_MAX_PROCESS_TIME,
             check=False,
             env=os.environ | dict(environment),
         )
@@ -278,4 +278,4 @@ def _python(code: str, *arguments: str, environment: Mapping[str, str]) -> str:
                 f"a new process failed: {(process.stderr.strip().splitlines() or ['no output'])[-1]}"
             )
         return process.stdout
-    raise UnavailableError(f"a new process took more than {MAX_PROCESS_TIME:.0f} s")
+    raise UnavailableError(f"a new process took more than {_MAX_PROCESS_TIME:.0f} s")

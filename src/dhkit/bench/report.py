@@ -19,7 +19,7 @@ BATCH = 100_000
 
 Table: TypeAlias = tuple[str, Sequence[str], list[list[str]]]
 """Heading, names of the columns, and cells of a table."""
-RATIO_MEANING = (
+_RATIO_MEANING = (
     "x batch and x single: how many times as long as dhkit's batch call with out=, and as its single call; "
     "medians over the rounds. Error: largest difference from dhkit's answers (of dynamics over their "
     "largest); a solution is one that closes to 1e-9."
@@ -238,7 +238,7 @@ class Report:
                 for entry, value in zip(plain[key], listed, strict=True):
                     if hasattr(value, "derived"):
                         entry |= value.derived
-        data: dict[str, object] = with_lists(plain)
+        data: dict[str, object] = _with_lists(plain)
         return data
 
     def markdown(self) -> str:
@@ -306,7 +306,7 @@ class BenchReport(Report):
     @property
     def meaning(self) -> str:
         """What the columns mean."""
-        return RATIO_MEANING
+        return _RATIO_MEANING
 
     def json(self) -> dict[str, object]:
         """Return the report as plain data for JSON, without NaN, tuples and classes."""
@@ -419,10 +419,10 @@ def _markdown_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> l
     return ["| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines]
 
 
-def with_lists(value: Any) -> Any:
+def _with_lists(value: Any) -> Any:
     """Return plain data with lists in place of tuples, as JSON reads it back."""
     if isinstance(value, dict):
-        return {key: with_lists(entry) for key, entry in value.items()}
+        return {key: _with_lists(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [with_lists(entry) for entry in value]
+        return [_with_lists(entry) for entry in value]
     return value

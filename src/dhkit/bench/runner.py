@@ -19,8 +19,8 @@ from dhkit.bench.report import BATCH, BenchReport, Ending, Missing, Outcome, Req
 from dhkit.bench.rounds import calm, items_within, lasting, repeated, rounds
 from dhkit.description import Array
 
-DYNAMICS = {"inverse_dynamics", "mass_matrix", "forward_dynamics"}
-MAX_DERIVATION_TIME = 90.0
+_DYNAMICS = {"inverse_dynamics", "mass_matrix", "forward_dynamics"}
+_MAX_DERIVATION_TIME = 90.0
 """Longest time of a peer's derivation, s: nobody would wait longer."""
 REPEATS = 9
 """Number of rounds: odd, so that the median is one of them."""
@@ -122,7 +122,7 @@ def run(
                 measurements.outcomes.append(outcome_of(quantity, measurements.rows, measurements.missing))
             for quantity in quantities if probes else ():
                 _probe(workload, quantity, repeats, measurements, tell)
-            if probes and not DYNAMICS.isdisjoint(quantities):
+            if probes and not _DYNAMICS.isdisjoint(quantities):
                 tell("derivations")
                 _derive(arm, measurements)
     except KeyboardInterrupt:
@@ -259,7 +259,7 @@ def _derive(arm: Arm, measurements: _Measurements) -> None:
     """Count operations and time derivations."""
     try:
         measurements.operations += operations(arm)
-        measurements.derivations += derivations(arm, MAX_DERIVATION_TIME)
+        measurements.derivations += derivations(arm, _MAX_DERIVATION_TIME)
     except Exception as error:  # it may fail in any way, as contenders may
         measurements.missing.append(_missing("dynamics", "derivations", error))
 

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path, PurePosixPath
 
+from dhkit.description.bounds import BOUNDS
 from dhkit.errors import DescriptionError
 
 MESH_FORMATS = (".stl", ".obj", ".dae", ".ply")
-MAX_PATH_LENGTH = 500
-"""Longest relative path, in characters."""
-MAX_NAME_LENGTH = 120
-"""Longest name of a file or folder in a path, in characters: 255 bytes is the limit of common file systems."""
 
-PACKAGE = Path(__file__).resolve().parents[1]
-CHECKOUT = PACKAGE.parents[1]
+_PACKAGE = Path(__file__).resolve().parents[1]
+_CHECKOUT = _PACKAGE.parents[1]
 """Root of the repository when dhkit runs from its sources; otherwise a folder without assets of dhkit."""
 
 
@@ -26,7 +23,7 @@ def asset(name: str) -> Path:
         The package has no such file.
     """
     if name.split("/")[0] in ("urdf", "meshes") and ".." not in PurePosixPath(name).parts:
-        for root in (PACKAGE, CHECKOUT):
+        for root in (_PACKAGE, _CHECKOUT):
             if (root / name).exists():
                 return root / name
     raise DescriptionError(f"no packaged file {name!r}; there are urdf/NAME.urdf and meshes/NAME/LINK.stl")
@@ -52,8 +49,8 @@ def inside(folder: Path | None, path: str, subject: str, root: str = "the robot'
     parts = PurePosixPath(path.replace("\\", "/"))
     if (
         not path
-        or len(path) > MAX_PATH_LENGTH
-        or max(map(len, parts.parts), default=0) > MAX_NAME_LENGTH
+        or len(path) > BOUNDS.path_characters
+        or max(map(len, parts.parts), default=0) > BOUNDS.path_part_characters
         or not path.isprintable()
         or ":" in path
         or parts.is_absolute()

@@ -27,13 +27,13 @@ INERTIA_PLACES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": 
 """Row and column of each moment and product in the inertia tensor, in the order in which six of them are listed."""
 MIN_EIGENVALUE_TOLERANCE = 1e-12
 """kg m^2: the lowest eigenvalue of a published inertia may be this far below zero ..."""
-RELATIVE_EIGENVALUE_TOLERANCE = 1e-9
+_RELATIVE_EIGENVALUE_TOLERANCE = 1e-9
 """... or this share of the largest eigenvalue, for tensors given to ten digits."""
 
 
 def eigenvalue_tolerance(largest: float) -> float:
     """Return how far below zero rounding may put an eigenvalue of an inertia, kg m^2, given its largest one."""
-    return MIN_EIGENVALUE_TOLERANCE + RELATIVE_EIGENVALUE_TOLERANCE * abs(largest)
+    return MIN_EIGENVALUE_TOLERANCE + _RELATIVE_EIGENVALUE_TOLERANCE * abs(largest)
 
 
 @dataclass(frozen=True)

@@ -25,10 +25,10 @@ from dhkit.description.values import Base, Convention, Placement, Tool
 from dhkit.errors import DescriptionError
 from dhkit.expressions import Expression, exact, exact_angle
 
-ROD_DECIMALS = 9
+_ROD_DECIMALS = 9
 """Decimals of the ends of rods between points on the axes, m."""
 
-ASYMMETRY_TOLERANCE = 1e-12
+_ASYMMETRY_TOLERANCE = 1e-12
 """Largest difference of two symmetric entries of an inertia, relative to its largest entry: rounding of R I R^T."""
 
 
@@ -203,7 +203,7 @@ def _link_ends(description: Description) -> list[tuple[Vector, Vector]]:
 
 
 def _exact_vector(point: Array) -> Vector:
-    x, y, z = (exact(round(float(entry), ROD_DECIMALS) + 0.0) for entry in point)
+    x, y, z = (exact(round(float(entry), _ROD_DECIMALS) + 0.0) for entry in point)
     return x, y, z
 
 
@@ -246,4 +246,4 @@ def _inertia_tensor(inertia: ArrayLike) -> Array:
 
 def is_asymmetric(tensor: Array) -> bool:
     """Return whether symmetric entries of an inertia, shape (3, 3), kg m^2, differ by more than rounding."""
-    return bool(np.abs(tensor - tensor.T).max() > ASYMMETRY_TOLERANCE * np.abs(tensor).max())
+    return bool(np.abs(tensor - tensor.T).max() > _ASYMMETRY_TOLERANCE * np.abs(tensor).max())

@@ -11,7 +11,7 @@ from typing import BinaryIO
 
 from dhkit.errors import DescriptionError, DhkitError
 
-STREAM = re.compile(r"/dev/(stdout|stderr)|/dev/fd/(\d{1,4})|/proc/self/fd/(\d{1,4})")
+_STREAM = re.compile(r"/dev/(stdout|stderr)|/dev/fd/(\d{1,4})|/proc/self/fd/(\d{1,4})")
 """Names of streams that this process has open; other paths below /dev, such as /dev/shm, name files."""
 
 
@@ -87,7 +87,7 @@ def write_atomically(path: str | Path, content: str | bytes, *, private: bool = 
         raise IsADirectoryError(errno.EISDIR, "is a folder; expected a file's name", str(path))
     path.parent.mkdir(parents=True, exist_ok=True)
     if not private:
-        if STREAM.fullmatch(str(path.absolute())) or (path.exists() and not path.is_file()):
+        if _STREAM.fullmatch(str(path.absolute())) or (path.exists() and not path.is_file()):
             try:
                 with _open_stream(path) as stream:
                     stream.write(data)
@@ -112,7 +112,7 @@ def write_atomically(path: str | Path, content: str | bytes, *, private: bool = 
 
 def _open_stream(path: Path) -> BinaryIO:
     """Open a pipe, a device or a stream of this process for writing, without replacing it."""
-    stream = STREAM.fullmatch(str(path.absolute()))
+    stream = _STREAM.fullmatch(str(path.absolute()))
     if stream is None:
         return path.open("ab")
     # Opening a redirected stream a second time would write from the file's beginning; a duplicate shares its position.

@@ -11,13 +11,13 @@ from dhkit.description.arrays import Array, number_array
 from dhkit.description.robot import Description, description_of, takes_robot
 from dhkit.description.values import Convention
 
-RATE_NAMES = ("qd", "tau", "start_velocity", "goal_velocity")
+_RATE_NAMES = ("qd", "tau", "start_velocity", "goal_velocity")
 """Beginnings of the names of arguments that hold speeds, accelerations or torques: no configuration has a value."""
 
-S = TypeVar("S", bound="Sliceable")
+S = TypeVar("S", bound="_Sliceable")
 
 
-class Sliceable(Protocol):
+class _Sliceable(Protocol):
     """An array or a list: a slice of it has its own type."""
 
     def __getitem__(self: S, index: slice, /) -> S:
@@ -47,7 +47,7 @@ def joint_array(description: Description, q: ArrayLike, name: str = "q") -> Arra
         Not numbers.
     """
     if type(q) is not np.ndarray:
-        if isinstance(q, str) and not name.startswith(RATE_NAMES):
+        if isinstance(q, str) and not name.startswith(_RATE_NAMES):
             return configuration(description, q, name)
         if isinstance(q, (list, tuple)) and any(isinstance(row, str) for row in q):
             rows = [joint_array(description, row, name) for row in q]
@@ -195,7 +195,7 @@ def world_to_tool(description: Description, q: ArrayLike) -> Array:
     return world_to_frames(description, q)[..., -1, :, :] @ description.numbers.T_last_tool
 
 
-GEOMETRY = ("theta", "d", "a", "alpha", "T_world_base", "T_last_tool")
+_GEOMETRY = ("theta", "d", "a", "alpha", "T_world_base", "T_last_tool")
 """Fields of :class:`~dhkit.description.numbers.Numbers` that decide where the frames are."""
 
 
@@ -203,4 +203,4 @@ def has_same_geometry(first: Description, second: Description) -> bool:
     """Return whether all frames of two arms are at the same places for equal joint values; their bodies may differ."""
     if first.convention is not second.convention or first.kinds != second.kinds:
         return False
-    return all(np.array_equal(getattr(first.numbers, name), getattr(second.numbers, name)) for name in GEOMETRY)
+    return all(np.array_equal(getattr(first.numbers, name), getattr(second.numbers, name)) for name in _GEOMETRY)

@@ -15,7 +15,7 @@ from dhkit.description.arrays import Array
 
 FAR = 4.0
 """Ratio of the sum of abs(a) + abs(d) to the length along the joint centres from which a and d are no sizes."""
-Z = np.array([0.0, 0.0, 1.0])
+_Z = np.array([0.0, 0.0, 1.0])
 
 
 class LinkEnds(NamedTuple):
@@ -67,9 +67,9 @@ def link_ends(a: Array, d: Array, cos_alpha: Array, sin_alpha: Array, *, is_stan
     for i in range(n):
         if is_standard:
             begin_offset[i + 1], begin_slope[i + 1, i] = offset[i], oblique[i]
-            end_slope[i, i] = Z
+            end_slope[i, i] = _Z
         else:
-            begin_slope[i + 1, i] = Z
+            begin_slope[i + 1, i] = _Z
             end_offset[i], end_slope[i, i] = offset[i], oblique[i]
 
     slopes = (end_slope - begin_slope).transpose(0, 2, 1).reshape(-1, n)

@@ -54,14 +54,14 @@ from dhkit.expressions import (
 
 log = logging.getLogger(__name__)
 
-LOCKING_BUDGET = 300_000
+_LOCKING_BUDGET = 300_000
 """Steps of exact arithmetic, about a second, after which an arm with symbols is locked with numbers instead."""
-READING_BUDGET = 80_000
+_READING_BUDGET = 80_000
 """Steps that reading a locked arm's symbols back may take: a share of a robot file's budget."""
-PARALLEL_SINE = 1e-10
+_PARALLEL_SINE = 1e-10
 """Two axes count as parallel if the sine of the angle between them is below this number."""
 
-LinkBodies: TypeAlias = tuple[Body | None, ...]
+_LinkBodies: TypeAlias = tuple[Body | None, ...]
 """Bodies of one link, in its frame; None stands for a joined link without a body."""
 
 
@@ -72,7 +72,7 @@ class _Chain(NamedTuple):
     joints: tuple[Joint, ...]
     """The joints; their own bodies are out of date, ``bodies`` counts."""
     tool: Tool
-    bodies: tuple[LinkBodies, ...]
+    bodies: tuple[_LinkBodies, ...]
     """The bodies of each link, the base first; they are joined in one step at the end."""
 
 
@@ -114,9 +114,9 @@ def lock(description: Description, joints: Mapping[int | str, Quantity]) -> Desc
         raise DescriptionError(f"all {description.n} joints locked; expected one left to move")
     description, locked = _with_numbers(description, locked, _angle_names(description, locked))
     try:
-        with Budget(LOCKING_BUDGET):
+        with Budget(_LOCKING_BUDGET):
             shorter = _lock_all(description, locked)
-        with Budget(READING_BUDGET):
+        with Budget(_READING_BUDGET):
             # What reading the arm's file would do, to see whether the arm fits into a file's budget.
             for expression in expressions_in(shorter):
                 if expression.symbols:
@@ -191,7 +191,7 @@ def _lock_all(description: Description, locked: Mapping[int, Expression]) -> Des
     So no common normal is taken of two axes of which one is joined to the base: nearly parallel ones would cost digits.
     """
     bodies = tuple(joint.bodies or (None,) for joint in description.joints)
-    base: LinkBodies = (description.base.body,) if description.base.body is not None else ()
+    base: _LinkBodies = (description.base.body,) if description.base.body is not None else ()
     chain = _Chain(description.base, description.joints, description.tool, (base, *bodies))
     values = resolved(description.parameters)
     first = next(place for place in range(description.n + 1) if place not in locked)
@@ -218,7 +218,7 @@ def _lock_all(description: Description, locked: Mapping[int, Expression]) -> Des
     )
 
 
-def _link_bodies(joint: Joint, parts: LinkBodies) -> tuple[Body, ...]:
+def _link_bodies(joint: Joint, parts: _LinkBodies) -> tuple[Body, ...]:
     """Return the bodies of a link: its own if no other link was joined to it, otherwise all joined to one."""
     if parts == joint.bodies:
         return joint.bodies
@@ -293,7 +293,7 @@ def _joined_shapes(before: tuple[Shape, ...], locked: tuple[Shape, ...]) -> tupl
     return before + tuple(replace(shape, body=count + shape.body) for shape in locked)
 
 
-def _moved_bodies(bodies: LinkBodies, T: ExactPose) -> LinkBodies:
+def _moved_bodies(bodies: _LinkBodies, T: ExactPose) -> _LinkBodies:
     return tuple(None if body is None else moved_body(body, T) for body in bodies)
 
 
@@ -312,7 +312,7 @@ def _common_normal(Y: ExactPose, values: Mapping[str, Expression]) -> _Row:
     def number(x: Expression) -> float:
         return float(substitute(x, values))
 
-    if math.hypot(number(Y[0, 2]), number(Y[1, 2])) < PARALLEL_SINE:
+    if math.hypot(number(Y[0, 2]), number(Y[1, 2])) < _PARALLEL_SINE:
         row = _parallel_axes_row(Y, is_opposite=number(Y[2, 2]) < 0)
     else:
         row = _skew_axes_row(Y, number)

@@ -17,30 +17,26 @@ from typing import TypeAlias
 import numpy as np
 
 from dhkit.description.arrays import Array
+from dhkit.description.bounds import BOUNDS
 from dhkit.errors import DescriptionError
 
-HEADER_LENGTH, TAG_LENGTH = 128, 8
-MATRIX, COMPRESSED = 14, 15
+_HEADER_LENGTH, _TAG_LENGTH = 128, 8
+_MATRIX, _COMPRESSED = 14, 15
 """Element types of a variable, and of a compressed variable."""
-NUMBER_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+_NUMBER_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 """Element types of numbers as NumPy's; MATLAB stores doubles in the shortest type that holds them exactly."""
-TEXT_CODES = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
-CLASSES = dict(enumerate(("cell", "struct", "object", "char", "sparse matrix", "double", "single"), start=1)) | {
+_TEXT_CODES = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
+_CLASSES = dict(enumerate(("cell", "struct", "object", "char", "sparse matrix", "double", "single"), start=1)) | {
     **{8 + k: f"{'u' if k % 2 else ''}int{8 << k // 2}" for k in range(8)},
     16: "function",
 }
-STRUCT, OBJECT, CHARACTERS, OPAQUE = 2, 3, 4, 17
+_STRUCT, _OBJECT, _CHARACTERS, _OPAQUE = 2, 3, 4, 17
 """Classes with a layout of their own; an opaque variable is an object of one of MATLAB's own classes, as timeseries."""
-FULL_MATRICES = range(6, 16)
-COMPLEX_FLAG = 0x0800
-MAX_AXES, MAX_NAME_LENGTH = 8, 63
-MAX_DEPTH = 6
-"""Largest nesting depth of structs."""
-MAX_VARIABLES = 20_000
-"""Largest number of variables of a file, fields of structs included."""
-HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-DAMAGE = "ends within an element, or has one of another kind; the .mat file is damaged"
-USER_BLOCK_LENGTH = 512
+_FULL_MATRICES = range(6, 16)
+_COMPLEX_FLAG = 0x0800
+_HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_DAMAGE = "ends within an element, or has one of another kind; the .mat file is damaged"
+_USER_BLOCK_LENGTH = 512
 """Bytes before the HDF5 signature of a file of format 7.3."""
 
 Value: TypeAlias = "str | Array | tuple[dict[str, MatVariable], ...]"
@@ -66,7 +62,7 @@ class MatVariable:
     @property
     def readable(self) -> bool:
         """Whether it holds real numbers or text."""
-        return bool(self.parts) and self.kind != CLASSES[STRUCT]
+        return bool(self.parts) and self.kind != _CLASSES[_STRUCT]
 
     @property
     def value(self) -> Value:
@@ -99,15 +95,15 @@ def read_mat(content: bytes, max_bytes: int, *, advice: str) -> dict[str, MatVar
     DescriptionError
         Another format, or damage; says which.
     """
-    signature_places = content[:8], content[USER_BLOCK_LENGTH : USER_BLOCK_LENGTH + 8]
-    if content.startswith(b"MATLAB 7.3 MAT-file") or HDF5_SIGNATURE in signature_places:
+    signature_places = content[:8], content[_USER_BLOCK_LENGTH : _USER_BLOCK_LENGTH + 8]
+    if content.startswith(b"MATLAB 7.3 MAT-file") or _HDF5_SIGNATURE in signature_places:
         raise DescriptionError(f"a .mat file of format 7.3 (HDF5), which is not read; {advice}")
-    order = {b"IM": "<", b"MI": ">"}.get(content[HEADER_LENGTH - 2 : HEADER_LENGTH])
+    order = {b"IM": "<", b"MI": ">"}.get(content[_HEADER_LENGTH - 2 : _HEADER_LENGTH])
     if order is None:
         raise DescriptionError(f"no .mat file of format 5; {advice}")
     reader = _Reader(order, max_bytes)
     variables: dict[str, MatVariable] = {}
-    for variable in reader.variables(content[HEADER_LENGTH:]):
+    for variable in reader.variables(content[_HEADER_LENGTH:]):
         if variable.name in variables:
             raise DescriptionError(f"{variable.name}: stands there twice")
         if variable.name:  # objects keep their content in a variable without a name
@@ -128,21 +124,21 @@ class _Reader:
 
     def variables(self, data: bytes) -> Iterator[MatVariable]:
         for element in self.elements(data):
-            inner = self.elements(self._unpack(element.data)) if element.kind == COMPRESSED else [element]
-            yield from (self._variable(matrix.data) for matrix in inner if matrix.kind == MATRIX)
+            inner = self.elements(self._unpack(element.data)) if element.kind == _COMPRESSED else [element]
+            yield from (self._variable(matrix.data) for matrix in inner if matrix.kind == _MATRIX)
 
     def elements(self, data: bytes) -> Iterator[_Element]:
         """Yield the elements that data consist of, in their order."""
         offset = 0
         while offset < len(data):
-            _require(len(data) - offset >= TAG_LENGTH)
+            _require(len(data) - offset >= _TAG_LENGTH)
             kind, length = struct.unpack_from(f"{self.order}II", data, offset)
             if kind >> 16:  # a small element: length and type share the first word, its data is the second
-                kind, length, start, step = kind & 0xFFFF, kind >> 16, offset + TAG_LENGTH // 2, TAG_LENGTH
-                _require(length <= TAG_LENGTH // 2)
+                kind, length, start, step = kind & 0xFFFF, kind >> 16, offset + _TAG_LENGTH // 2, _TAG_LENGTH
+                _require(length <= _TAG_LENGTH // 2)
             else:
-                start = offset + TAG_LENGTH
-                step = TAG_LENGTH + length + (0 if kind == COMPRESSED else -length % TAG_LENGTH)
+                start = offset + _TAG_LENGTH
+                step = _TAG_LENGTH + length + (0 if kind == _COMPRESSED else -length % _TAG_LENGTH)
             _require(length <= len(data) - start)
             yield _Element(kind, data[start : start + length])
             offset += step
@@ -163,49 +159,49 @@ class _Reader:
     def _variable(self, data: bytes, name: str | None = None, depth: int = 1) -> MatVariable:
         """Return the variable of an element; a field of a struct gets its name from the struct."""
         self.count += 1
-        if depth > MAX_DEPTH or self.count > MAX_VARIABLES:
+        if depth > BOUNDS.mat_nesting or self.count > BOUNDS.mat_variables:
             raise DescriptionError("variables nested too deep, or too many")
         parts = self.elements(data)
         flags = _next(parts).data
         _require(len(flags) >= 4)
         word = struct.unpack(f"{self.order}I", flags[:4])[0]
         code = word & 0xFF
-        if code == OPAQUE:
+        if code == _OPAQUE:
             own_name, _, kind = (_name(_next(parts)) for _ in range(3))
             return MatVariable(name or own_name, kind, (), self)
         dimensions, own_name = _next(parts), _name(_next(parts))
         name = name or own_name
-        if code == OBJECT:
+        if code == _OBJECT:
             return MatVariable(name, _name(_next(parts)), (), self)
-        if code == STRUCT:
-            return MatVariable(name, CLASSES[code], (dimensions, *parts), self)
-        if code not in FULL_MATRICES and code != CHARACTERS:
-            return MatVariable(name, CLASSES.get(code, f"matrix of class {code}"), (), self)
-        if word & COMPLEX_FLAG:
+        if code == _STRUCT:
+            return MatVariable(name, _CLASSES[code], (dimensions, *parts), self)
+        if code not in _FULL_MATRICES and code != _CHARACTERS:
+            return MatVariable(name, _CLASSES.get(code, f"matrix of class {code}"), (), self)
+        if word & _COMPLEX_FLAG:
             return MatVariable(name, "complex matrix", (), self)
-        return MatVariable(name, CLASSES[code], (dimensions, _next(parts)), self)
+        return MatVariable(name, _CLASSES[code], (dimensions, _next(parts)), self)
 
     def value(self, variable: MatVariable) -> Value:
         dimensions, *content = variable.parts
         count = len(dimensions.data) // 4
-        _require(0 < count <= MAX_AXES and len(dimensions.data) % 4 == 0)
+        _require(0 < count <= BOUNDS.mat_axes and len(dimensions.data) % 4 == 0)
         shape = struct.unpack(f"{self.order}{count}i", dimensions.data)
         _require(min(shape) >= 0)
-        if variable.kind == CLASSES[STRUCT]:
+        if variable.kind == _CLASSES[_STRUCT]:
             return self._records(variable.name, content, shape)
-        if variable.kind == CLASSES[CHARACTERS]:
+        if variable.kind == _CLASSES[_CHARACTERS]:
             return self._text(variable.name, content[0])
         return self._array(variable.name, content[0], shape)
 
     def _array(self, name: str, body: _Element, shape: tuple[int, ...]) -> Array:
-        _require(body.kind in NUMBER_TYPES)
-        dtype = np.dtype(f"{self.order}{NUMBER_TYPES[body.kind]}")
+        _require(body.kind in _NUMBER_TYPES)
+        dtype = np.dtype(f"{self.order}{_NUMBER_TYPES[body.kind]}")
         if int(np.prod(shape, dtype=object)) * dtype.itemsize != len(body.data):
             raise DescriptionError(f"{name}: {len(body.data)} bytes for shape {shape}; the file is damaged")
         return np.frombuffer(body.data, dtype).reshape(shape, order="F").astype(float)
 
     def _text(self, name: str, body: _Element) -> str:
-        code = TEXT_CODES.get(body.kind, "")
+        code = _TEXT_CODES.get(body.kind, "")
         if code.startswith(("utf-16", "utf-32")):
             code += {"<": "-le", ">": "-be"}[self.order]
         try:
@@ -217,10 +213,10 @@ class _Reader:
         """Return the fields of each struct of an array; in the file the names precede the fields of all structs."""
         _require(len(parts) >= 2 and len(parts[0].data) == 4)
         (length,) = struct.unpack(f"{self.order}i", parts[0].data)
-        _require(0 < length <= MAX_NAME_LENGTH + 1 and len(parts[1].data) % length == 0)
+        _require(0 < length <= BOUNDS.mat_name_characters + 1 and len(parts[1].data) % length == 0)
         text = parts[1].data
         names = [_name(_Element(1, text[at : at + length].split(b"\0")[0])) for at in range(0, len(text), length)]
-        fields = [part for part in parts[2:] if part.kind == MATRIX]
+        fields = [part for part in parts[2:] if part.kind == _MATRIX]
         _require(len(fields) == len(names) * int(np.prod(shape, dtype=object)) and len(set(names)) == len(names))
         depth = name.count(".") + 2
         variables = [
@@ -231,18 +227,18 @@ class _Reader:
 
 
 def _name(element: _Element) -> str:
-    name = element.data[:MAX_NAME_LENGTH].decode("latin-1")
+    name = element.data[: BOUNDS.mat_name_characters].decode("latin-1")
     return name if name.isprintable() else ascii(name)[1:-1]  # messages have one line, whatever the file holds
 
 
 def _next(parts: Iterator[_Element]) -> _Element:
     part = next(parts, None)
     if part is None:
-        raise DescriptionError(DAMAGE)
+        raise DescriptionError(_DAMAGE)
     return part
 
 
 def _require(is_intact: bool) -> None:
     """Refuse a damaged file."""
     if not is_intact:
-        raise DescriptionError(DAMAGE)
+        raise DescriptionError(_DAMAGE)

@@ -15,28 +15,22 @@ from pathlib import Path
 from xml.parsers import expat
 
 from dhkit.description.assets import MESH_FORMATS
+from dhkit.description.bounds import BOUNDS
 from dhkit.description.files import error_reason
 from dhkit.errors import DescriptionError
 
-MAX_MESH_BYTES = 50_000_000
-"""Largest mesh file, in bytes: a million triangles of a binary STL, more than a browser shows well."""
-STL_HEADER_LENGTH, STL_FACET_LENGTH = 84, 50
+_STL_HEADER_LENGTH, _STL_FACET_LENGTH = 84, 50
 """Bytes of a binary STL before its facets (80 of text, 4 of a count), and of each facet."""
-TEXT_END_LENGTH = 4_096
+_TEXT_END_LENGTH = 4_096
 """Bytes that are read at the beginning and at the end of a text file."""
-MAX_OBJ_HEAD_LENGTH = 1_000_000
-"""Bytes at the beginning of an OBJ file in which a vertex must stand."""
-MAX_PLY_HEADER_LENGTH = 65_536
-MAX_XML_DEPTH = 64
-"""Largest nesting depth of elements in a COLLADA file; exporters write about 12 levels."""
-PLY_SIZES = {
+_PLY_SIZES = {
     **dict.fromkeys(("char", "uchar", "int8", "uint8"), 1),
     **dict.fromkeys(("short", "ushort", "int16", "uint16"), 2),
     **dict.fromkeys(("int", "uint", "float", "int32", "uint32", "float32"), 4),
     **dict.fromkeys(("double", "float64"), 8),
 }
 """Bytes of a number in a binary PLY file, by its type."""
-VERTEX_LINE = re.compile(rb"^[ \t]*v[ \t]+[-+.\d]", re.MULTILINE)
+_VERTEX_LINE = re.compile(rb"^[ \t]*v[ \t]+[-+.\d]", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -60,7 +54,7 @@ class MeshFileError(DescriptionError):
         return f"{self.path}: {self.reason}"
 
 
-def check_mesh_file(path: Path, max_bytes: int = MAX_MESH_BYTES) -> MeshHeader:
+def check_mesh_file(path: Path, max_bytes: int = BOUNDS.mesh_bytes) -> MeshHeader:
     """Return a mesh file's header, or refuse a file that cannot be the mesh that its name says.
 
     Parameters
@@ -129,21 +123,21 @@ def _bytes_at(path: Path, start: int, count: int) -> bytes:
 
 
 def _stl_header(path: Path, size: int) -> MeshHeader:
-    head = _bytes_at(path, 0, TEXT_END_LENGTH)
-    count = int.from_bytes(head[80:STL_HEADER_LENGTH], "little")
-    expected = STL_HEADER_LENGTH + STL_FACET_LENGTH * count
+    head = _bytes_at(path, 0, _TEXT_END_LENGTH)
+    count = int.from_bytes(head[80:_STL_HEADER_LENGTH], "little")
+    expected = _STL_HEADER_LENGTH + _STL_FACET_LENGTH * count
     # The length decides, not the first word: binary files of many exporters begin with "solid" too.
-    if len(head) >= STL_HEADER_LENGTH and size == expected:
+    if len(head) >= _STL_HEADER_LENGTH and size == expected:
         if count == 0:
             raise _FaultError("no triangles: a binary STL whose header counts 0")
         return MeshHeader("stl", count)
     if head.lstrip()[:5].lower() == b"solid" and b"\0" not in head:
         if b"facet" not in head.lower():
             raise _FaultError("no triangles: an ASCII STL without facets")
-        if b"endsolid" not in _bytes_at(path, max(0, size - TEXT_END_LENGTH), TEXT_END_LENGTH).lower():
+        if b"endsolid" not in _bytes_at(path, max(0, size - _TEXT_END_LENGTH), _TEXT_END_LENGTH).lower():
             raise _FaultError("truncated: an ASCII STL that does not end in 'endsolid'")
         return MeshHeader("stl_ascii", None)
-    if len(head) < STL_HEADER_LENGTH or b"\0" not in head:
+    if len(head) < _STL_HEADER_LENGTH or b"\0" not in head:
         raise _FaultError("no STL: neither a text that begins with 'solid' nor a binary header")
     raise _FaultError(
         f"no STL: {size} bytes; its header counts {count} triangles, which need {expected} "
@@ -152,14 +146,14 @@ def _stl_header(path: Path, size: int) -> MeshHeader:
 
 
 def _obj_header(path: Path, _size: int) -> MeshHeader:
-    head = _bytes_at(path, 0, MAX_OBJ_HEAD_LENGTH)
-    if b"\0" in head[:TEXT_END_LENGTH] or not VERTEX_LINE.search(head):
+    head = _bytes_at(path, 0, BOUNDS.obj_head_bytes)
+    if b"\0" in head[:_TEXT_END_LENGTH] or not _VERTEX_LINE.search(head):
         raise _FaultError("no OBJ: no line 'v x y z' in its first megabyte")
     return MeshHeader("obj", None)
 
 
 def _ply_header(path: Path, size: int) -> MeshHeader:
-    header, ending, _ = _bytes_at(path, 0, MAX_PLY_HEADER_LENGTH).partition(b"end_header")
+    header, ending, _ = _bytes_at(path, 0, BOUNDS.ply_header_bytes).partition(b"end_header")
     lines = [line.split() for line in header.decode("ascii", "replace").splitlines()]
     if not ending or not lines or lines[0] != ["ply"]:
         raise _FaultError("no PLY: expected 'ply', a header and 'end_header'")
@@ -193,9 +187,9 @@ def _ply_elements(lines: list[list[str]], *, is_ascii: bool) -> tuple[dict[str, 
             if is_ascii:
                 each = 2 if words[1] != "list" else 8
             elif words[1] == "list" and len(words) >= 5:
-                each = PLY_SIZES.get(words[2], 1) + 3 * PLY_SIZES.get(words[3], 1) * (element == "face")
+                each = _PLY_SIZES.get(words[2], 1) + 3 * _PLY_SIZES.get(words[3], 1) * (element == "face")
             else:
-                each = PLY_SIZES.get(words[1], 1)
+                each = _PLY_SIZES.get(words[1], 1)
             min_bytes += counts[element] * each
     return counts, max(0, min_bytes - 1)
 
@@ -209,8 +203,8 @@ def _dae_header(path: Path, size: int) -> MeshHeader:
         nonlocal depth, root
         depth += 1
         root = root or name
-        if depth > MAX_XML_DEPTH:
-            raise _FaultError(f"elements nested more than {MAX_XML_DEPTH} deep")
+        if depth > BOUNDS.collada_nesting:
+            raise _FaultError(f"elements nested more than {BOUNDS.collada_nesting} deep")
 
     def end_element(_name: str) -> None:
         nonlocal depth

@@ -11,7 +11,7 @@ from dhkit.expressions import CONSTANTS, FUNCTIONS, Expression, substitute
 PARAMETER_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}", re.ASCII)
 
 
-JOINT_VARIABLE_NAME = re.compile(r"q[0-9]+", re.ASCII)
+_JOINT_VARIABLE_NAME = re.compile(r"q[0-9]+", re.ASCII)
 """Name of a joint variable, which rows of a table may contain."""
 
 
@@ -27,7 +27,7 @@ def check_parameter_name(name: str) -> None:
         raise DescriptionError(f"parameters: {name[:80]!r} is no name; expected letters, digits and _, 64 at most")
     if name in CONSTANTS or name in FUNCTIONS:
         raise DescriptionError(f"parameters: {name!r} is taken; expressions know it as a constant or function")
-    if JOINT_VARIABLE_NAME.fullmatch(name):
+    if _JOINT_VARIABLE_NAME.fullmatch(name):
         raise DescriptionError(f"parameters: {name!r} is taken: joint variables are q1, q2 ...")
 
 

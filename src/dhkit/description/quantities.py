@@ -12,7 +12,7 @@ from dhkit.expressions import CONSTANTS, Expression, parse
 
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?", re.ASCII)
 """A decimal, as files have it."""
-JOINT_VARIABLE = re.compile(r"\s*q_?([0-9]{1,2})\s*([+-].*)?", re.ASCII | re.DOTALL)
+_JOINT_VARIABLE = re.compile(r"\s*q_?([0-9]{1,2})\s*([+-].*)?", re.ASCII | re.DOTALL)
 """A joint variable and what is added to it."""
 
 Entry = TypeVar("Entry")
@@ -64,7 +64,7 @@ def without_variable(entry: Entry, number: int) -> Entry | str | int:
 
     Tables are printed so, and books print them so; the variable itself is added to theta, or to d, of every row.
     """
-    if isinstance(entry, str) and (match := JOINT_VARIABLE.fullmatch(entry)) and int(match[1]) == number:
+    if isinstance(entry, str) and (match := _JOINT_VARIABLE.fullmatch(entry)) and int(match[1]) == number:
         offset: str | None = match[2]
         return offset or 0
     return entry

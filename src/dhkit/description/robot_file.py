@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dhkit.description.bodies import INERTIA_PLACES, Body, Inertia, Vector
+from dhkit.description.bounds import BOUNDS
 from dhkit.description.files import read_bounded, write_atomically
 from dhkit.description.named import Named
 from dhkit.description.quantities import parse_quantity, without_variable
@@ -48,9 +49,6 @@ if TYPE_CHECKING:
         ToolForm,
     )
 
-MAX_BYTES = 1_000_000
-"""Largest robot file, in bytes."""
-
 
 def read_robot(path: str | Path) -> Description:
     """Read a robot file.
@@ -61,7 +59,7 @@ def read_robot(path: str | Path) -> Description:
         It cannot be read, or describes no robot: file, joint, key, what was found and expected.
     """
     path = Path(path)
-    content = read_bounded(path, MAX_BYTES)
+    content = read_bounded(path, BOUNDS.file_bytes)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -80,8 +78,8 @@ def from_toml(text: str, *, file: str = "robot file", mesh_folder: Path | None =
     from dhkit.description.schema import validated
 
     try:
-        if len(text) > MAX_BYTES:
-            raise DescriptionError(f"more than {MAX_BYTES / 1e6:g} MB; expected a robot file")
+        if len(text) > BOUNDS.file_bytes:
+            raise DescriptionError(f"more than {BOUNDS.file_bytes / 1e6:g} MB; expected a robot file")
         with Budget():
             return _FormReader(validated(toml_document(text)), mesh_folder).description()
     except DescriptionError as error:

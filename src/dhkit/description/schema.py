@@ -21,17 +21,10 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, ErrorDetails, PydanticCustomError
 
+from dhkit.description.bounds import BOUNDS
 from dhkit.description.parameters import PARAMETER_NAME
 from dhkit.description.toml_text import Document
-from dhkit.description.validation import (
-    BODY_NAME,
-    MAX_BODIES,
-    MAX_CONFIGURATIONS,
-    MAX_JOINTS,
-    MAX_PARAMETERS,
-    MAX_SHAPES,
-    NAME,
-)
+from dhkit.description.validation import BODY_NAME, NAME
 from dhkit.errors import DescriptionError
 
 Entry: TypeAlias = int | Decimal | str
@@ -92,13 +85,13 @@ class _AlsoTakes:
         return {"anyOf": [own, self.other(own)]}
 
 
-NUMBER = {"type": ["number", "string"]}
-ROW = {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3}
-THREE_BY_THREE = ROW | {"items": ROW}
+_NUMBER = {"type": ["number", "string"]}
+_ROW = {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3}
+_THREE_BY_THREE = _ROW | {"items": _ROW}
 Number = Annotated[
     Entry,
     PlainValidator(_entry),
-    WithJsonSchema(NUMBER | {"description": "a number in the file's units, or text in SI"}),
+    WithJsonSchema(_NUMBER | {"description": "a number in the file's units, or text in SI"}),
 ]
 Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
@@ -129,7 +122,7 @@ class InertiaForm(Form):
     xz: Number = 0
 
 
-InertiaEntry = Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _AlsoTakes(lambda _: THREE_BY_THREE)]
+_InertiaEntry = Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _AlsoTakes(lambda _: _THREE_BY_THREE)]
 
 
 class BodyForm(Form):
@@ -138,7 +131,7 @@ class BodyForm(Form):
     name: Text = ""
     mass: Number
     com: Triple = Field(default=[0, 0, 0])
-    inertia: Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _AlsoTakes(lambda _: THREE_BY_THREE)] = (
+    inertia: Annotated[InertiaForm, BeforeValidator(_keyed_inertia), _AlsoTakes(lambda _: _THREE_BY_THREE)] = (
         InertiaForm()
     )
     unphysical: bool = False
@@ -154,7 +147,7 @@ class DriveForm(Form):
         list[Number],
         BeforeValidator(_one_or_two),
         Field(min_length=1, max_length=2),
-        _AlsoTakes(lambda _: NUMBER),
+        _AlsoTakes(lambda _: _NUMBER),
     ] = [0]
 
 
@@ -174,7 +167,7 @@ class BallForm(Form):
 class FrameForm(Form):
     """The DH frame of a link that was locked to another, in the DH frame of that one, and its number in the link."""
 
-    body: Annotated[int, Field(ge=0, le=MAX_JOINTS)] = 0
+    body: Annotated[int, Field(ge=0, le=BOUNDS.joints)] = 0
     xyz: Triple = Field(default=[0, 0, 0])
     rpy: Triple = Field(default=[0, 0, 0])
 
@@ -183,7 +176,7 @@ class ShapeForm(Form):
     """One of mesh, box, cylinder, capsule and sphere, placed in the link's DH frame, or in ``frame``."""
 
     mesh: Text | None = None
-    scale: Annotated[Triple, BeforeValidator(_one_or_three), _AlsoTakes(lambda _: NUMBER)] = [1, 1, 1]
+    scale: Annotated[Triple, BeforeValidator(_one_or_three), _AlsoTakes(lambda _: _NUMBER)] = [1, 1, 1]
     box: Triple | None = None
     cylinder: RoundForm | None = None
     capsule: RoundForm | None = None
@@ -205,7 +198,7 @@ class ShapeForm(Form):
 Shapes = Annotated[
     list[ShapeForm],
     BeforeValidator(_list_of_tables),
-    Field(max_length=MAX_SHAPES, default=[]),
+    Field(max_length=BOUNDS.shapes, default=[]),
     _AlsoTakes(lambda several: several["items"]),
 ]
 
@@ -225,7 +218,7 @@ class JointForm(Form):
     velocity: Number | None = None
     effort: Number | None = None
     body: BodyForm | None = None
-    bodies: Annotated[list[BodyForm], Field(min_length=1, max_length=MAX_BODIES)] | None = None
+    bodies: Annotated[list[BodyForm], Field(min_length=1, max_length=BOUNDS.bodies)] | None = None
     drive: DriveForm | None = None
     shape: Shapes
     assumed: list[Literal["a", "alpha", "d", "theta", "limits", "velocity", "effort", "body", "drive", "shape"]] = (
@@ -242,7 +235,7 @@ class JointForm(Form):
 class CouplingForm(Form):
     """Inertia of a drive that two joints turn, kg m^2, kg m or kg; joints by number, from 1."""
 
-    joints: Annotated[list[Annotated[int, Field(ge=1, le=MAX_JOINTS)]], Field(min_length=2, max_length=2)]
+    joints: Annotated[list[Annotated[int, Field(ge=1, le=BOUNDS.joints)]], Field(min_length=2, max_length=2)]
     inertia: Number
 
 
@@ -271,17 +264,17 @@ class RobotForm(Form):
     source: Text = ""
     notes: Text = ""
     drawn: bool = True
-    parameters: dict[str, Number] = Field(default={}, max_length=MAX_PARAMETERS)
-    joint: list[JointForm] = Field(min_length=1, max_length=MAX_JOINTS)
+    parameters: dict[str, Number] = Field(default={}, max_length=BOUNDS.parameters)
+    joint: list[JointForm] = Field(min_length=1, max_length=BOUNDS.joints)
     coupling: Annotated[
         list[CouplingForm],
         BeforeValidator(_list_of_tables),
-        Field(max_length=MAX_JOINTS * (MAX_JOINTS - 1) // 2, default=[]),
+        Field(max_length=BOUNDS.joints * (BOUNDS.joints - 1) // 2, default=[]),
         _AlsoTakes(lambda several: several["items"]),
     ]
     base: BaseForm = Field(default_factory=lambda: BaseForm.model_validate({}))
     tool: ToolForm = Field(default_factory=lambda: ToolForm.model_validate({}))
-    configurations: dict[str, list[Number]] = Field(default={}, max_length=MAX_CONFIGURATIONS)
+    configurations: dict[str, list[Number]] = Field(default={}, max_length=BOUNDS.configurations)
 
 
 def robot_schema() -> JsonSchema:

@@ -11,7 +11,7 @@ from dhkit.display import counted, html_table, repr_line
 from dhkit.expressions import Expression
 
 COLUMNS = ("theta", "d", "a", "alpha")
-MAX_CELL_LENGTH = 400
+_MAX_CELL_LENGTH = 400
 """Longest entry in a notebook's table, in characters."""
 
 
@@ -89,7 +89,7 @@ class DHTable:
 
     def _repr_html_(self) -> str:
         caption = f"{self.convention.value} DH"
-        return html_table(self.headings, self.rows, caption, most=len(self.rows), longest=MAX_CELL_LENGTH)
+        return html_table(self.headings, self.rows, caption, most=len(self.rows), longest=_MAX_CELL_LENGTH)
 
     def latex(self) -> str:
         """Return the table as a LaTeX ``tabular``."""

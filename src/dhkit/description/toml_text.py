@@ -8,22 +8,19 @@ from collections.abc import Mapping
 from decimal import Decimal, InvalidOperation
 from typing import Any, TypeAlias
 
+from dhkit.description.bounds import BOUNDS
 from dhkit.errors import DescriptionError
 
 Document: TypeAlias = dict[str, Any]
 """A parsed document: tables, lists, texts, whole numbers, Decimal, booleans and dates, not checked further."""
 
-DOTTED_KEY = re.compile(r"(?<![\w\-\"'])[\w\-\"']++(?:[ \t]*+\.[ \t]*+[\w\-\"']++){9}")
+_DOTTED_KEY = re.compile(r"(?<![\w\-\"'])[\w\-\"']++(?:[ \t]*+\.[ \t]*+[\w\-\"']++){9}")
 """A key of ten dotted parts or more, which no file of ours has; tomllib takes quadratic time over such keys.
 
 Possessive quantifiers keep this expression itself linear."""
-LINE = re.compile(r"\(at line (\d+),")
-UNQUOTED = re.compile(r"[=,\[]\s*(?!(?:true|false|inf|nan)\b)([^\s\"'\[{,#]*[A-Za-z*/][^\"',\]}#]{0,200})")
+_LINE = re.compile(r"\(at line (\d+),")
+_UNQUOTED = re.compile(r"[=,\[]\s*(?!(?:true|false|inf|nan)\b)([^\s\"'\[{,#]*[A-Za-z*/][^\"',\]}#]{0,200})")
 """A value, of a key or in a list, that is neither text nor a number."""
-MAX_HINT = 500
-"""Number of characters of a line that are searched for such a value."""
-MAX_INTEGER_BITS = 2_048
-"""Largest size of a whole number, in bits: beyond the range of a double."""
 
 
 def toml_document(text: str) -> Document:
@@ -34,7 +31,7 @@ def toml_document(text: str) -> Document:
     DescriptionError
         Not TOML, nested too deep, or a number beyond the range of a double.
     """
-    if deep := DOTTED_KEY.search(text):
+    if deep := _DOTTED_KEY.search(text):
         raise DescriptionError(f"the key {deep.group()[:40]}... is nested too deep")
     try:
         document = tomllib.loads(text, parse_float=_decimal)
@@ -48,8 +45,8 @@ def toml_document(text: str) -> Document:
 
 def _unquoted(text: str, message: str) -> str:
     """Return a hint if the parser stopped in a line with an expression or a name that lacks its quotes."""
-    place = LINE.search(message)
-    value = UNQUOTED.search(text.split("\n")[int(place[1]) - 1][:MAX_HINT]) if place else None
+    place = _LINE.search(message)
+    value = _UNQUOTED.search(text.split("\n")[int(place[1]) - 1][: BOUNDS.hint_characters]) if place else None
     return f'; names and expressions are in quotes: "{value[1].strip()[:40]}"' if value else ""
 
 
@@ -79,5 +76,5 @@ def _check_numbers(value: object) -> None:
     if isinstance(value, list):
         for entry in value:
             _check_numbers(entry)
-    elif isinstance(value, int) and value.bit_length() > MAX_INTEGER_BITS:
+    elif isinstance(value, int) and value.bit_length() > BOUNDS.integer_bits:
         raise DescriptionError("a whole number beyond the range of a double")

@@ -26,7 +26,7 @@ from dhkit.description.values import (
 )
 from dhkit.expressions import Expression
 
-Content: TypeAlias = dict[str, Any]
+_Content: TypeAlias = dict[str, Any]
 """Keys of a table with what tomlkit takes as values."""
 
 
@@ -74,8 +74,8 @@ def toml_text(description: RobotData) -> str:
     return tomlkit.dumps(document)
 
 
-def _joint(joint: Joint, units: Units) -> Content:
-    content: Content = {
+def _joint(joint: Joint, units: Units) -> _Content:
+    content: _Content = {
         "name": joint.name,
         "type": joint.type.value,
         "a": _entry(joint.a, units.metres),
@@ -102,7 +102,7 @@ def _joint(joint: Joint, units: Units) -> Content:
 
 
 def _body(body: Body, units: Units) -> InlineTable:
-    content: Content = {"name": body.name} if body.name else {}
+    content: _Content = {"name": body.name} if body.name else {}
     content["mass"] = _entry(body.mass)
     content |= _nonzero_entries("com", body.com, units.metres)
     if moments := {key: _entry(moment) for key, moment in vars(body.inertia).items() if not moment.is_zero}:
@@ -117,11 +117,11 @@ def _drive(drive: Drive) -> InlineTable:
     return _inline_table(numbers | {"coulomb": _entries(drive.coulomb)})
 
 
-def _placement(placement: Placement, units: Units) -> Content:
+def _placement(placement: Placement, units: Units) -> _Content:
     return _nonzero_entries("xyz", placement.xyz, units.metres) | _nonzero_entries("rpy", placement.rpy, units.radians)
 
 
-def _shapes(shapes: Sequence[Shape], units: Units) -> Content:
+def _shapes(shapes: Sequence[Shape], units: Units) -> _Content:
     """Return the key ``shape`` with one shape or a list of several; nothing without shapes."""
     if len(shapes) == 1:
         return {"shape": _shape(shapes[0], units)}
@@ -129,7 +129,7 @@ def _shapes(shapes: Sequence[Shape], units: Units) -> Content:
 
 
 def _shape(shape: Shape, units: Units) -> InlineTable:
-    content: Content
+    content: _Content
     match shape.geometry:
         case Mesh(path, scale):
             content = {"mesh": path}
@@ -156,7 +156,7 @@ def _entries(values: Iterable[Expression], unit: Expression = ONE) -> Array:
     return _array(_entry(value, unit) for value in values)
 
 
-def _nonzero_entries(key: str, values: Sequence[Expression], unit: Expression) -> Content:
+def _nonzero_entries(key: str, values: Sequence[Expression], unit: Expression) -> _Content:
     """Return a key with a list of values; nothing where all of them are zero, the default."""
     return {} if all(value.is_zero for value in values) else {key: _entries(values, unit)}
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from dhkit.description.assets import MESH_FORMATS, inside
 from dhkit.description.bodies import MIN_EIGENVALUE_TOLERANCE, Body, eigenvalue_tolerance
+from dhkit.description.bounds import BOUNDS
 from dhkit.description.joint_text import violated_limit_text
 from dhkit.description.mesh_files import MeshFileError, check_mesh_file
 from dhkit.description.parameters import check_parameter_name, resolved
@@ -18,35 +19,22 @@ from dhkit.description.values import Box, Drive, Geometry, Joint, Mesh, Placemen
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import Expression, substitute
 
-MAX_JOINTS = 32
-MAX_PARAMETERS = 200
-MAX_CONFIGURATIONS = 100
-MAX_SHAPES = 200
-"""Largest number of shapes of a link: a humanoid's trunk with both arms locked has 110."""
-MAX_BODIES = 16
-"""Largest number of rigid bodies of a link."""
-MAX_NUMBER = 1e12
-"""Largest absolute value of a number, SI units: products of several such numbers are finite doubles."""
-MAX_MESSAGE_LENGTH = 300
-"""Characters kept of an expression's own message, which may quote the whole expression."""
-MAX_NAME_LENGTH = 64
-"""Longest name of a robot, joint, body or configuration, in characters."""
-NAME = re.compile(rf"[A-Za-z_][A-Za-z0-9_.\-]{{0,{MAX_NAME_LENGTH - 1}}}", re.ASCII)
-BODY_NAME = re.compile(rf"[A-Za-z_][A-Za-z0-9_.\- ]{{0,{MAX_NAME_LENGTH - 1}}}", re.ASCII)
+NAME = re.compile(rf"[A-Za-z_][A-Za-z0-9_.\-]{{0,{BOUNDS.name_characters - 1}}}", re.ASCII)
+BODY_NAME = re.compile(rf"[A-Za-z_][A-Za-z0-9_.\- ]{{0,{BOUNDS.name_characters - 1}}}", re.ASCII)
 RESERVED_NAME = re.compile(r"(world|base|tool|dh\d+|link\d+)(_fixed)?")
 """Names of links and fixed joints of our URDFs: a joint of the same name would confuse Pinocchio."""
-CONTROL_CHARACTER = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
+_CONTROL_CHARACTER = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
 """Characters that XML may not hold or that a terminal would act on."""
 SHAPE_LEFT_OUT = "; this shape is left out"
 """End of a line of notes on a shape of the file that a description comes from, which the description does not have."""
-COLOR = re.compile(r"#[0-9a-fA-F]{6}")
+_COLOR = re.compile(r"#[0-9a-fA-F]{6}")
 
-MAX_TABLE_ANGLE, MAX_LIMIT_ANGLE = math.tau + 1e-9, 2 * math.tau + 1e-9
-"""rad: larger angles of the table, or joint limits, are probably degrees; see MAX_DEGREES."""
-MAX_DEGREES = 1080.0
+_MAX_TABLE_ANGLE, _MAX_LIMIT_ANGLE = math.tau + 1e-9, 2 * math.tau + 1e-9
+"""rad: larger angles of the table, or joint limits, are probably degrees; see _MAX_DEGREES."""
+_MAX_DEGREES = 1080.0
 """Largest number that is probably an angle in degrees: three turns; larger ones give no warning."""
 
-Value = Callable[[str, Expression], float]
+_Value = Callable[[str, Expression], float]
 """Returns the number of an expression, SI and radians; the text names the expression in messages."""
 
 
@@ -59,9 +47,9 @@ def check(description: RobotData) -> tuple[str, ...]:
         The first fault: joint, key, what was found and what was expected.
     """
     for what, count, least, most in (
-        ("joints", description.n, 1, MAX_JOINTS),
-        ("parameters", len(description.parameters), 0, MAX_PARAMETERS),
-        ("configurations", len(description.configurations), 0, MAX_CONFIGURATIONS),
+        ("joints", description.n, 1, BOUNDS.joints),
+        ("parameters", len(description.parameters), 0, BOUNDS.parameters),
+        ("configurations", len(description.configurations), 0, BOUNDS.configurations),
     ):
         if not least <= count <= most:
             raise DescriptionError(f"{count} {what}; expected {least} to {most}")
@@ -82,7 +70,7 @@ def check(description: RobotData) -> tuple[str, ...]:
     warnings += _check_couplings(description, value)
     _check_names(description)
     for key in ("source", "notes"):
-        if control := CONTROL_CHARACTER.search(getattr(description, key)):
+        if control := _CONTROL_CHARACTER.search(getattr(description, key)):
             raise DescriptionError(f"{key}: holds the control character {control.group()!r}; expected plain text")
     base, tool = description.base, description.tool
     for part, placed in (("base", base), ("tool", tool)):
@@ -106,9 +94,9 @@ def _number(where: str, expression: Expression, values: Mapping[str, Expression]
     try:
         number = float(substitute(expression, values))
     except ExpressionError as error:
-        raise DescriptionError(f"{where}: {str(error)[:MAX_MESSAGE_LENGTH]}") from None
-    if abs(number) > MAX_NUMBER:
-        raise DescriptionError(f"{where}: {number:.3g} in SI units; expected at most {MAX_NUMBER:g}")
+        raise DescriptionError(f"{where}: {str(error)[: BOUNDS.message_characters]}") from None
+    if abs(number) > BOUNDS.number:
+        raise DescriptionError(f"{where}: {number:.3g} in SI units; expected at most {BOUNDS.number:g}")
     return number
 
 
@@ -126,17 +114,17 @@ def _check_names(description: RobotData) -> None:
             raise DescriptionError(f"joint {i}: name {name!r} is another joint's already")
 
 
-def _check_joint(joint: Joint, where: str, value: Value) -> Iterator[str]:
+def _check_joint(joint: Joint, where: str, value: _Value) -> Iterator[str]:
     row = {key: value(f"{where}: {key}", getattr(joint, key)) for key in ("a", "alpha", "d", "theta")}
-    angles = [(key, row[key], MAX_TABLE_ANGLE) for key in ("alpha", "theta")]
+    angles = [(key, row[key], _MAX_TABLE_ANGLE) for key in ("alpha", "theta")]
     if joint.limits is not None:
         lower, upper = (value(f"{where}: limits[{i}]", limit) for i, limit in enumerate(joint.limits))
         if lower > upper:
             raise DescriptionError(f"{where}: limits [{lower:g}, {upper:g}] are the wrong way round")
         if joint.is_revolute:
-            angles += [("lower limit", lower, MAX_LIMIT_ANGLE), ("upper limit", upper, MAX_LIMIT_ANGLE)]
+            angles += [("lower limit", lower, _MAX_LIMIT_ANGLE), ("upper limit", upper, _MAX_LIMIT_ANGLE)]
     for key, angle, most in angles:
-        if most < abs(angle) <= MAX_DEGREES:
+        if most < abs(angle) <= _MAX_DEGREES:
             yield f"{where}: {key} is {angle:.6g} rad, {abs(angle) / math.tau:.3g} turns; are angles in degrees?"
     for key, unit in (("velocity", "rad/s or m/s"), ("effort", "N m or N")):
         limit = getattr(joint, key)
@@ -153,8 +141,8 @@ def _check_joint(joint: Joint, where: str, value: Value) -> Iterator[str]:
 
 
 def _check_body_names(bodies: Sequence[Body], where: str) -> None:
-    if len(bodies) > MAX_BODIES:
-        raise DescriptionError(f"{where}: {len(bodies)} bodies; expected at most {MAX_BODIES}")
+    if len(bodies) > BOUNDS.bodies:
+        raise DescriptionError(f"{where}: {len(bodies)} bodies; expected at most {BOUNDS.bodies}")
     names = [body.name for body in bodies]
     for k, name in enumerate(names, start=1):
         if name and not BODY_NAME.fullmatch(name):
@@ -166,7 +154,7 @@ def _check_body_names(bodies: Sequence[Body], where: str) -> None:
             raise DescriptionError(f"{where}: name {name!r} is another body's already")
 
 
-def _check_drive(drive: Drive, where: str, value: Value) -> None:
+def _check_drive(drive: Drive, where: str, value: _Value) -> None:
     if value(f"{where}: drive.gear", drive.gear) == 0:
         raise DescriptionError(f"{where}: drive.gear is 0; expected the ratio of motor to joint speed")
     for key, unit in (("rotor_inertia", "kg m^2"), ("viscous", "N m s/rad")):
@@ -180,7 +168,7 @@ def _check_drive(drive: Drive, where: str, value: Value) -> None:
         )
 
 
-def _check_couplings(description: RobotData, value: Value) -> Iterator[str]:
+def _check_couplings(description: RobotData, value: _Value) -> Iterator[str]:
     pairs: set[tuple[int, int]] = set()
     armature = [value("drive", joint.drive.armature) if joint.drive else 0.0 for joint in description.joints]
     for k, coupling in enumerate(description.couplings):
@@ -199,7 +187,7 @@ def _check_couplings(description: RobotData, value: Value) -> Iterator[str]:
             )
 
 
-def _check_body(body: Body, where: str, value: Value) -> Iterator[str]:
+def _check_body(body: Body, where: str, value: _Value) -> Iterator[str]:
     mass = value(f"{where}: body.mass", body.mass)
     if mass < 0:
         raise DescriptionError(f"{where}: body.mass is {mass:g} kg; expected none below 0")
@@ -221,7 +209,7 @@ def _check_body(body: Body, where: str, value: Value) -> Iterator[str]:
         yield f"{where}: a body without mass has inertia"
 
 
-def _check_only_body(body: Body, where: str, value: Value) -> Iterator[str]:
+def _check_only_body(body: Body, where: str, value: _Value) -> Iterator[str]:
     """Check the only body of a link, which is unlikely to be a point mass; one of several bodies may be one."""
     yield from _check_body(body, where, value)
     mass = value(f"{where}: body.mass", body.mass)
@@ -230,14 +218,14 @@ def _check_only_body(body: Body, where: str, value: Value) -> Iterator[str]:
         yield f"{where}: a body of {mass:g} kg has no inertia"
 
 
-def _principal_moments(body: Body, where: str, value: Value) -> tuple[float, float, float]:
+def _principal_moments(body: Body, where: str, value: _Value) -> tuple[float, float, float]:
     """Return the eigenvalues of the inertia, kg m^2, the lowest first."""
     rows = [[value(f"{where}: body.inertia", entry) for entry in row] for row in body.inertia.rows]
     lowest, middle, largest = (float(x) for x in np.linalg.eigvalsh(np.array(rows)))
     return lowest, middle, largest
 
 
-def _check_placement(placement: Placement, prefix: str, value: Value) -> None:
+def _check_placement(placement: Placement, prefix: str, value: _Value) -> None:
     for key, entries in (("xyz", placement.xyz), ("rpy", placement.rpy)):
         for i, entry in enumerate(entries):
             value(f"{prefix}{key}[{i}]", entry)
@@ -254,13 +242,13 @@ def check_body(body: Body, where: str, values: Mapping[str, Expression]) -> None
     list(_check_body(body, where, lambda place, expression: _number(place, expression, values)))
 
 
-def _check_shapes(shapes: tuple[Shape, ...], where: str, value: Value, description: RobotData) -> Iterator[str]:
-    if len(shapes) > MAX_SHAPES:
-        raise DescriptionError(f"{where}: {len(shapes)} shapes; expected at most {MAX_SHAPES}")
+def _check_shapes(shapes: tuple[Shape, ...], where: str, value: _Value, description: RobotData) -> Iterator[str]:
+    if len(shapes) > BOUNDS.shapes:
+        raise DescriptionError(f"{where}: {len(shapes)} shapes; expected at most {BOUNDS.shapes}")
     for shape in shapes:
         _check_placement(shape.placement, f"{where}: shape.", value)
         _check_placement(shape.frame, f"{where}: shape.frame.", value)
-        if shape.color is not None and not COLOR.fullmatch(shape.color):
+        if shape.color is not None and not _COLOR.fullmatch(shape.color):
             raise DescriptionError(f"{where}: shape.color is {shape.color[:80]!r}; expected '#rrggbb'")
         if isinstance(shape.geometry, Mesh):
             yield from _check_mesh(shape.geometry, f"{where}: shape", value, description)
@@ -268,7 +256,7 @@ def _check_shapes(shapes: tuple[Shape, ...], where: str, value: Value, descripti
             _check_sizes(shape.geometry, f"{where}: shape", value)
 
 
-def _check_sizes(geometry: Geometry, where: str, value: Value) -> None:
+def _check_sizes(geometry: Geometry, where: str, value: _Value) -> None:
     if isinstance(geometry, Box):
         sizes = {f"box[{i}]": edge for i, edge in enumerate(geometry.size)}
     else:
@@ -279,7 +267,7 @@ def _check_sizes(geometry: Geometry, where: str, value: Value) -> None:
             raise DescriptionError(f"{where}.{key} is {number:g}; expected a positive number")
 
 
-def _check_mesh(mesh: Mesh, where: str, value: Value, description: RobotData) -> Iterator[str]:
+def _check_mesh(mesh: Mesh, where: str, value: _Value, description: RobotData) -> Iterator[str]:
     """Refuse an invalid path or scale; a file that is no mesh is a warning, for the arm works without it."""
     file = inside(description.mesh_folder, mesh.path, f"{where}.mesh")
     if not mesh.path.lower().endswith(MESH_FORMATS):
@@ -296,7 +284,7 @@ def _check_mesh(mesh: Mesh, where: str, value: Value, description: RobotData) ->
         yield f"{where}.mesh: {mesh.path!r} {fault}; the link is drawn without it"
 
 
-def _check_configurations(description: RobotData, value: Value) -> Iterator[str]:
+def _check_configurations(description: RobotData, value: _Value) -> Iterator[str]:
     for name, q in description.configurations.items():
         if not NAME.fullmatch(name):
             raise DescriptionError(f"configurations: {name[:80]!r} is no name")

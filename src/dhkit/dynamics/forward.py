@@ -16,7 +16,7 @@ from dhkit.symbolic import SINGULAR, Friction
 
 log = logging.getLogger(__name__)
 
-SINGULAR_SAMPLES = 16
+_SINGULAR_SAMPLES = 16
 """Number of random states at which a mass matrix must be singular to count as singular at every state."""
 
 
@@ -78,7 +78,7 @@ def require_inertia(description: Description) -> None:
         A link without a body; joints that carry no inertia at any state, or couplings that are too large: names them,
         and what would help.
     """
-    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (SINGULAR_SAMPLES, description.n))
+    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SINGULAR_SAMPLES, description.n))
     M = mass_matrix(description, q)
     if description.couplings and (np.linalg.eigvalsh(M)[:, 0] < -SINGULAR * np.abs(M).max(axis=(1, 2))).any():
         pairs = (coupling.joints for coupling in description.couplings)

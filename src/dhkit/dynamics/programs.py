@@ -29,7 +29,7 @@ from dhkit.symbolic import (
 if TYPE_CHECKING:
     import casadi
 
-EXPRESSIONS: Mapping[str, Callable[..., casadi.SX]] = {
+_EXPRESSIONS: Mapping[str, Callable[..., casadi.SX]] = {
     "mass_matrix": composite_mass_matrix,
     "coriolis_matrix": composite_coriolis_matrix,
     "gravity_torque": recursive_gravity,
@@ -39,8 +39,8 @@ EXPRESSIONS: Mapping[str, Callable[..., casadi.SX]] = {
     "kinetic_energy": kinetic_energy,
     "potential_energy": potential_energy,
 }
-"""Derivations of each quantity, as functions of the table and of the joint vectors of ``STATES``."""
-STATES: Mapping[str, tuple[str, ...]] = {
+"""Derivations of each quantity, as functions of the table and of the joint vectors of ``_STATES``."""
+_STATES: Mapping[str, tuple[str, ...]] = {
     "mass_matrix": ("q",),
     "coriolis_matrix": ("q", "qd"),
     "gravity_torque": ("q",),
@@ -63,7 +63,7 @@ def evaluate(
     out: Array | None = None,
     threads: int = 1,
 ) -> Array:
-    """Return a quantity of ``EXPRESSIONS``, shape (..., *tail), at joint vectors by name, each (..., n), in SI units.
+    """Return a quantity of ``_EXPRESSIONS``, shape (..., *tail), at joint vectors by name, each (..., n), in SI units.
 
     Raises
     ------
@@ -93,8 +93,8 @@ def dynamics_kernel(quantity: str, description: Description) -> tuple[Kernel, Ar
 def dynamics_graph(quantity: str, description: Description) -> Graph:
     """Return the program of a quantity, parametric in the arm's numbers."""
     table, parameters = InertialTable.parametric(description)
-    symbols = {name: joint_symbols(name, description.n) for name in STATES[quantity]}
-    expression = EXPRESSIONS[quantity](table, *symbols.values())
+    symbols = {name: joint_symbols(name, description.n) for name in _STATES[quantity]}
+    expression = _EXPRESSIONS[quantity](table, *symbols.values())
     return Graph.of(quantity, {"parameters": parameters, **symbols}, {"result": expression})
 
 
@@ -104,5 +104,5 @@ def dynamic_kernels(description: Description) -> list[Kernel]:
     kernels = [friction_kernel(description.n, smooth) for smooth in (False, True)]
     kernels.append(wrench_kernel(description)[0])
     if all(joint.bodies for joint in description.joints):
-        kernels += [dynamics_kernel(quantity, description)[0] for quantity in EXPRESSIONS]
+        kernels += [dynamics_kernel(quantity, description)[0] for quantity in _EXPRESSIONS]
     return kernels

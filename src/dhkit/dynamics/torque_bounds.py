@@ -27,7 +27,7 @@ import numpy as np
 
 from dhkit.description import Array, Convention, Description, Numbers
 
-FRICTION_FACTORS = 1.0, 3.0, 12.0, 60.0
+_FRICTION_FACTORS = 1.0, 3.0, 12.0, 60.0
 """The factors c_k of smooth dry friction."""
 
 
@@ -141,7 +141,7 @@ def dry_friction_bounds(numbers: Numbers, width: float, least_speed: Array, moti
     forwards, backwards = numbers.coulomb.T
     size = np.abs(forwards - backwards) / 2 + np.abs(forwards + backwards)
     r = np.hypot(1.0, least_speed / width)
-    f1, f2, f3, f4 = (size * FRICTION_FACTORS[k - 1] / (width**k * r ** (k + 2)) for k in (1, 2, 3, 4))
+    f1, f2, f3, f4 = (size * _FRICTION_FACTORS[k - 1] / (width**k * r ** (k + 2)) for k in (1, 2, 3, 4))
     v1, v2, v3, v4 = motion[2:6]
     # d^4 f(v(t)) / dt^4 (Faa di Bruno).
     bounds: Array = f4 * v1**4 + 6 * f3 * v1**2 * v2 + f2 * (3 * v2**2 + 4 * v1 * v3) + f1 * v4

@@ -20,9 +20,9 @@ from dhkit.symbolic import (
     velocity_regressor as velocity_regressor_expression,
 )
 
-DEPENDENT = 1e-9
+_DEPENDENT = 1e-9
 """A column of unit length depends on earlier ones where less than this remains of it; rounding leaves 1e-14."""
-STATES_PER_JOINT = 20
+_STATES_PER_JOINT = 20
 """Number of random states per joint for the rank: twice as many equations as parameters."""
 
 
@@ -134,11 +134,11 @@ def parameter_grouping(description: Description) -> ParameterGrouping:
     """
     n = description.n
     rng = np.random.default_rng(0)
-    states = rng.uniform(-np.pi, np.pi, (3, STATES_PER_JOINT * n, n))
+    states = rng.uniform(-np.pi, np.pi, (3, _STATES_PER_JOINT * n, n))
     A = regressor(description, *states).reshape(-1, 10 * n)
     order = [10 * i + k for i in reversed(range(n)) for k in range(1, 10)] + [10 * i for i in reversed(range(n))]
     basis, kept = np.zeros((len(A), 0)), []
-    floor = DEPENDENT * np.linalg.norm(A, axis=0).max()
+    floor = _DEPENDENT * np.linalg.norm(A, axis=0).max()
     for k in order:
         size = np.linalg.norm(A[:, k])
         if size <= floor:
@@ -146,7 +146,7 @@ def parameter_grouping(description: Description) -> ParameterGrouping:
         rest = A[:, k] / size
         for _ in range(2):  # the second pass removes what rounding left
             rest = rest - basis @ (basis.T @ rest)
-        if np.linalg.norm(rest) > DEPENDENT:
+        if np.linalg.norm(rest) > _DEPENDENT:
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
             kept.append(k)
     columns = tuple(sorted(kept))

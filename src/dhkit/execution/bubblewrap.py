@@ -15,10 +15,10 @@ HOME = Path("/home/student")
 PACKAGE_FOLDER = Path("/packages")
 RUNNERS = Path("/runners")
 """Folder of dhkit's files that are executed in the program's process."""
-SYSTEM_FOLDERS = ("/usr", "/lib", "/lib32", "/lib64", "/bin", "/sbin")
-SYSTEM_FILES = ("/etc/ld.so.cache", "/etc/alternatives", "/etc/octave", "/etc/fonts", "/etc/localtime")
+_SYSTEM_FOLDERS = ("/usr", "/lib", "/lib32", "/lib64", "/bin", "/sbin")
+_SYSTEM_FILES = ("/etc/ld.so.cache", "/etc/alternatives", "/etc/octave", "/etc/fonts", "/etc/localtime")
 """What programs of the system read: Octave finds its linear algebra by /etc/alternatives."""
-FOLDER_BYTES = 64 << 20
+_FOLDER_BYTES = 64 << 20
 """Size of each folder that a program may write to, bytes."""
 
 
@@ -29,7 +29,7 @@ def base_python() -> str:
 
 def bubblewrap(packages: tuple[str, ...]) -> list[str]:
     """Return bubblewrap with the listed mounts."""
-    size = ("--size", str(FOLDER_BYTES))
+    size = ("--size", str(_FOLDER_BYTES))
     return [
         *("bwrap", "--unshare-all", "--die-with-parent", "--new-session", "--cap-drop", "ALL"),
         *_system_mounts(),
@@ -41,13 +41,13 @@ def bubblewrap(packages: tuple[str, ...]) -> list[str]:
 
 def _system_mounts() -> Iterator[str]:
     """Yield options for the system's libraries and for Python's, without the packages that are installed there."""
-    for folder in SYSTEM_FOLDERS:
+    for folder in _SYSTEM_FOLDERS:
         path = Path(folder)
         if path.is_symlink():
             yield from ("--symlink", os.readlink(path), folder)  # noqa: PTH115 - as it is written there
         elif path.is_dir():
             yield from ("--ro-bind", folder, folder)
-    for name in SYSTEM_FILES:
+    for name in _SYSTEM_FILES:
         yield from ("--ro-bind-try", name, name)
     prefix = os.path.realpath(sys.base_prefix)
     if not prefix.startswith("/usr"):

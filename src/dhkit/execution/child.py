@@ -9,15 +9,10 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+from dhkit.execution.bounds import BOUNDS
 from dhkit.execution.isolated_commands import folder_inside, python_command, runner_inside
 from dhkit.execution.isolation import Isolation
 from dhkit.execution.process import HERE, CallTime, Failure, Limits, Process, ProgramError, printable
-
-MAX_SOURCE_BYTES = 1_000_000
-MAX_START_TIME = 30.0
-"""Processor time from the start to the first line, s: importing numpy may take some seconds."""
-MAX_ERROR_CHARACTERS = 500
-MAX_LINE = 10**7
 
 FUNCTION_RUNNERS = {".py": "python_runner.py", ".m": "octave_runner.m"}
 """Runners that call a file's functions with numbers."""
@@ -147,7 +142,7 @@ class Child:
         if self._closed:  # meanwhile, by another thread, which has not seen this process
             self._end()
             raise ProgramError(f"{self.name} was closed", Failure.ENDED)
-        first = self._read_until(running, MAX_START_TIME, lambda answer: "functions" in answer or "error" in answer)
+        first = self._read_until(running, BOUNDS.start_time, lambda answer: "functions" in answer or "error" in answer)
         if "error" in first:
             self._end()
             raise ProgramError(_error_text(first), Failure.UNREADABLE, _error_line(first))
@@ -199,8 +194,8 @@ class Child:
         try:
             if not source.is_file():
                 raise ProgramError(f"{source}: expected a file", Failure.UNREADABLE)
-            if source.stat().st_size > MAX_SOURCE_BYTES:
-                raise ProgramError(f"{source}: expected at most {MAX_SOURCE_BYTES} bytes", Failure.UNREADABLE)
+            if source.stat().st_size > BOUNDS.source_bytes:
+                raise ProgramError(f"{source}: expected at most {BOUNDS.source_bytes} bytes", Failure.UNREADABLE)
             (folder / source.name).write_bytes(source.read_bytes())
         except OSError as error:
             raise ProgramError(f"{source}: {error.strerror}", Failure.UNREADABLE) from None
@@ -219,10 +214,10 @@ class Child:
 
 def _error_text(answer: Mapping[str, object]) -> str:
     """Return the text of an answer that is an error, in one line."""
-    return " ".join(printable(str(answer["error"])).split())[:MAX_ERROR_CHARACTERS] or "failed"
+    return " ".join(printable(str(answer["error"])).split())[: BOUNDS.error_characters] or "failed"
 
 
 def _error_line(answer: Mapping[str, object]) -> int | None:
     """Return the line of the source that an answer names; None where it names none."""
     line = answer.get("line")
-    return line if isinstance(line, int) and not isinstance(line, bool) and 0 < line < MAX_LINE else None
+    return line if isinstance(line, int) and not isinstance(line, bool) and 0 < line < BOUNDS.line_number else None

@@ -9,7 +9,7 @@ from pathlib import Path
 from dhkit.execution.bubblewrap import HOME, PACKAGE_FOLDER, RUNNERS, base_python, bubblewrap, package_paths, read_only
 from dhkit.execution.isolation import Isolation, Kind
 
-HERE = Path(__file__).parent
+_HERE = Path(__file__).parent
 
 
 def folder_inside(isolation: Isolation, outside: Path) -> Path:
@@ -71,6 +71,6 @@ def isolated_command(
     if isolation.kind is not Kind.BUBBLEWRAP:
         return list(program)
     binds = {path: HOME / path.name for path in sorted(folder.iterdir())}
-    binds |= {path: RUNNERS / path.name for path in (*HERE.glob("*_runner.py"), *HERE.glob("*_runner.m"))}
+    binds |= {path: RUNNERS / path.name for path in (*_HERE.glob("*_runner.py"), *_HERE.glob("*_runner.m"))}
     binds |= {path.resolve(): path for path in shown}
     return [*bubblewrap(isolation.packages), *read_only(binds), "--chdir", str(HOME), "--", *program]

@@ -29,7 +29,7 @@ from dhkit.execution.other_user import FIRST_USER
 
 PACKAGES = ("numpy", "scipy", "sympy", "casadi")
 """Packages that programs may import, unless a task names others."""
-PROBE_TIME = 20.0
+_PROBE_TIME = 20.0
 """Longest time of the attempt to isolate a program, s."""
 
 
@@ -120,7 +120,7 @@ def _probed(hidden: tuple[str, ...], packages: tuple[str, ...], user: int) -> Is
     return Isolation(Kind.NONE, f"{reason}; as another user: {problem}", packages)
 
 
-WHAT_IS_SEEN = """
+_WHAT_IS_SEEN = """
 import os, sys
 for path in sys.argv[1:]:
     try:
@@ -136,7 +136,7 @@ def _problem_of_bubblewrap(hidden: Sequence[str], packages: tuple[str, ...]) -> 
     """Return why bubblewrap isolates nothing here; empty where it does."""
     if shutil.which("bwrap") is None:
         return "bubblewrap is not installed (Debian: apt-get install bubblewrap)"
-    seen, error = _probe([*bubblewrap(packages), "--", base_python(), "-I", "-S", "-c", WHAT_IS_SEEN, *hidden], 0)
+    seen, error = _probe([*bubblewrap(packages), "--", base_python(), "-I", "-S", "-c", _WHAT_IS_SEEN, *hidden], 0)
     if error:
         return f"bubblewrap fails: {error}"
     return f"bubblewrap shows {seen[0]}, which lies among the files of the system" if seen else ""
@@ -144,7 +144,7 @@ def _problem_of_bubblewrap(hidden: Sequence[str], packages: tuple[str, ...]) -> 
 
 def _problem_of_user(hidden: Sequence[str], needed: Sequence[str]) -> str:
     """Return why another user is no isolation here, or cannot read the packages it needs; empty where it works."""
-    seen, error = _probe([base_python(), "-I", "-S", "-c", WHAT_IS_SEEN, *hidden, *needed], FIRST_USER)
+    seen, error = _probe([base_python(), "-I", "-S", "-c", _WHAT_IS_SEEN, *hidden, *needed], FIRST_USER)
     if error:
         return error
     for path in hidden:
@@ -163,7 +163,7 @@ def _probe(command: list[str], user: int) -> tuple[list[str], str]:
             command,
             capture_output=True,
             text=True,
-            timeout=PROBE_TIME,
+            timeout=_PROBE_TIME,
             cwd="/",
             env={"LANG": "C.UTF-8"},
             user=user or None,

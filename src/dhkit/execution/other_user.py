@@ -14,8 +14,8 @@ import psutil
 
 FIRST_USER = 61_000
 """First number of the users that a program runs as: those of Debian end below, and nobody is 65,534."""
-USERS = 3_000
-END_ROUNDS = 200
+_USERS = 3_000
+_END_ROUNDS = 200
 """Rounds of killing all processes of a user, 10 ms apart."""
 
 _numbers = itertools.count(os.getpid())
@@ -23,7 +23,7 @@ _numbers = itertools.count(os.getpid())
 
 def next_user() -> int:
     """Return the number of a user for one program."""
-    return FIRST_USER + next(_numbers) % USERS
+    return FIRST_USER + next(_numbers) % _USERS
 
 
 def processes_of(user: int) -> list[psutil.Process]:
@@ -38,7 +38,7 @@ def processes_of(user: int) -> list[psutil.Process]:
 
 def end_processes_of(user: int) -> None:
     """Kill a user's processes until none is left that could start another."""
-    for _ in range(END_ROUNDS):
+    for _ in range(_END_ROUNDS):
         left = processes_of(user)
         if not left:
             return

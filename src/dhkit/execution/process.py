@@ -22,6 +22,7 @@ from pathlib import Path
 import psutil
 
 from dhkit.errors import DhkitError
+from dhkit.execution.bounds import BOUNDS
 from dhkit.execution.isolated_commands import folder_inside, isolated_command
 from dhkit.execution.isolation import Isolation, Kind
 from dhkit.execution.launcher import MAX_PROCESSES
@@ -33,23 +34,13 @@ WAITING_FACTOR = 4.0
 
 On a busy machine a process waits for its turns, which must not change what is found; one that sleeps ends all the same.
 """
-MAX_LINE_BYTES = 1 << 22
-"""Largest answer, bytes."""
-MAX_UNREAD_ANSWERS = 1_000
-"""Most answers that wait to be read."""
-MAX_OUTPUT_BYTES = 1 << 16
-"""Bytes that are kept of a program's printed output: the last ones."""
-MAX_WRITTEN_BYTES = 128 << 20
-"""Largest size together of a program's files in its folder and of those without a name, bytes."""
-EXIT_DELAY = 0.3
+_EXIT_DELAY = 0.3
 """Longest time from the end of a program's answers to its own end, s."""
-WATCH_PERIOD = 0.05
+_WATCH_PERIOD = 0.05
 """Time between two looks at memory and processes, s."""
-LAST_WORDS_TIME = 1.0
+_LAST_WORDS_TIME = 1.0
 """Longest time for the printed output of a program that has ended, s: children may hold it open."""
-MAX_END_TIME = 5.0
-"""Longest time that processes may take to end when they are killed, s."""
-BLOCK_BYTES = 512
+_BLOCK_BYTES = 512
 """Unit of ``st_blocks``."""
 
 
@@ -175,7 +166,7 @@ class Process:
         """Processor time of all processes of the program, when the watch last looked, s."""
         self._descendants: dict[int, psutil.Process] = {}
         self._processor_times: dict[int, float] = {}
-        self._lines: queue.Queue[bytes | None] = queue.Queue(MAX_UNREAD_ANSWERS)
+        self._lines: queue.Queue[bytes | None] = queue.Queue(BOUNDS.unread_answers)
         self._output = bytearray()
         self._drained = threading.Event()
         """Set at the end of the printed output."""
@@ -251,11 +242,11 @@ class Process:
         self._closed.set()
         self._kill()
         with suppress(subprocess.TimeoutExpired):
-            self._process.wait(MAX_END_TIME)
+            self._process.wait(BOUNDS.end_time)
         os.close(self._requests)
         for thread in self._threads:
             if thread is not threading.current_thread():
-                thread.join(MAX_END_TIME)
+                thread.join(BOUNDS.end_time)
         if self._user:
             remove_files_of(self._user)
         self._folder.cleanup()
@@ -295,12 +286,12 @@ class Process:
             Failure.LATE: call.late,
             Failure.MEMORY: f"needed more than {self._limits.memory / (1 << 30):.3g} GB of memory",
             Failure.PROCESSES: f"started more than {MAX_PROCESSES} processes",
-            Failure.FILES: f"wrote more than {MAX_WRITTEN_BYTES >> 20} MB to files",
+            Failure.FILES: f"wrote more than {BOUNDS.written_bytes >> 20} MB to files",
             Failure.ENDED: f"the program ended{self._exit_status_text()}",
             Failure.GARBAGE: "wrote what is no answer",
         }
         if self.failure is Failure.ENDED:
-            self._drained.wait(LAST_WORDS_TIME)  # its last words may come after the news of its end
+            self._drained.wait(_LAST_WORDS_TIME)  # its last words may come after the news of its end
         lines = self.output().strip().splitlines() if self.failure is Failure.ENDED else []
         last_line = f": {printable(lines[-1])[:200]}" if lines else ""
         return ProgramError(texts[self.failure] + last_line, self.failure)
@@ -308,7 +299,7 @@ class Process:
     def _exit_status_text(self) -> str:
         """Return the status or the signal that the program ended with, as text; empty if it still runs."""
         with suppress(subprocess.TimeoutExpired):
-            status = self._process.wait(EXIT_DELAY)
+            status = self._process.wait(_EXIT_DELAY)
             number = -status if status < 0 else status - 128  # bubblewrap tells a signal as a shell does
             if number > 0:
                 with suppress(ValueError):
@@ -319,7 +310,7 @@ class Process:
     def _receive(self) -> None:
         """Queue the lines of answers; a line that is too long, or too many of them, ends the process."""
         with os.fdopen(self._answers, "rb") as file:
-            while line := file.readline(MAX_LINE_BYTES):
+            while line := file.readline(BOUNDS.answer_bytes):
                 if self._has_own_root:
                     self._folder.cleanup()  # what is mounted from it stays; nothing is left even if dhkit is killed
                 try:
@@ -340,14 +331,14 @@ class Process:
         stream = self._process.stdout
         assert stream is not None  # noqa: S101 - for mypy: it is a pipe
         with stream:
-            while piece := os.read(stream.fileno(), MAX_OUTPUT_BYTES):
+            while piece := os.read(stream.fileno(), BOUNDS.output_bytes):
                 self._output += piece
-                del self._output[:-MAX_OUTPUT_BYTES]
+                del self._output[: -BOUNDS.output_bytes]
         self._drained.set()
 
     def _watch(self) -> None:
         """Watch processor time, memory, number and files of the processes, and end the process beyond its limits."""
-        while not self._closed.wait(WATCH_PERIOD):
+        while not self._closed.wait(_WATCH_PERIOD):
             self._find_descendants()
             memory = 0
             for process in list(self._descendants.values()):
@@ -362,7 +353,7 @@ class Process:
                 self._terminate(Failure.MEMORY)
             elif len(self._descendants) > MAX_PROCESSES:
                 self._terminate(Failure.PROCESSES)
-            elif _written_bytes(Path(self._folder.name), list(self._descendants)) > MAX_WRITTEN_BYTES:
+            elif _written_bytes(Path(self._folder.name), list(self._descendants)) > BOUNDS.written_bytes:
                 self._terminate(Failure.FILES)
 
     def _find_descendants(self) -> None:
@@ -401,7 +392,7 @@ def _written_bytes(folder: Path, processes: Sequence[int]) -> int:
     for place, folders, names in os.walk(folder):
         for name in (*folders, *names):
             with suppress(OSError):
-                total += BLOCK_BYTES * os.lstat(os.path.join(place, name)).st_blocks  # noqa: PTH118 - many files
+                total += _BLOCK_BYTES * os.lstat(os.path.join(place, name)).st_blocks  # noqa: PTH118 - many files
     unnamed: dict[tuple[int, int], int] = {}
     for pid in processes:
         with suppress(OSError):
@@ -409,7 +400,7 @@ def _written_bytes(folder: Path, processes: Sequence[int]) -> int:
                 with suppress(OSError):
                     status = os.stat(f"/proc/{pid}/fd/{descriptor}")  # noqa: PTH116 - many files
                     if stat.S_ISREG(status.st_mode) and status.st_nlink == 0:
-                        unnamed[status.st_dev, status.st_ino] = BLOCK_BYTES * status.st_blocks
+                        unnamed[status.st_dev, status.st_ino] = _BLOCK_BYTES * status.st_blocks
     return total + sum(unnamed.values())
 
 

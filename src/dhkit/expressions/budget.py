@@ -7,7 +7,7 @@ from contextvars import ContextVar, Token
 from dhkit.display import repr_line
 from dhkit.errors import ExpressionError
 
-DEFAULT_WORK = 100_000
+_DEFAULT_WORK = 100_000
 """Number of products and sums of terms, about half a second. A file of the library needs at most 1,000, an arm of
 symbols with a joint locked at 60 degrees 20,000."""
 
@@ -24,7 +24,7 @@ class Budget:
     dhkit.errors.ExpressionError: multiplies out to too many terms
     """
 
-    def __init__(self, work: int = DEFAULT_WORK) -> None:
+    def __init__(self, work: int = _DEFAULT_WORK) -> None:
         self.left = work
         self._tokens: list[Token[Budget | None]] = []
 

@@ -17,26 +17,19 @@ from typing import TypeAlias
 from dhkit.cached_property import cached_property
 from dhkit.display import LONGEST_LINE, plain
 from dhkit.errors import ExpressionError
+from dhkit.expressions.bounds import BOUNDS
 from dhkit.expressions.budget import spend
 from dhkit.expressions.syntax import decimal_text
 
-MAX_TERMS = 2_000
-"""Largest number of terms of a sum; the longest entry of a robot file has a few dozen."""
-MAX_EXPONENT = 64
-"""Largest whole exponent; it bounds a power's expansion and digits."""
-MAX_BITS = 8_192
-"""Largest size of a coefficient in bits. Doubles need 1,100; products of 8,192 bits still take microseconds."""
 PI_DIGITS = Fraction("3.14159265358979323846264338327950288419716939937510582097494459")
 STEPS_IN_PI = 12
 """Steps of 15 degrees in pi: multiples of 15 degrees have exact cosines."""
-MAX_ATOM_LENGTH = 4_000
-"""Longest text of a function with its arguments, characters."""
 LARGEST = 10**308
 """Nearly the largest double."""
 MAX_FRACTION_PART = 16
 """Fractions with parts up to this are printed as fractions (l1/12), others as decimals (0.4318*l1)."""
 
-Scalar: TypeAlias = "Expression | int | Fraction"
+_Scalar: TypeAlias = "Expression | int | Fraction"
 
 
 @dataclass(frozen=True)
@@ -142,12 +135,12 @@ class Expression:
         Raises
         ------
         ExpressionError
-            The text is longer than :data:`MAX_ATOM_LENGTH`; nested functions double it with each level.
+            The text is longer than ``BOUNDS.atom_characters``; nested functions double it with each level.
         """
         if atom.arguments:
             spend(len(atom.text) // 16)
-            if len(atom.text) > MAX_ATOM_LENGTH:
-                raise ExpressionError(f"a function of more than {MAX_ATOM_LENGTH} characters")
+            if len(atom.text) > BOUNDS.atom_characters:
+                raise ExpressionError(f"a function of more than {BOUNDS.atom_characters} characters")
         return cls(((((atom, 1),), Fraction(1)),))
 
     @classmethod
@@ -202,7 +195,7 @@ class Expression:
                 base = atom.value()
                 if exponent < 0 and (base == 0 or _is_rounding(atom, base)):
                     raise ExpressionError(
-                        f"{plain(self.text, SHOWN_LENGTH)} divides by zero" + (", to rounding" if base else "")
+                        f"{plain(self.text, _SHOWN_LENGTH)} divides by zero" + (", to rounding" if base else "")
                     )
                 value *= _power(base, exponent)
             total += value
@@ -212,7 +205,7 @@ class Expression:
         try:
             return float(self.value())
         except OverflowError:
-            raise ExpressionError(f"{plain(self.text, SHOWN_LENGTH)} is no finite double") from None
+            raise ExpressionError(f"{plain(self.text, _SHOWN_LENGTH)} is no finite double") from None
 
     @property
     def text(self) -> str:
@@ -245,23 +238,23 @@ class Expression:
 
     # Arithmetic
 
-    def __add__(self, other: Scalar) -> Expression:
+    def __add__(self, other: _Scalar) -> Expression:
         return Expression.sum((self, _expression(other)))
 
     def __neg__(self) -> Expression:
         return Expression(tuple((monomial, -coefficient) for monomial, coefficient in self.terms))
 
-    def __sub__(self, other: Scalar) -> Expression:
+    def __sub__(self, other: _Scalar) -> Expression:
         return self + -_expression(other)
 
-    def __rsub__(self, other: Scalar) -> Expression:
+    def __rsub__(self, other: _Scalar) -> Expression:
         return -self + other
 
-    def __mul__(self, other: Scalar) -> Expression:
+    def __mul__(self, other: _Scalar) -> Expression:
         total: dict[Monomial, Fraction] = {}
         unresolved = ZERO
         right = _expression(other).terms
-        spend(len(self.terms) * len(right) * (1 + (_bits(self.terms) + _bits(right)) // BITS_PER_WORK))
+        spend(len(self.terms) * len(right) * (1 + (_bits(self.terms) + _bits(right)) // _BITS_PER_WORK))
         for left_monomial, left in self.terms:
             for right_monomial, coefficient in right:
                 monomial, factor = _merged(left_monomial, right_monomial)
@@ -275,17 +268,17 @@ class Expression:
     __radd__ = __add__
     __rmul__ = __mul__
 
-    def __truediv__(self, other: Scalar) -> Expression:
+    def __truediv__(self, other: _Scalar) -> Expression:
         divisor = _expression(other)
         ratio = _ratio(self, divisor)
         return self * _reciprocal(divisor) if ratio is None else Expression.number(ratio)
 
-    def __rtruediv__(self, other: Scalar) -> Expression:
+    def __rtruediv__(self, other: _Scalar) -> Expression:
         return _expression(other) / self
 
     def __pow__(self, exponent: int) -> Expression:
-        if abs(exponent) > MAX_EXPONENT:
-            raise ExpressionError(f"an exponent beyond {MAX_EXPONENT}")
+        if abs(exponent) > BOUNDS.exponent:
+            raise ExpressionError(f"an exponent beyond {BOUNDS.exponent}")
         if exponent < 0:
             return (1 / self) ** -exponent
         result = Expression.number(1)
@@ -311,26 +304,26 @@ def _power(base: Fraction, exponent: int) -> Fraction:
 
 def _shortened(value: Fraction) -> Fraction:
     size = value.numerator.bit_length() - value.denominator.bit_length()
-    if value.numerator.bit_length() + value.denominator.bit_length() <= 2 * POWER_BITS:
+    if value.numerator.bit_length() + value.denominator.bit_length() <= 2 * _POWER_BITS:
         return value
-    scale = Fraction(2) ** (POWER_BITS - size)
+    scale = Fraction(2) ** (_POWER_BITS - size)
     return Fraction(round(value * scale)) / scale
 
 
-BITS_PER_WORK = 256
+_BITS_PER_WORK = 256
 """Size of two coefficients, bits, whose product takes as long as adding a term; a budget counts both."""
-POWER_BITS = 400
+_POWER_BITS = 400
 """Precision of powers of pi and functions, bits: 120 digits, twice those of pi."""
-SHOWN_LENGTH = 120
+_SHOWN_LENGTH = 120
 """Longest expression in a message, characters."""
-CANCELLED = Fraction(1, 10**14)
+_CANCELLED = Fraction(1, 10**14)
 """A sum of rounded values may be zero if it is below this share of its terms' sizes; each is rounded to 1e-16."""
 
 ZERO = Expression()
 PI = Expression.of_atom(Atom("pi"))
 
 
-def _expression(value: Scalar) -> Expression:
+def _expression(value: _Scalar) -> Expression:
     return value if isinstance(value, Expression) else Expression.number(value)
 
 
@@ -354,9 +347,9 @@ def _order(term: tuple[Monomial, Fraction]) -> tuple[int, str]:
 def _collected(total: Mapping[Monomial, Fraction]) -> Expression:
     spend(1 + len(total))
     terms = [term for term in total.items() if term[1]]
-    if len(terms) > MAX_TERMS:
-        raise ExpressionError(f"an expression of more than {MAX_TERMS} terms")
-    if any(c.numerator.bit_length() + c.denominator.bit_length() > MAX_BITS for _, c in terms):
+    if len(terms) > BOUNDS.terms:
+        raise ExpressionError(f"an expression of more than {BOUNDS.terms} terms")
+    if any(c.numerator.bit_length() + c.denominator.bit_length() > BOUNDS.coefficient_bits for _, c in terms):
         raise ExpressionError("a number too long to be kept exactly")
     return Expression(tuple(sorted(terms, key=_order) if len(terms) > 1 else terms))
 
@@ -369,8 +362,8 @@ def _merged(left: Monomial, right: Monomial) -> tuple[Monomial, Expression | Non
     powers = dict(left)
     for atom, exponent in right:
         powers[atom] = powers.get(atom, 0) + exponent
-    if any(abs(exponent) > MAX_EXPONENT**2 for exponent in powers.values()):
-        raise ExpressionError(f"an exponent of more than {MAX_EXPONENT**2}")
+    if any(abs(exponent) > BOUNDS.exponent**2 for exponent in powers.values()):
+        raise ExpressionError(f"an exponent of more than {BOUNDS.exponent**2}")
     factor: Expression | None = None
     for atom, exponent in list(powers.items()):
         resolved, left_over = 0, exponent
@@ -397,7 +390,7 @@ def _is_rounding(atom: Atom, value: Fraction) -> bool:
     if atom.name != "group":
         return False
     terms = sum(abs(Expression((term,)).value()) for term in atom.arguments[0].terms)
-    return abs(value) <= CANCELLED * terms
+    return abs(value) <= _CANCELLED * terms
 
 
 def _reciprocal(divisor: Expression) -> Expression:

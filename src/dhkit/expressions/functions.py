@@ -11,11 +11,11 @@ from dhkit.errors import ExpressionError
 from dhkit.expressions.exact import PI, STEPS_IN_PI, ZERO, Atom, Expression
 from dhkit.expressions.numbers import exact, exact_angle
 
-NEGLIGIBLE = 1e-40
+_NEGLIGIBLE = 1e-40
 """Values of functions below this are replaced by 0: no length makes them count, and their decimals would be long."""
-SETTLED_DIGITS = 30
+_SETTLED_DIGITS = 30
 """Digits kept of a coefficient that products of decimals have made longer; a double has 17."""
-LARGEST_FACTORED = 10**6
+_LARGEST_FACTORED = 10**6
 """Square roots of numbers up to this are split into those of primes: sqrt(6) is sqrt(2)*sqrt(3)."""
 
 
@@ -30,7 +30,7 @@ def sqrt(x: Expression) -> Expression:
     root = math.isqrt(inside)
     if root * root == inside:
         return Expression.number(Fraction(root, number.denominator))
-    if inside > LARGEST_FACTORED:
+    if inside > _LARGEST_FACTORED:
         return Expression.of_atom(Atom("sqrt", (x,)))
     result = Expression.number(Fraction(1, number.denominator))
     for prime, power in _prime_factors(inside):
@@ -158,7 +158,7 @@ def _replaced(atom: Atom, values: Mapping[str, Expression]) -> Expression:
 
 def _decimal(atom: Atom) -> Expression:
     value = float(atom.value())
-    return exact(value) if abs(value) > NEGLIGIBLE else ZERO
+    return exact(value) if abs(value) > _NEGLIGIBLE else ZERO
 
 
 def decimals(expression: Expression) -> Expression:
@@ -254,6 +254,6 @@ def settled(value: Expression, *, angle: bool = False) -> Expression:
     ``sin(0.5)`` is an atom of exact arithmetic; in a table it is written as 0.479425538604203.
     """
     if value.symbols or value.rational is not None or value.half_turns is not None:
-        return value.with_digits(SETTLED_DIGITS)
+        return value.with_digits(_SETTLED_DIGITS)
     number = exact(float(value))
     return exact_angle(number) if angle else number

@@ -22,18 +22,12 @@ from fractions import Fraction
 from typing import NamedTuple, NoReturn, TypeAlias
 
 from dhkit.errors import ExpressionError
+from dhkit.expressions.bounds import BOUNDS
 
-MAX_LENGTH = 10_000
-"""Longest expression, characters: longer than any derivation that a person types."""
-MAX_DEPTH = 50
-"""Deepest nesting of brackets, signs and powers."""
-MAX_DIGITS = 400
-"""Largest number of digits, and largest decimal exponent: no finite double has more."""
-
-TOKEN = re.compile(r"\s*(?:((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*/^(),]))", re.ASCII)
+_TOKEN = re.compile(r"\s*(?:((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*/^(),]))", re.ASCII)
 
 
-DECIMAL_DIGITS = 4_096
+_DECIMAL_DIGITS = 4_096
 """Precision of printed decimals: more than any coefficient of an exact expression needs."""
 
 
@@ -105,8 +99,8 @@ def read(text: str) -> Tree:
     ExpressionError
         The text is no expression, or is longer or deeper than the limits of this module.
     """
-    if len(text) > MAX_LENGTH:
-        raise ExpressionError(f"an expression of {len(text)} characters; expected at most {MAX_LENGTH}")
+    if len(text) > BOUNDS.characters:
+        raise ExpressionError(f"an expression of {len(text)} characters; expected at most {BOUNDS.characters}")
     return read_tokens(_tokens(text), text)
 
 
@@ -123,7 +117,7 @@ def read_tokens(tokens: Sequence[Token], text: str) -> Tree:
     Raises
     ------
     ExpressionError
-        The tokens are no expression, or nested deeper than :data:`MAX_DEPTH`.
+        The tokens are no expression, or nested deeper than ``BOUNDS.nesting``.
     """
     return _Reader(tokens, text).whole()
 
@@ -138,7 +132,7 @@ def decimal_fraction(text: str) -> Fraction:
     """
     mantissa, _, exponent = text.lower().partition("e")
     shown = text if len(text) <= 20 else f"{text[:17]}..."
-    if len(mantissa) > MAX_DIGITS or len(exponent) > 6 or abs(int(exponent or 0)) > MAX_DIGITS:
+    if len(mantissa) > BOUNDS.digits or len(exponent) > 6 or abs(int(exponent or 0)) > BOUNDS.digits:
         raise ExpressionError(f"{shown} is beyond the range of a double")
     value = Fraction(text)
     try:
@@ -156,7 +150,7 @@ def decimal_text(value: Fraction) -> str | None:
             denominator //= prime
     if denominator != 1:
         return None
-    digits = Context(prec=DECIMAL_DIGITS)
+    digits = Context(prec=_DECIMAL_DIGITS)
     return str(digits.divide(Decimal(value.numerator), Decimal(value.denominator))).lower()
 
 
@@ -164,7 +158,7 @@ def _tokens(text: str) -> list[Token]:
     tokens, at = [], 0
     end = len(text.rstrip())
     while at < end:
-        match = TOKEN.match(text, at)
+        match = _TOKEN.match(text, at)
         if match is None:
             at += len(text[at:]) - len(text[at:].lstrip())
             raise ExpressionError(f"{_shown(text)}: unexpected character {text[at]!r} at position {at + 1}")
@@ -210,8 +204,8 @@ class _Reader:
 
     def _deeper(self) -> None:
         self.depth += 1
-        if self.depth > MAX_DEPTH:
-            raise ExpressionError(f"{self.shown}: nested more than {MAX_DEPTH} deep")
+        if self.depth > BOUNDS.nesting:
+            raise ExpressionError(f"{self.shown}: nested more than {BOUNDS.nesting} deep")
 
     def whole(self) -> Tree:
         tree = self.sum()

@@ -15,18 +15,17 @@ from pathlib import Path
 from typing import TypeAlias
 
 from dhkit.errors import DhkitError
+from dhkit.grading.bounds import BOUNDS
 from dhkit.grading.isolation import Limits, Worker, is_late, start_worker
 from dhkit.grading.report import GradeReport
 from dhkit.grading.reports.json import report_of
 from dhkit.grading.sheets import Sheet
 
 GIGABYTE = 1024**3
-MAX_REPORT_BYTES = 20_000_000
-"""Longest report that is accepted from a process, bytes."""
 
 Judge: TypeAlias = Callable[[Path], GradeReport]
 """Judges a sheet; an exception that it raises becomes the report's error."""
-Numbered: TypeAlias = tuple[int, GradeReport]
+_Numbered: TypeAlias = tuple[int, GradeReport]
 """A report with the number of its sheet, from 0."""
 
 
@@ -81,7 +80,7 @@ def grade_all(
 
 
 def _in_order(
-    results: Iterator[Numbered],
+    results: Iterator[_Numbered],
     total: int,
     prepare: Callable[[GradeReport], object] | None,
     progress: Callable[[int, int], object] | None,
@@ -99,14 +98,14 @@ def _in_order(
             turn += 1
 
 
-def _judge_here(sheets: Sequence[Sheet], judge: Judge, limits: Limits) -> Iterator[Numbered]:
+def _judge_here(sheets: Sequence[Sheet], judge: Judge, limits: Limits) -> Iterator[_Numbered]:
     for number, sheet in enumerate(sheets):
         begin = time.monotonic()
         report = GradeReport(error=sheet.error) if sheet.error else report_of(_judge_to_json(sheet.path, judge, limits))
         yield number, _with_origin(report, sheet, time.monotonic() - begin)
 
 
-def _judge_in_processes(sheets: Sequence[Sheet], judge: Judge, jobs: int, limits: Limits) -> Iterator[Numbered]:
+def _judge_in_processes(sheets: Sequence[Sheet], judge: Judge, jobs: int, limits: Limits) -> Iterator[_Numbered]:
     """Yield reports as they are completed; at the end no process is left."""
     waiting = deque(enumerate(sheets))
     with closing(_Pool(judge, limits)) as pool:
@@ -164,7 +163,7 @@ class _Pool:
         self._selector.register(worker.pipe, selectors.EVENT_READ, number)
         return ""
 
-    def wait(self) -> list[Numbered]:
+    def wait(self) -> list[_Numbered]:
         """Wait until a process writes or exceeds its limit; return the reports that are then complete."""
         if not self.running:
             return []
@@ -176,15 +175,15 @@ class _Pool:
         done = []
         for key, _ in self._selector.select(max(0.0, patience)):
             is_complete = workers[key.data].read()
-            if len(workers[key.data].received) > MAX_REPORT_BYTES:
-                done.append(self._finish(key.data, f"the judge wrote more than {MAX_REPORT_BYTES / 1e6:g} MB"))
+            if len(workers[key.data].received) > BOUNDS.report_bytes:
+                done.append(self._finish(key.data, f"the judge wrote more than {BOUNDS.report_bytes / 1e6:g} MB"))
             elif is_complete:
                 done.append(self._finish(key.data))
         self._waited = time.monotonic()
         late = [number for number, (_, worker) in self.running.items() if worker.deadline <= self._waited]
         return done + [self._finish(number, self.limits.late) for number in late]
 
-    def _finish(self, number: int, error: str = "") -> Numbered:
+    def _finish(self, number: int, error: str = "") -> _Numbered:
         sheet, worker = self.running[number]
         status = self._end(number)
         report = GradeReport(error=error) if error else self._report(worker.received, status)

@@ -8,7 +8,7 @@ from fractions import Fraction
 from dhkit.symbolic.mistakes import MISTAKES, Mistake, Subject, catalogue
 from dhkit.symbolic.textbook_kinematics import KINEMATIC_MISTAKES, ROW
 
-UNNAMED_HINT = "Look again at the entries that are marked as wrong."
+_UNNAMED_HINT = "Look again at the entries that are marked as wrong."
 """Hint of a diagnosis that names no mistake."""
 PARAMETER_FACTORS = {
     "parameter_halved": Fraction(1, 2),
@@ -41,7 +41,7 @@ def _catalogue(groups: Mapping[tuple[Subject, str], Mapping[str, str]]) -> dict[
     )
 
 
-WRITING = _catalogue(
+_WRITING = _catalogue(
     {
         (Subject.WRITING, "Look again at the units."): {
             "degrees_for_radians": "angles in degrees are used as if they were in radians",
@@ -166,7 +166,7 @@ INVERSE = _catalogue(
     }
 )
 
-EQUATION = _catalogue(
+_EQUATION = _catalogue(
     {
         (Subject.ENERGY, "Look again at the inertia: of which body is this the formula, and about which point?"): {
             "inertia_halved": "the link's inertia about its centre of mass counts by half",
@@ -287,7 +287,7 @@ EQUATION = _catalogue(
 
 LIBRARY: Mapping[str, Mistake] = catalogue(
     mistake
-    for group in (INVERSE, JACOBIAN, TABLE, KINEMATIC_MISTAKES, MISTAKES, EQUATION, WRITING)
+    for group in (INVERSE, JACOBIAN, TABLE, KINEMATIC_MISTAKES, MISTAKES, _EQUATION, _WRITING)
     for mistake in group.values()
 )
 """All mistakes by identity, in the order in which the command line lists them."""
@@ -322,4 +322,4 @@ def sentence_of(identity: str, where: str = "", detail: str = "") -> str:
 
 def hint_of(identity: str | None) -> str:
     """Return the hint of a mistake: the place to look at, not the error; for None a general hint."""
-    return LIBRARY[identity].hint if identity else UNNAMED_HINT
+    return LIBRARY[identity].hint if identity else _UNNAMED_HINT

@@ -15,6 +15,7 @@ from dhkit.grading.answers.objects import entries_of
 from dhkit.grading.answers.sheet import quantity_names, read_sheet, sheet_of
 from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Names
 from dhkit.grading.answers.sources import SHEET_SUFFIXES, executed_source, read_source
+from dhkit.grading.bounds import BOUNDS
 from dhkit.grading.judging.truth import truth_of
 from dhkit.grading.mistakes.diagnosis import variants_of
 from dhkit.grading.options import GradeKeywords, GradeOptions
@@ -24,9 +25,7 @@ from dhkit.grading.sheet_judge import judge_sheet
 
 MAX_PREPARED_JOINTS = 4
 """Largest arm whose mistakes are all derived ahead; for larger arms that takes longer than most sheets need."""
-MAX_NAME_CHARACTERS = 200
-"""Longest name of a robot file that a sheet may give."""
-IDENTITY = [["1" if i == j else "0" for j in range(4)] for i in range(4)]
+_IDENTITY = [["1" if i == j else "0" for j in range(4)] for i in range(4)]
 
 
 def grade(
@@ -170,7 +169,7 @@ def robot_of(sheet: AnswerSheet, folder: str | Path) -> Description:
             return library_robot(name)
         except DescriptionError as error:
             raise AnswerError(f"{place}: {error}") from None
-    if len(name) > MAX_NAME_CHARACTERS or not name.isprintable():
+    if len(name) > BOUNDS.robot_name_characters or not name.isprintable():
         raise AnswerError(f"{place}: {name[:40]!r} is no file name")
     inside = Path(folder).resolve()
     try:
@@ -195,7 +194,7 @@ def prepare(description: Description | None, report: GradeReport | None = None) 
         derived.
     """
     if report is None:
-        judge_sheet(description or library_robot("planar2r"), sheet_of({"answer": {"A1": IDENTITY}}))
+        judge_sheet(description or library_robot("planar2r"), sheet_of({"answer": {"A1": _IDENTITY}}))
         import mpmath  # noqa: F401
         import scipy.optimize  # noqa: F401
 

@@ -22,18 +22,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
 
-PIPE_BYTES = 1 << 18
+_PIPE_BYTES = 1 << 18
 """Bytes that are read from a pipe at once."""
-MAX_FILES = 65_536
+_MAX_FILES = 65_536
 """Highest number of a file that is closed in a new process."""
-WAITING_FACTOR = 4.0
+_WAITING_FACTOR = 4.0
 """Longest time on the clock, as a multiple of the limit of processor time.
 
 On a busy machine a process waits for its turns, which must not change what is found; one that sleeps ends all the same.
 """
-GRACE = 5.0
+_GRACE = 5.0
 """Time that a process may outlive its limit, s: its parent has died then and does not end it."""
-TIME_SIGNALS = ("SIGXCPU", "SIGALRM", "SIGPROF")
+_TIME_SIGNALS = ("SIGXCPU", "SIGALRM", "SIGPROF")
 """Signals that end a process which exceeds its time."""
 
 
@@ -55,7 +55,7 @@ class Limits:
     @property
     def longest(self) -> float:
         """Longest time on the clock, s."""
-        return WAITING_FACTOR * self.seconds
+        return _WAITING_FACTOR * self.seconds
 
     @property
     def late(self) -> str:
@@ -92,7 +92,7 @@ class Worker:
 
     def read(self) -> bool:
         """Receive what is in the pipe; return whether the process has closed it, its result being complete."""
-        piece = os.read(self.pipe, PIPE_BYTES)
+        piece = os.read(self.pipe, _PIPE_BYTES)
         self.received += piece
         return not piece
 
@@ -167,7 +167,7 @@ def result_of(work: Callable[[], bytes], limits: Limits) -> bytes:
 
 def is_late(status: int) -> bool:
     """Return whether a process exceeded its time, given its status, -k for signal k."""
-    return -status in [getattr(signal, name) for name in TIME_SIGNALS]
+    return -status in [getattr(signal, name) for name in _TIME_SIGNALS]
 
 
 def _run(end: int, work: Callable[[], bytes], limits: Limits) -> NoReturn:
@@ -198,7 +198,7 @@ def _close_files(end: int) -> None:
     for standard in (0, 1, 2):
         os.dup2(null, standard)
     os.closerange(3, end)
-    os.closerange(end + 1, min(os.sysconf("SC_OPEN_MAX"), MAX_FILES))
+    os.closerange(end + 1, min(os.sysconf("SC_OPEN_MAX"), _MAX_FILES))
     sys.stdin = open(0, closefd=False)  # noqa: SIM115
     sys.stdout = sys.stderr = open(1, "w", closefd=False)  # noqa: SIM115
 
@@ -207,7 +207,7 @@ def _set_limits(limits: Limits) -> None:
     import resource
 
     for number, timer, longest in (
-        (signal.SIGALRM, signal.ITIMER_REAL, limits.longest + GRACE),
+        (signal.SIGALRM, signal.ITIMER_REAL, limits.longest + _GRACE),
         (signal.SIGPROF, signal.ITIMER_PROF, limits.seconds),
     ):
         signal.signal(number, signal.SIG_DFL)

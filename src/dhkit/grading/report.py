@@ -10,14 +10,13 @@ from enum import Enum
 from pydantic import TypeAdapter
 
 from dhkit.display import counted, html_block, html_lines, html_table, plain, repr_line
+from dhkit.grading.bounds import BOUNDS
 from dhkit.grading.remarks import Note
 
 NO_STEP = "no step finds"
 """How the statement of an entry begins that stands for a joint without a step."""
-MAX_ENTRIES_NAMED = 6
+_MAX_ENTRIES_NAMED = 6
 """Entries that a message names; of more, the rest is counted."""
-MAX_CHARACTERS_SHOWN = 400
-"""Longest answer, and longest statement about one, that a notebook shows, in characters."""
 
 
 class Verdict(Enum):
@@ -130,7 +129,9 @@ class Entry:
             "witness": "" if self.witness is None else repr(self.witness)[1:-1].removeprefix("Witness: "),
         }
         rows = [(name, text) for name, text in texts.items() if text]
-        return html_block(f"{self.name}: {self.verdict.value}", html_table((), rows, longest=MAX_CHARACTERS_SHOWN))
+        return html_block(
+            f"{self.name}: {self.verdict.value}", html_table((), rows, longest=BOUNDS.notebook_characters)
+        )
 
 
 def entry_name(quantity: str, index: tuple[int, ...]) -> str:
@@ -176,9 +177,9 @@ class Diagnosis:
     @property
     def place(self) -> str:
         """The entries in a few words, for messages."""
-        if len(self.entries) > MAX_ENTRIES_NAMED:
-            named = ", ".join(self.entries[: MAX_ENTRIES_NAMED - 1])
-            return f"{named} and {len(self.entries) - MAX_ENTRIES_NAMED + 1} more"
+        if len(self.entries) > _MAX_ENTRIES_NAMED:
+            named = ", ".join(self.entries[: _MAX_ENTRIES_NAMED - 1])
+            return f"{named} and {len(self.entries) - _MAX_ENTRIES_NAMED + 1} more"
         return ", ".join(self.entries) or self.where
 
     def __repr__(self) -> str:

@@ -18,9 +18,9 @@ from dhkit.description.toml_text import plain_numbers, toml_document
 from dhkit.display import repr_line, value_line
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.sheet import QUANTITY
+from dhkit.grading.bounds import BOUNDS
 
-MAX_BYTES = 100_000
-STRICT = ConfigDict(extra="forbid", use_attribute_docstrings=True)
+_STRICT = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 WEIGHED = re.compile(
     rf"(?:{QUANTITY.pattern})|(M|C|T|J|A[1-9][0-9]??)_?([1-9])([1-9])|(M|C|J)_?([1-9][0-9]?)_([1-9][0-9]?)"
     r"|(h|g|tau|dh|ik)_?([1-9][0-9]?)"
@@ -35,7 +35,7 @@ Share = Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)]
 Weight = Annotated[float, Field(strict=True, ge=0, le=1e6, allow_inf_nan=False)]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=_STRICT)
 class Credit:
     """Which share of its points an entry gets that is not simply right, from 0 to 1."""
 
@@ -57,7 +57,7 @@ class Credit:
     __repr__ = value_line
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=_STRICT)
 class Rubric:
     """What answers are worth.
 
@@ -92,7 +92,7 @@ class Rubric:
             No such file, one over 100 kB, no TOML, or anything that :meth:`from_data` refuses; names the file.
         """
         try:
-            content = read_bounded(path, MAX_BYTES, "a rubric")
+            content = read_bounded(path, BOUNDS.rubric_bytes, "a rubric")
         except DescriptionError as error:
             raise AnswerError(str(error)) from None
         try:

@@ -9,6 +9,7 @@ from pydantic import TypeAdapter
 
 from dhkit.description import Description
 from dhkit.description.schema import titled_schema
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.quantity_names import SMALL_HEADS
 from dhkit.grading.answers.sheet import (
     ALIASES,
@@ -17,9 +18,6 @@ from dhkit.grading.answers.sheet import (
     FORMAT,
     JACOBIAN_ROWS,
     KEYS,
-    MAX_BRANCHES,
-    MAX_NAMES,
-    MAX_STEPS,
     QUANTITY,
     quantity_names,
     shape_of,
@@ -30,10 +28,10 @@ from dhkit.kinematics import classify
 
 Schema: TypeAlias = dict[str, Any]
 """A JSON Schema, or a part of one."""
-ENTRY: Schema = {"type": ["string", "number"]}
+_ENTRY: Schema = {"type": ["string", "number"]}
 """A formula as text, or a number."""
-ANSWER = {"$ref": "#/$defs/Answer"}
-MEANINGS = {
+_ANSWER = {"$ref": "#/$defs/Answer"}
+_MEANINGS = {
     "M": "Mass matrix M(q), n rows of n: kg m^2 of revolute joints, kg of sliding ones.",
     "C": "Matrix C(q, qd) of Coriolis and centrifugal terms, n rows of n; it is judged by C qd.",
     "h": "Coriolis and centrifugal torques C(q, qd) qd, n entries: N m and N.",
@@ -46,14 +44,14 @@ MEANINGS = {
     "J": "The tool's Jacobian, 6 rows of n: linear (m), then angular; world axes. Planar arms: x, y, or x, y, angle.",
 }
 """Descriptions by quantity, without the link transforms."""
-UNITS = dict(zip(COLUMNS, ("rad", "m", "m", "rad"), strict=True))
+_UNITS = dict(zip(COLUMNS, ("rad", "m", "m", "rad"), strict=True))
 """Units of the entries of a table's row."""
 
 
 def sheet_schema() -> Schema:
     """Return the JSON Schema of answer sheets in TOML."""
     text = "Answers about a robot, as text that is read and never run: SI units and radians."
-    answer = {"anyOf": [ENTRY, {"type": "array", "items": ANSWER}]}
+    answer = {"anyOf": [_ENTRY, {"type": "array", "items": _ANSWER}]}
     return _document("answer sheet", "sheet", text, Answer=answer) | {"required": ["answer"]}
 
 
@@ -101,8 +99,8 @@ def _properties() -> Schema:
         "parameters": {
             "type": "object",
             "description": "Further names, each an expression in the robot's parameters and in names before it.",
-            "additionalProperties": ENTRY,
-            "maxProperties": MAX_NAMES,
+            "additionalProperties": _ENTRY,
+            "maxProperties": BOUNDS.names,
         },
         "friction": _switch("Whether tau includes viscous friction."),
         "execute": _switch("Whether programs may be executed where `dhkit grade --execute` asks for it."),
@@ -136,7 +134,7 @@ def _properties() -> Schema:
             "minItems": 1,
             "items": {
                 "type": "array",
-                "prefixItems": [ENTRY | {"description": f"{name}, {UNITS[name]}"} for name in COLUMNS],
+                "prefixItems": [_ENTRY | {"description": f"{name}, {_UNITS[name]}"} for name in COLUMNS],
                 "minItems": len(COLUMNS),
                 "maxItems": len(COLUMNS),
             },
@@ -145,8 +143,8 @@ def _properties() -> Schema:
             "type": "array",
             "description": "Solutions, each a list of n formulas (rad, m) of the tool's pose px py pz, r11 ... r33.",
             "minItems": 1,
-            "maxItems": MAX_BRANCHES,
-            "items": {"type": "array", "items": ENTRY},
+            "maxItems": BOUNDS.branches,
+            "items": {"type": "array", "items": _ENTRY},
         },
     }
     keys |= {
@@ -158,7 +156,7 @@ def _properties() -> Schema:
         "type": "array",
         "description": "Steps in the order in which joints are found; in place of branches.",
         "minItems": 1,
-        "maxItems": MAX_STEPS,
+        "maxItems": BOUNDS.steps,
         "items": _table(KEYS["step"], keys, "An equation, its solution, or both.")
         | {"required": ["joint"], "anyOf": [{"required": ["equation"]}, {"required": ["solution"]}]},
     }
@@ -181,7 +179,7 @@ def _table(keys: Sequence[str], properties: Schema, description: str) -> Schema:
 
 def _answer(**tables: Schema) -> Schema:
     """Return the schema of the answers: whole quantities, single entries, or tables."""
-    whole = {name: ANSWER | {"description": MEANINGS[name]} for name in quantity_names(0)}
+    whole = {name: _ANSWER | {"description": _MEANINGS[name]} for name in quantity_names(0)}
     names = {name: name for name in whole} | ALIASES | SMALL_HEADS
     heads = "|".join(name for name, quantity in names.items() if shape_of(quantity, 1))
     element = rf"(?:{heads})[_{{]*[1-9][0-9_,{{}}]*|A[1-9][0-9_,{{}}]{{2,}}"
@@ -190,8 +188,8 @@ def _answer(**tables: Schema) -> Schema:
         "description": "Formulas in quotes or numbers, alone or in lists; what is empty is not handed in.",
         "properties": whole | tables,
         "patternProperties": {
-            _whole("A[1-9][0-9]?"): ANSWER | {"description": "Link transform from link i - 1 to link i, 4 rows of 4."},
-            _whole(element): ENTRY | {"description": "A single entry, counted from 1: M11, g_2, A1_14."},
+            _whole("A[1-9][0-9]?"): _ANSWER | {"description": "Link transform from link i - 1 to link i, 4 rows of 4."},
+            _whole(element): _ENTRY | {"description": "A single entry, counted from 1: M11, g_2, A1_14."},
         },
         "additionalProperties": False,
         "minProperties": 1,
@@ -200,7 +198,7 @@ def _answer(**tables: Schema) -> Schema:
 
 def _formulas(description: str) -> Schema:
     """Return the schema of a formula, or of a list of them."""
-    return {"anyOf": [ENTRY, {"type": "array", "items": ENTRY, "maxItems": MAX_STEPS}], "description": description}
+    return {"anyOf": [_ENTRY, {"type": "array", "items": _ENTRY, "maxItems": BOUNDS.steps}], "description": description}
 
 
 def _text(description: str) -> Schema:
@@ -222,7 +220,7 @@ def _whole(pattern: str) -> str:
 
 # An empty sheet
 
-TEMPLATE_QUANTITIES = ("K", "V", "M", "C", "g", "tau")
+_TEMPLATE_QUANTITIES = ("K", "V", "M", "C", "g", "tau")
 """Quantities with entries in an empty sheet; others are in its comments."""
 
 
@@ -253,7 +251,7 @@ def template(description: Description, robot: str | None = None) -> str:
         '# parameters = { lc1 = "l1/2" }',
         "",
         "[answer]",
-        *(f"{name} = {_empty(shape_of(name, n))}" for name in TEMPLATE_QUANTITIES),
+        *(f"{name} = {_empty(shape_of(name, n))}" for name in _TEMPLATE_QUANTITIES),
         *(f"# A{i + 1} = {_empty((4, 4))}" for i in range(n)),
         f"# J = {_empty((6, n))}",
         "",

@@ -248,7 +248,7 @@ class _SheetJudge:
         )
 
     def _table_in_numbers(self, judged: KinematicJudgement) -> KinematicJudgement:
-        return in_numbers(judged, judged.at_values, self.sheet.task)
+        return _in_numbers(judged, judged.at_values, self.sheet.task)
 
     def _inverse(self, explain: bool) -> KinematicJudgement:
         from dhkit.grading.judging.inverse import judge_inverse
@@ -279,7 +279,7 @@ class _SheetJudge:
             ),
         )
 
-    def _at_other_values(self, trees: Sequence[Tree], judge: FormulaJudge, explain: bool) -> KinematicJudgement:
+    def _at_other_values(self, trees: Sequence[Tree], judge: _FormulaJudge, explain: bool) -> KinematicJudgement:
         """Judge formulas at the file's values; those that pass at other values of the arm's letters too.
 
         Where letters have equal values, mistakes are looked for at other values: one would look like another.
@@ -303,10 +303,10 @@ class _SheetJudge:
                 judged = replace(judged, diagnosis=elsewhere.diagnosis)
         elif is_ambiguous:
             judged = judge(description, _unchanged, explain)
-        return in_numbers(judged, other.at_values, self.sheet.task)
+        return _in_numbers(judged, other.at_values, self.sheet.task)
 
 
-FormulaJudge: TypeAlias = Callable[[Description, Callable[[Tree], Tree], bool], KinematicJudgement]
+_FormulaJudge: TypeAlias = Callable[[Description, Callable[[Tree], Tree], bool], KinematicJudgement]
 """Function from an arm, a change of formulas, and whether to look for mistakes, to the judgement of a sheet."""
 
 
@@ -314,7 +314,7 @@ def _unchanged(tree: Tree) -> Tree:
     return tree
 
 
-def in_numbers(judged: KinematicJudgement, at_values: Mapping[str, float], task: Requirements) -> KinematicJudgement:
+def _in_numbers(judged: KinematicJudgement, at_values: Mapping[str, float], task: Requirements) -> KinematicJudgement:
     """Return a judgement of an answer that has letters as numbers: it is incomplete where the task asks for letters."""
     if not at_values:
         return judged

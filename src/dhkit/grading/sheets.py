@@ -11,16 +11,11 @@ from pathlib import Path
 
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.sources import SHEET_SUFFIXES
+from dhkit.grading.bounds import BOUNDS
 
-MAX_DEPTH = 8
-MAX_LISTED = 20
-"""Largest number of unread files that are listed by name."""
-MAX_SHEETS = 10_000
-MAX_FILES = 200_000
-"""Largest number of files and folders that are visited: a student may hand in a whole disk."""
-ROBOT = re.compile(rb"^[ \t]*\[\[[ \t]*joint[ \t]*\]\]", re.MULTILINE)
-ANSWER = re.compile(rb"^[ \t]*(\[[ \t]*answer|answer[ \t.]*=)", re.MULTILINE)
-PEEK_BYTES = 1_000_000
+_ROBOT = re.compile(rb"^[ \t]*\[\[[ \t]*joint[ \t]*\]\]", re.MULTILINE)
+_ANSWER = re.compile(rb"^[ \t]*(\[[ \t]*answer|answer[ \t.]*=)", re.MULTILINE)
+_PEEK_BYTES = 1_000_000
 """Length of the beginning of a file by which robot files are recognized, bytes."""
 
 
@@ -82,8 +77,8 @@ def find_sheets(paths: Sequence[Path], exclude: Collection[Path] = ()) -> list[S
             )
         for sheet in _in_folder(path, passed_over) if path.is_dir() else [Sheet(path, _student(path, stems))]:
             found.setdefault(sheet.path.absolute(), sheet)
-            if len(found) > MAX_SHEETS:
-                raise AnswerError(f"{path}: more than {MAX_SHEETS} answer sheets")
+            if len(found) > BOUNDS.sheets:
+                raise AnswerError(f"{path}: more than {BOUNDS.sheets} answer sheets")
     return list(found.values())
 
 
@@ -99,7 +94,7 @@ def _in_folder(root: Path, passed_over: Collection[Path]) -> list[Sheet]:
     for sheet in _visit(root):
         if not sheet.error and sheet.path.resolve() in passed_over:
             continue
-        if sheet.error == UNREAD:
+        if sheet.error == _UNREAD:
             unread.setdefault(sheet.student, []).append(sheet.path)
         else:
             sheets.setdefault(sheet.student, []).append(sheet)
@@ -117,19 +112,19 @@ def _in_folder(root: Path, passed_over: Collection[Path]) -> list[Sheet]:
 
 
 def _shorten(names: Sequence[str]) -> tuple[str, ...]:
-    more = (f"{len(names) - MAX_LISTED} more",) if len(names) > MAX_LISTED else ()
-    return (*names[:MAX_LISTED], *more)
+    more = (f"{len(names) - BOUNDS.listed_files} more",) if len(names) > BOUNDS.listed_files else ()
+    return (*names[: BOUNDS.listed_files], *more)
 
 
-UNREAD = "unread"
+_UNREAD = "unread"
 """Marks, in :func:`_visit`, a file with another suffix; it is replaced by a message for the student."""
 
 
 def _visit(root: Path) -> Iterator[Sheet]:
     inside = root.resolve()
     for looked_at, path in enumerate(_walk(root, 0)):
-        if looked_at >= MAX_FILES:
-            raise AnswerError(f"{root}: more than {MAX_FILES} files; expected a folder of answer sheets")
+        if looked_at >= BOUNDS.files:
+            raise AnswerError(f"{root}: more than {BOUNDS.files} files; expected a folder of answer sheets")
         parts = path.relative_to(root).parts
         student = path.stem if len(parts) == 1 else parts[0]
         if path.is_symlink() and (fault := _fault_of_link(path, inside)):
@@ -139,7 +134,7 @@ def _visit(root: Path) -> Iterator[Sheet]:
                 yield Sheet(path, student, fault)
         elif path.suffix.lower() not in SHEET_SUFFIXES or _is_robot(path):
             if len(parts) > 1 or path.suffix.lower() not in SHEET_SUFFIXES:
-                yield Sheet(path, student, UNREAD)
+                yield Sheet(path, student, _UNREAD)
         else:
             yield Sheet(path, student, "" if path.is_file() else "not a regular file")
 
@@ -155,7 +150,7 @@ def _walk(folder: Path, depth: int) -> Iterator[Path]:
             continue
         path = folder / entry.name
         yield path
-        if entry.is_dir(follow_symlinks=False) and depth + 1 < MAX_DEPTH:
+        if entry.is_dir(follow_symlinks=False) and depth + 1 < BOUNDS.folder_depth:
             yield from _walk(path, depth + 1)
 
 
@@ -174,8 +169,8 @@ def _fault_of_folder(path: Path, depth: int) -> str:
     """Return why a folder is not searched; empty if it is, or for a link to a folder."""
     if path.is_symlink():
         return ""
-    if depth >= MAX_DEPTH:
-        return f"nested deeper than {MAX_DEPTH} folders; not looked into"
+    if depth >= BOUNDS.folder_depth:
+        return f"nested deeper than {BOUNDS.folder_depth} folders; not looked into"
     return "" if os.access(path, os.R_OK | os.X_OK) else "a folder that cannot be read"
 
 
@@ -185,7 +180,7 @@ def _is_robot(path: Path) -> bool:
         return False
     try:
         with path.open("rb") as file:
-            start = file.read(PEEK_BYTES)
+            start = file.read(_PEEK_BYTES)
     except OSError:
         return False
-    return bool(ROBOT.search(start)) and not ANSWER.search(start)
+    return bool(_ROBOT.search(start)) and not _ANSWER.search(start)

@@ -18,14 +18,14 @@ Absolute: TypeAlias = Callable[[Any], Any]
 EXACT_RANGE = 1e6
 """Largest angle, rad, of sine and cosine; beyond it, where a double has few digits of an angle, they are NaN."""
 
-ROUND_TO_INTEGER = 6755399441055744.0
+_ROUND_TO_INTEGER = 6755399441055744.0
 """1.5 x 2^52; adding and subtracting it rounds a double to the nearest integer."""
-TWO_OVER_PI = 0.6366197723675814
+_TWO_OVER_PI = 0.6366197723675814
 # pi/2 in three parts. The first two have 33 bits, so that k times them is exact for k up to 2^20.
-HALF_PI_1, HALF_PI_2, HALF_PI_3 = 1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21
+_HALF_PI_1, _HALF_PI_2, _HALF_PI_3 = 1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21
 
-QUARTER_PI, HALF_PI, PI = 0.78539816339744830962, 1.57079632679489661923, 3.14159265358979323846
-TAN_EIGHTH_PI = 0.41421356237309504880
+_QUARTER_PI, _HALF_PI, _PI = 0.78539816339744830962, 1.57079632679489661923, 3.14159265358979323846
+_TAN_EIGHTH_PI = 0.41421356237309504880
 
 
 def minimum(a: Vector, b: Vector) -> Vector:
@@ -44,12 +44,12 @@ def sincos(x: Vector) -> tuple[Vector, Vector]:
     The absolute error is at most 2.3e-16 up to ``EXACT_RANGE``, and 2 units in the last place of results above 1e-5;
     beyond it, and of what is not finite, they are NaN.
     """
-    k = (x * TWO_OVER_PI + ROUND_TO_INTEGER) - ROUND_TO_INTEGER
+    k = (x * _TWO_OVER_PI + _ROUND_TO_INTEGER) - _ROUND_TO_INTEGER
     # The remainder is r + tail; without the tail the result would lose half a unit in the last place.
-    t = x - k * HALF_PI_1
-    second = k * HALF_PI_2
+    t = x - k * _HALF_PI_1
+    second = k * _HALF_PI_2
     r = select(absolute(x) <= EXACT_RANGE, t - second, nan)
-    tail = ((t - r) - second) - k * HALF_PI_3
+    tail = ((t - r) - second) - k * _HALF_PI_3
     z = r * r
     half = 0.5 * z
     p = z * 1.58969099521155010221e-10 - 2.50507602534068634195e-08
@@ -67,7 +67,7 @@ def sincos(x: Vector) -> tuple[Vector, Vector]:
     cosine = near_one + ((((1.0 - near_one) - half) + (z * z) * p) - r * tail)
     # The quadrant: k/4 minus its nearest integer is 0, 1/4, ±1/2 or -1/4 for k = 0, 1, 2, 3 modulo 4.
     quarter = k * 0.25
-    quadrant = quarter - ((quarter + ROUND_TO_INTEGER) - ROUND_TO_INTEGER)
+    quadrant = quarter - ((quarter + _ROUND_TO_INTEGER) - _ROUND_TO_INTEGER)
     opposite = absolute(quadrant) > 0.375
     odd = absolute(absolute(quadrant) - 0.25) < 0.125
     s = select(odd, cosine, sine)
@@ -85,7 +85,7 @@ def atan2(y: Any, x: Any, select: Select = select, absolute: Absolute = absolute
     longer = select(steep, height, width)
     shorter = select(steep, width, height)
     # Above tan(pi/8) take the angle's difference from pi/4, so that the polynomial's argument is at most tan(pi/8).
-    wide = shorter > TAN_EIGHTH_PI * longer
+    wide = shorter > _TAN_EIGHTH_PI * longer
     numerator = select(wide, shorter - longer, shorter)
     denominator = select(wide, shorter + longer, longer)
     t = select(denominator > 0.0, numerator / denominator, 0.0)
@@ -101,9 +101,9 @@ def atan2(y: Any, x: Any, select: Select = select, absolute: Absolute = absolute
     p = p * z - 1.99999999998764832476e-01
     p = p * z + 3.33333333333329318027e-01
     angle = t - t * (z * p)
-    angle = select(wide, QUARTER_PI + angle, angle)
-    angle = select(steep, HALF_PI - angle, angle)
-    angle = select(x < 0.0, PI - angle, angle)
+    angle = select(wide, _QUARTER_PI + angle, angle)
+    angle = select(steep, _HALF_PI - angle, angle)
+    angle = select(x < 0.0, _PI - angle, angle)
     angle = select(y < 0.0, -angle, angle)
     # The comparison is false if y or x is NaN.
     return select(absolute(x) + absolute(y) <= inf, angle, nan)

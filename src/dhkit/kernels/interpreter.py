@@ -19,9 +19,9 @@ from dhkit.symbolic import Graph
 if TYPE_CHECKING:
     import casadi
 
-LANES = 64
+_LANES = 64
 """Number of items that one call of the virtual machine computes in a larger batch."""
-MAX_SINGLE_ITEMS = 16
+_MAX_SINGLE_ITEMS = 16
 """Up to this number, items at the end of a batch are computed one by one, which is faster than idle lanes."""
 
 
@@ -35,7 +35,7 @@ class Interpreter:
 
     def __init__(self, graph: Graph, types: Sequence[str]) -> None:
         one = _function(graph, types)
-        self._functions = {1: one, LANES: one.map("lanes", "serial", LANES, [0, 1], [])}
+        self._functions = {1: one, _LANES: one.map("lanes", "serial", _LANES, [0, 1], [])}
         self._inputs = [variable.size for variable in graph.inputs]
         self._outputs = [variable.size for variable in graph.outputs]
         self._stages = Stages(self._staged)
@@ -47,15 +47,15 @@ class Interpreter:
             self._stages.work(1, parameters, inputs, outputs)
             return
         start = 0
-        while count - start >= LANES:
-            rows = slice(start, start + LANES)
-            self._stages.work(LANES, parameters, [x[rows] for x in inputs], [y[rows] for y in outputs])
-            start += LANES
-        if count - start > MAX_SINGLE_ITEMS:
+        while count - start >= _LANES:
+            rows = slice(start, start + _LANES)
+            self._stages.work(_LANES, parameters, [x[rows] for x in inputs], [y[rows] for y in outputs])
+            start += _LANES
+        if count - start > _MAX_SINGLE_ITEMS:
             rows = slice(start, count)
-            padded = [np.concatenate([x[rows], np.zeros((start + LANES - count, x.shape[1]))]) for x in inputs]
-            results = [np.empty((LANES, y.shape[1]), y.dtype) for y in outputs]
-            self._stages.work(LANES, parameters, padded, results)
+            padded = [np.concatenate([x[rows], np.zeros((start + _LANES - count, x.shape[1]))]) for x in inputs]
+            results = [np.empty((_LANES, y.shape[1]), y.dtype) for y in outputs]
+            self._stages.work(_LANES, parameters, padded, results)
             for y, result in zip(outputs, results, strict=True):
                 y[rows] = result[: count - start]
             return

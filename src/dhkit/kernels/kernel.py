@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-MODES = ("auto", "on", "off")
+_MODES = ("auto", "on", "off")
 
 SMALL_BATCH = 64
 """Smaller batches are interpreted and do not count towards compiling, so that no control loop waits for it."""
@@ -34,7 +34,7 @@ COMPILE_AFTER = 65_536
 as compiling (30 to 250 ms)."""
 MIN_ITEMS_PER_THREAD = 4_096
 """Smallest number of items for a thread; for fewer, the transfer takes longer than it saves."""
-MAX_KERNELS = 2_048
+_MAX_KERNELS = 2_048
 """Largest number of kernels that a process keeps; the oldest is dropped first."""
 
 
@@ -48,7 +48,7 @@ def kernel_mode() -> str:
         The variable has another value.
     """
     mode = os.environ.get("DHKIT_KERNELS") or "auto"
-    if mode not in MODES:
+    if mode not in _MODES:
         raise DhkitError(f"DHKIT_KERNELS is {mode!r}; expected auto, on or off")
     return mode
 
@@ -138,7 +138,7 @@ class Kernel:
             code = store.read(self.name, store.digest(self.name, self._pattern))
             if code is not None:
                 self._function = machine_code.CompiledFunction(code)
-        except MACHINE_CODE_ERRORS as error:
+        except _MACHINE_CODE_ERRORS as error:
             self._give_up(error)
         self._looked_up = True
 
@@ -151,7 +151,7 @@ class Kernel:
 
             code = machine_code.compile_module(llvm_source(program, self._types))
             self._function = machine_code.CompiledFunction(code)
-        except MACHINE_CODE_ERRORS as error:
+        except _MACHINE_CODE_ERRORS as error:
             self._give_up(error)
             return
         store.write(self.name, store.digest(self.name, self._pattern), code)
@@ -177,7 +177,7 @@ class Kernel:
             return self._graph
 
 
-MACHINE_CODE_ERRORS = (ImportError, OSError, RuntimeError)
+_MACHINE_CODE_ERRORS = (ImportError, OSError, RuntimeError)
 """Errors of llvmlite and the loader on machines that they do not support."""
 
 _kernels: dict[tuple[str, str], Kernel] = {}
@@ -221,7 +221,7 @@ def kernel(name: str, pattern: str, derive: Callable[[], Graph], types: Sequence
     if found is None:
         with _deriving:
             found = _kernels.setdefault((name, pattern), Kernel(name, pattern, derive, types))
-            while len(_kernels) > MAX_KERNELS:
+            while len(_kernels) > _MAX_KERNELS:
                 del _kernels[next(iter(_kernels))]
     return found
 

@@ -30,12 +30,12 @@ BLOCK = 64
 
 FLOAT, SMALL_INTEGER = "float64", "uint8"
 """Types of an output's entries, by NumPy's names."""
-STORED = {FLOAT: "double", SMALL_INTEGER: "i8"}
+_STORED = {FLOAT: "double", SMALL_INTEGER: "i8"}
 """LLVM's names of these types."""
 
-Value: TypeAlias = Vector | Mask
+_Value: TypeAlias = Vector | Mask
 
-NUMERIC: Mapping[str, Callable[..., Value]] = {
+_NUMERIC: Mapping[str, Callable[..., _Value]] = {
     "add": operator.add,
     "subtract": operator.sub,
     "multiply": operator.mul,
@@ -53,7 +53,7 @@ NUMERIC: Mapping[str, Callable[..., Value]] = {
     "unequal": Vector.differs,
 }
 """Operations of a program on numbers."""
-LOGICAL: Mapping[str, Callable[..., Mask]] = {
+_LOGICAL: Mapping[str, Callable[..., Mask]] = {
     "logical_and": operator.and_,
     "logical_or": operator.or_,
     "logical_not": operator.invert,
@@ -62,7 +62,7 @@ LOGICAL: Mapping[str, Callable[..., Mask]] = {
 
 
 @dataclass(frozen=True)
-class Layout:
+class _Layout:
     """Rows of a block for the entries of a program's variables; a row has ``BLOCK`` doubles."""
 
     graph: Graph
@@ -94,7 +94,7 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
         Type of each output: ``FLOAT``, or ``SMALL_INTEGER`` for whole numbers from 0 to 255.
     """
     # Programs that decide small integers round every operation as the interpreter does, so that both decide alike.
-    layout, body = Layout(graph), Body(EXACT if SMALL_INTEGER in types else FUSING)
+    layout, body = _Layout(graph), Body(EXACT if SMALL_INTEGER in types else FUSING)
     results = _results(graph, layout, body, types)
     inputs = [f"%x{k}" for k in range(len(graph.inputs) - 1)]
     outputs = [f"%y{k}" for k in range(len(graph.outputs))]
@@ -128,7 +128,7 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
     ]
     for k, name in enumerate(outputs):
         before = f"write{k - 1}_end" if k else "compute"
-        kind = STORED[types[k]]
+        kind = _STORED[types[k]]
         lines += _copied(f"write{k}", before, name, graph.outputs[k].size, layout.outputs[k], kind, reading=False)
         lines += [f"  br label %{f'write{k + 1}' if k + 1 < len(outputs) else 'written'}"]
     lines += [
@@ -143,7 +143,7 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _results(graph: Graph, layout: Layout, body: Body, types: Sequence[str]) -> list[str]:
+def _results(graph: Graph, layout: _Layout, body: Body, types: Sequence[str]) -> list[str]:
     """Write the program's operations into ``body`` and return the lines that store its results."""
     rows = [
         [_loaded(body, start + entry) for entry in range(variable.size)]
@@ -164,9 +164,9 @@ def _results(graph: Graph, layout: Layout, body: Body, types: Sequence[str]) -> 
     return lines
 
 
-def _node_values(graph: Graph, body: Body, rows: Sequence[Sequence[Vector]]) -> list[Value]:
+def _node_values(graph: Graph, body: Body, rows: Sequence[Sequence[Vector]]) -> list[_Value]:
     """Return the value of every node."""
-    values: dict[int, Value] = {}
+    values: dict[int, _Value] = {}
     pairs = graph.angle_pairs
     for k, node in enumerate(graph.nodes):
         if node.operation == "constant":
@@ -183,21 +183,21 @@ def _node_values(graph: Graph, body: Body, rows: Sequence[Sequence[Vector]]) -> 
     return [values[k] for k in range(len(graph.nodes))]
 
 
-def _apply(operation: str, arguments: Sequence[Value]) -> Value:
+def _apply(operation: str, arguments: Sequence[_Value]) -> _Value:
     if operation == "select":
         condition, true, false = arguments
         return select(_mask(condition), _number(true), _number(false))
-    if operation in LOGICAL:
-        return LOGICAL[operation](*map(_mask, arguments))
-    return NUMERIC[operation](*map(_number, arguments))
+    if operation in _LOGICAL:
+        return _LOGICAL[operation](*map(_mask, arguments))
+    return _NUMERIC[operation](*map(_number, arguments))
 
 
-def _number(value: Value) -> Vector:
+def _number(value: _Value) -> Vector:
     """Return a value as numbers: 1 for true, 0 for false."""
     return value if isinstance(value, Vector) else select(value, Vector(value.body, constant(1.0)), 0.0)
 
 
-def _mask(value: Value) -> Mask:
+def _mask(value: _Value) -> Mask:
     """Return a value as truth values: numbers other than 0 are true."""
     return value if isinstance(value, Mask) else value.differs(0.0)
 

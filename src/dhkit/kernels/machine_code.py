@@ -15,11 +15,11 @@ from dhkit.description import Array
 from dhkit.kernels.llvm_source import BLOCK
 from dhkit.kernels.stages import Stage, Stages, address, aligned
 
-OPTIMIZATION = 2
+_OPTIMIZATION = 2
 """LLVM's level for instruction selection and scheduling; for straight-line code no other passes are useful."""
-ALIGNMENT = 64
+_ALIGNMENT = 64
 """Alignment of a block's rows, bytes."""
-SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64)
+_SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64)
 
 
 @cache
@@ -69,7 +69,7 @@ class CompiledFunction:
         place = self._engine.get_function_address("kernel")
         if not place:
             raise RuntimeError("object code without a function named kernel")
-        self._function = SIGNATURE(place)
+        self._function = _SIGNATURE(place)
         self._alone: Stages | None = None
         """Stages for single items."""
 
@@ -101,7 +101,7 @@ class CompiledFunction:
 
     def _call(self, parameters: Array, arrays: Sequence[NDArray[Any]]) -> Callable[[], object]:
         """Return a call of the function with these arrays, which it keeps."""
-        work = aligned(sum(array.shape[1] for array in arrays) * BLOCK, ALIGNMENT)
+        work = aligned(sum(array.shape[1] for array in arrays) * BLOCK, _ALIGNMENT)
         addresses = np.array([address(array) for array in arrays], dtype=np.uintp)
         kept = (parameters, arrays, addresses, work)
         places = (address(parameters), address(addresses), address(work), len(arrays[0]))
@@ -116,5 +116,5 @@ def _start() -> None:
 
 def _machine(triple: str, name: str, features: str) -> Any:
     return llvm.Target.from_triple(triple).create_target_machine(
-        cpu=name, features=features, opt=OPTIMIZATION, reloc="static", codemodel="jitdefault", jit=True
+        cpu=name, features=features, opt=_OPTIMIZATION, reloc="static", codemodel="jitdefault", jit=True
     )

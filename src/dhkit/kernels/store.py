@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 PACKAGES = ("control", "description", "dynamics", "expressions", "kernels", "kinematics", "symbolic")
 """Packages of dhkit whose sources determine what a kernel computes."""
-VERSIONS = ("casadi", "llvmlite", "numpy")
+_VERSIONS = ("casadi", "llvmlite", "numpy")
 """Packages whose versions determine programs and machine code."""
 
 
@@ -169,4 +169,4 @@ def _circumstances() -> tuple[str, ...]:
     for package in PACKAGES:
         for path in sorted((root / package).rglob("*.py")):
             total.update(path.read_bytes())
-    return (total.hexdigest(), *(f"{name} {version(name)}" for name in VERSIONS), *processor())
+    return (total.hexdigest(), *(f"{name} {version(name)}" for name in _VERSIONS), *processor())

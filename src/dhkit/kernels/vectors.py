@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 WIDTH = 8
 """Number of doubles of a vector: one register of AVX-512, two of AVX, four of SSE and NEON."""
-VECTOR, MASK = f"<{WIDTH} x double>", f"<{WIDTH} x i1>"
+VECTOR, _MASK = f"<{WIDTH} x double>", f"<{WIDTH} x i1>"
 
 FUSING, EXACT = "contract nsz", "nsz"
 """Liberties for LLVM: fuse products into sums and drop the sign of zero; or the latter alone, so that every operation
@@ -97,13 +97,13 @@ class Mask:
     name: str
 
     def __and__(self, other: Mask) -> Mask:
-        return Mask(self.body, self.body.define(f"and {MASK} {self.name}, {other.name}"))
+        return Mask(self.body, self.body.define(f"and {_MASK} {self.name}, {other.name}"))
 
     def __or__(self, other: Mask) -> Mask:
-        return Mask(self.body, self.body.define(f"or {MASK} {self.name}, {other.name}"))
+        return Mask(self.body, self.body.define(f"or {_MASK} {self.name}, {other.name}"))
 
     def __invert__(self) -> Mask:
-        return Mask(self.body, self.body.define(f"xor {MASK} {self.name}, splat (i1 true)"))
+        return Mask(self.body, self.body.define(f"xor {_MASK} {self.name}, splat (i1 true)"))
 
 
 def constant(value: float) -> str:
@@ -119,7 +119,7 @@ def _text(number: Number) -> str:
 def select(condition: Mask, true: Number, false: Number) -> Vector:
     """Return one of two values in each lane, without a branch."""
     body = condition.body
-    choice = f"select {body.liberties} {MASK} {condition.name}, {VECTOR} {_text(true)}, {VECTOR} {_text(false)}"
+    choice = f"select {body.liberties} {_MASK} {condition.name}, {VECTOR} {_text(true)}, {VECTOR} {_text(false)}"
     return Vector(body, body.define(choice))
 
 

@@ -20,19 +20,19 @@ from dhkit.kinematics.closed_form.family import Fit
 from dhkit.kinematics.singular_factors import ShoulderFactor, link_radii, slide_radii
 from dhkit.kinematics.singularities import singularities
 
-ARMS_IN_A_PLANE = {"elbow_wrist", "slide_wrist", "three_parallel", "yaw_two", "yaw_three"}
+_ARMS_IN_A_PLANE = {"elbow_wrist", "slide_wrist", "three_parallel", "yaw_two", "yaw_three"}
 """Families with an arm in a plane that joint 1 turns."""
-PLANAR = {"parallel_chain", "polar"}
+_PLANAR = {"parallel_chain", "polar"}
 """Families whose tool moves in a plane across the first axis, or also along that axis."""
-NAMES = {
+_NAMES = {
     "elbow_wrist": "wrist centre",
     "slide_wrist": "wrist centre",
     "three_parallel": "meeting point of axes 5 and 6",
 }
-CIRCLE_SEGMENTS = 180
-TOUCHING = 1e-9
+_CIRCLE_SEGMENTS = 180
+_TOUCHING = 1e-9
 """Share of a1 by which two circles that touch may miss each other; at x = 0 each touches its mirror image."""
-MIN_RADIUS = 1e-3
+_MIN_RADIUS = 1e-3
 """A circle with a radius below this share of the reach is drawn as a point."""
 
 
@@ -70,9 +70,9 @@ def boundaries(description: Description) -> tuple[Boundary, ...]:
     family, fit = found.family, found.fit
     if family is None or fit is None or not description.joints[0].is_revolute:
         return ()
-    if family.name in ARMS_IN_A_PLANE:
-        return _turned_ring(description, NAMES.get(family.name, "tool"))
-    return _ring(description, fit) if family.name in PLANAR else ()
+    if family.name in _ARMS_IN_A_PLANE:
+        return _turned_ring(description, _NAMES.get(family.name, "tool"))
+    return _ring(description, fit) if family.name in _PLANAR else ()
 
 
 def _turned_ring(description: Description, point: str) -> tuple[Boundary, ...]:
@@ -96,7 +96,7 @@ def _turned_ring(description: Description, point: str) -> tuple[Boundary, ...]:
     if np.isfinite(most):
         found.append(Boundary("outer", point, world(ring.outer), around(float(np.hypot(a1 + most, side.offset)))))
     inner = ring.inner
-    if np.isfinite(inner).any() and least > MIN_RADIUS * side.size:
+    if np.isfinite(inner).any() and least > _MIN_RADIUS * side.size:
         found.append(Boundary("inner", point, world(inner), nowhere))
     if side.offset and np.isfinite(most) and most > a1:
         found.append(Boundary("shoulder", point, world(ring.edge), around(abs(side.offset))))
@@ -135,9 +135,9 @@ class _Ring:
     def edge(self) -> Array:
         """The covered part of the axis x = 0, shape (k, 2), m, NaN at the hole."""
         high, low = (np.sqrt(max(0.0, radius**2 - self.a1**2)) for radius in (self.most, self.least))
-        upper = np.linspace(low, high, CIRCLE_SEGMENTS + 1)
+        upper = np.linspace(low, high, _CIRCLE_SEGMENTS + 1)
         heights = (
-            np.concatenate([-upper[::-1], [np.nan], upper]) if low else np.linspace(-high, high, CIRCLE_SEGMENTS + 1)
+            np.concatenate([-upper[::-1], [np.nan], upper]) if low else np.linspace(-high, high, _CIRCLE_SEGMENTS + 1)
         )
         return np.stack([0.0 * heights, heights], axis=1)
 
@@ -146,13 +146,13 @@ class _Ring:
         if radius <= -centre or not radius:
             return np.empty((0, 2))
         half = np.arccos(max(-1.0, -centre / radius))
-        angles = np.linspace(-half, half, CIRCLE_SEGMENTS + 1)
+        angles = np.linspace(-half, half, _CIRCLE_SEGMENTS + 1)
         return np.stack([centre + radius * np.cos(angles), radius * np.sin(angles)], axis=1)
 
     def _uncovered(self, points: Array, centre: float) -> Array:
         """Return points with NaN for those inside the ring about the other centre."""
         distance = np.hypot(points[:, 0] - centre, points[:, 1])
-        touching = TOUCHING * self.a1
+        touching = _TOUCHING * self.a1
         covered = (distance > self.least - touching) & (distance < self.most + touching)
         return np.where(covered[:, None], np.nan, points)
 
@@ -166,11 +166,11 @@ def _ring(description: Description, fit: Fit) -> tuple[Boundary, ...]:
 
     def boundary(name: str, radius: float) -> Boundary:
         line = np.stack([[radius, 0.0, height] for height in heights])
-        circle = np.hstack([radius * _unit_circle(), np.full((CIRCLE_SEGMENTS + 1, 1), heights[0])])
+        circle = np.hstack([radius * _unit_circle(), np.full((_CIRCLE_SEGMENTS + 1, 1), heights[0])])
         return Boundary(name, "tool", np.asarray(origin + line @ R), np.asarray(origin + circle @ R))
 
     radii = zip(("inner", "outer"), _radii(description, fit), strict=True)
-    least = MIN_RADIUS * float(np.asarray(p["reach"]))
+    least = _MIN_RADIUS * float(np.asarray(p["reach"]))
     return tuple(boundary(name, radius) for name, radius in radii if least < radius < np.inf)[::-1]
 
 
@@ -192,5 +192,5 @@ def _rises(description: Description, fit: Fit) -> Array:
 
 
 def _unit_circle() -> Array:
-    angles = np.linspace(0, 2 * np.pi, CIRCLE_SEGMENTS + 1)
+    angles = np.linspace(0, 2 * np.pi, _CIRCLE_SEGMENTS + 1)
     return np.stack([np.cos(angles), np.sin(angles)], axis=1)

@@ -14,7 +14,7 @@ from dhkit.kinematics.solutions import LIMIT_SLACK, IKFlag, IKSolutions, IKStatu
 
 SINGULARITIES = np.uint8(IKFlag.shoulder | IKFlag.elbow | IKFlag.wrist)
 """Flags of a branch at a singularity."""
-BOUND_ROUNDING = 1e-12
+_BOUND_ROUNDING = 1e-12
 """Relative margin of the arm's greatest length for rounding in the sum of its links."""
 
 
@@ -118,7 +118,7 @@ def is_beyond_all_links(description: Description, positions: Array) -> NDArray[n
     with np.errstate(all="ignore"):
         away = np.linalg.norm(positions - chain[0], axis=-1)
         # The squares of positions above 1e154 m overflow: they are infinitely far away.
-        beyond: NDArray[np.bool_] = away > length + BOUND_ROUNDING * (length + np.abs(positions).sum(axis=-1))
+        beyond: NDArray[np.bool_] = away > length + _BOUND_ROUNDING * (length + np.abs(positions).sum(axis=-1))
         overflows: NDArray[np.bool_] = np.isinf(away)
     return np.asarray(beyond | overflows)
 

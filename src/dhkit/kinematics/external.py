@@ -22,13 +22,13 @@ from dhkit.kinematics.solutions import IKSolutions
 
 log = logging.getLogger(__name__)
 
-RESTARTED_JOINTS = 6
+_RESTARTED_JOINTS = 6
 """Number of joints of arms with finitely many solutions."""
-STARTS, MAX_ROUNDS = 32, 8
+_STARTS, _MAX_ROUNDS = 32, 8
 """Number of random starts in a round of iterations, and largest number of rounds."""
-CLOSES = 1e-11
+_CLOSES = 1e-11
 """Error to which a solution closes that iteration finds: share of the reach, and rad."""
-SAME_SOLUTION = 1e-5
+_SAME_SOLUTION = 1e-5
 """Solutions that differ by less, rad, are one: near singularities iterations end that far apart."""
 SAME_ANGLE = 1e-6
 """Angles that differ by less, rad, count as equal when solutions are sorted."""
@@ -80,7 +80,7 @@ def solve_externally(description: Description, T: ArrayLike) -> IKSolutions:
     q = np.concatenate([np.empty((0, n)), *found])
     q, closed = refined(description, q, np.repeat(goals.reshape(-1, 16), counts, axis=0))
     q, owner = q[closed], owner[closed]
-    if n == RESTARTED_JOINTS or solver is None:
+    if n == _RESTARTED_JOINTS or solver is None:
         q, owner = _with_restarts(description, poses.reshape(-1, 4, 4), np.flatnonzero(posed), q, owner)
     table = _ordered(q, owner, posed.size)
     B = table.shape[1]
@@ -111,14 +111,14 @@ def _with_restarts(
     rng = np.random.default_rng(0)
     has_curves = freedoms(description, "whole") < description.n  # infinitely many solutions: one is enough
     waiting = rows
-    for _ in range(MAX_ROUNDS):
+    for _ in range(_MAX_ROUNDS):
         if has_curves:
             waiting = np.setdiff1d(waiting, owner)
         if not len(waiting):
             break
-        of_start = np.repeat(waiting, STARTS)
+        of_start = np.repeat(waiting, _STARTS)
         starts = rng.uniform(-np.pi, np.pi, (len(of_start), description.n))
-        found = solve_numerically(description, poses[of_start], starts, restarts=0, tolerance=CLOSES, limits=False)
+        found = solve_numerically(description, poses[of_start], starts, restarts=0, tolerance=_CLOSES, limits=False)
         reached = found.valid[:, 0]
         before = np.bincount(owner, minlength=len(poses))
         q, owner = _distinct(np.concatenate([q, found.q[reached, 0]]), np.concatenate([owner, of_start[reached]]))
@@ -132,7 +132,7 @@ def _distinct(q: Array, owner: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp
     order = np.argsort(owner, kind="stable")
     for places in np.split(order, np.flatnonzero(np.diff(owner[order])) + 1):
         turns = np.abs(np.angle(np.exp(1j * (q[places, None] - q[places])))).max(axis=-1)
-        kept[places] = ~np.any(np.tril(turns < SAME_SOLUTION, k=-1), axis=1)
+        kept[places] = ~np.any(np.tril(turns < _SAME_SOLUTION, k=-1), axis=1)
     return q[kept], owner[kept]
 
 

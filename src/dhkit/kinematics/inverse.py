@@ -16,9 +16,9 @@ from dhkit.kinematics.external import solve_externally
 from dhkit.kinematics.solutions import IKSolutions, IKStatus
 from dhkit.kinematics.solver import free_angles, solve_in_closed_form, solver_of
 
-BOUNDARY_SHARE = 1e-4
+_BOUNDARY_SHARE = 1e-4
 """Distance beyond the workspace, as a share of the reach, of poses that an arm near a family may still reach."""
-CHUNK = 16_384
+_CHUNK = 16_384
 """Poses per chunk: with eight branches 6 MB of joint positions, which fit into the processor's cache."""
 
 
@@ -80,7 +80,7 @@ def _with_poses_at_the_boundary(description: Description, found: IKSolutions, po
     """
     from dhkit.kinematics.neighbour import solve_from_neighbour  # with SciPy's rotations, 60 ms
 
-    least = BOUNDARY_SHARE * max(description.reach, 1e-300)
+    least = _BOUNDARY_SHARE * max(description.reach, 1e-300)
     is_near = (found.status_code == IKStatus.out_of_reach) & (found.distance <= least)
     rows = np.flatnonzero(is_near.ravel())
     if not len(rows):
@@ -110,7 +110,7 @@ def _with_poses_at_the_boundary(description: Description, found: IKSolutions, po
 
 @takes_robot
 def inverse_kinematics_in_chunks(
-    description: Description, T: ArrayLike, size: int = CHUNK, seed: ArrayLike | None = None, threads: int = 1
+    description: Description, T: ArrayLike, size: int = _CHUNK, seed: ArrayLike | None = None, threads: int = 1
 ) -> Iterator[tuple[slice, IKSolutions]]:
     """Return an iterator over the solutions of many poses, ``size`` at a time, without memory for all of them.
 

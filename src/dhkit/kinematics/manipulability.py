@@ -17,12 +17,12 @@ from dhkit.kinematics.jacobian import jacobian
 Motion: TypeAlias = Literal["translational", "rotational", "whole"]
 """Part of the tool's velocity: that of its origin, its angular velocity, or both (m and rad, unweighted)."""
 
-ROWS = {"translational": slice(0, 3), "rotational": slice(3, 6), "whole": slice(0, 6)}
-RANK_TOLERANCE = 1e-9
+_ROWS = {"translational": slice(0, 3), "rotational": slice(3, 6), "whole": slice(0, 6)}
+_RANK_TOLERANCE = 1e-9
 """Singular values below this share of the largest count as 0: far above rounding, far below those of regular states."""
-RANK_SAMPLES = 4
+_RANK_SAMPLES = 4
 """Number of random configurations that determine the generic rank; each has it with probability 1."""
-FLATNESS = 6 * np.finfo(float).eps
+_FLATNESS = 6 * np.finfo(float).eps
 """An ellipsoid is flat if its shortest axis is at most this share of its longest, the rounding of an SVD."""
 
 
@@ -105,7 +105,7 @@ def isotropy(description: Description, q: ArrayLike, motion: Motion = "translati
     if not rank:
         return 0.0 * sigma[..., 0]
     largest, smallest = sigma[..., 0], sigma[..., rank - 1]
-    flat = smallest <= FLATNESS * largest
+    flat = smallest <= _FLATNESS * largest
     return np.divide(np.where(flat, 0.0, smallest), np.where(flat, 1.0, largest))
 
 
@@ -143,9 +143,9 @@ def freedoms(description: Description, motion: Motion = "translational") -> int:
     >>> freedoms(library_robot("planar3r")), freedoms(library_robot("planar3r"), "whole")
     (2, 3)
     """
-    q = np.random.default_rng(0).uniform(0.3, 1.2, (RANK_SAMPLES, description.n))
+    q = np.random.default_rng(0).uniform(0.3, 1.2, (_RANK_SAMPLES, description.n))
     sigma = singular_values(description, q, motion)
-    return int(np.sum(sigma > RANK_TOLERANCE * sigma.max(initial=0.0), axis=-1).max())
+    return int(np.sum(sigma > _RANK_TOLERANCE * sigma.max(initial=0.0), axis=-1).max())
 
 
 @takes_robot
@@ -177,7 +177,7 @@ def velocity_ellipsoid(description: Description, q: ArrayLike, motion: Motion = 
     U, sigma, _ = np.linalg.svd(J)
     U[..., 2] *= np.linalg.det(U)[..., None]  # right-handed
     lengths = np.zeros((*U.shape[:-2], 3))
-    lengths[..., : sigma.shape[-1]] = np.where(sigma <= FLATNESS * sigma[..., :1], 0.0, sigma)
+    lengths[..., : sigma.shape[-1]] = np.where(sigma <= _FLATNESS * sigma[..., :1], 0.0, sigma)
     for array in (U, lengths):
         array[missing] = np.nan
     return Ellipsoid(forward_kinematics(description, q)[..., :3, 3], U, lengths)
@@ -203,9 +203,9 @@ def force_ellipsoid(description: Description, q: ArrayLike, motion: Motion = "tr
 
 
 def _rows(description: Description, q: ArrayLike, motion: Motion) -> Array:
-    if motion not in ROWS:
-        raise ValueError(f"motion is {motion!r}; expected {', '.join(map(repr, ROWS))}")
-    return jacobian(description, joint_array(description, q))[..., ROWS[motion], :]
+    if motion not in _ROWS:
+        raise ValueError(f"motion is {motion!r}; expected {', '.join(map(repr, _ROWS))}")
+    return jacobian(description, joint_array(description, q))[..., _ROWS[motion], :]
 
 
 def _known(J: Array) -> tuple[Array, NDArray[np.bool_]]:

@@ -34,22 +34,22 @@ from dhkit.kinematics.numeric import descend, refined, solve_numerically
 from dhkit.kinematics.solutions import IKFlag, IKSolutions
 from dhkit.kinematics.solver import Solver, free_angles, solve_in_closed_form, solver_for
 
-OTHER = "other"
+_OTHER = "other"
 """Name of the last branch: a solution that iteration finds where no branch of the neighbour leads to one."""
-OTHER_STARTS = 15
+_OTHER_STARTS = 15
 """Number of random starts of that iteration for a pose."""
-CHUNK = 2048
+_CHUNK = 2048
 """Number of poses at a time: the differences of all pairs of their solutions take 6 MB."""
-SAMPLES = 64
+_SAMPLES = 64
 """Number of random states at which the neighbour's miss is measured."""
-MISSES = 4.0
+_MISSES = 4.0
 """Displacement of a pose near the boundary, over the neighbour's largest miss: of the six directions along the axes
 one has a share of 0.58 of it or more towards the workspace."""
-PATH_STEPS = 32
+_PATH_STEPS = 32
 """Number of steps in which a solution is followed from the pose of its start to the required one."""
-PATH_ERROR = 1e-9
+_PATH_ERROR = 1e-9
 """Error, share of the reach and rad, at which Newton's method stops on the way."""
-SAME_ANGLE = 1e-6
+_SAME_ANGLE = 1e-6
 """Joint values, rad or share of the reach, that differ by less are the same solution."""
 
 
@@ -80,13 +80,13 @@ def solve_from_neighbour(description: Description, T: ArrayLike, seed: ArrayLike
     B = len(solver.fit.branches) + 1
     q = np.full((len(rows), B, description.n), np.nan)
     flags = np.zeros((len(rows), B), dtype=np.uint8)
-    for begin in range(0, len(rows), CHUNK):
-        some = begin + np.flatnonzero(posed[begin : begin + CHUNK])
+    for begin in range(0, len(rows), _CHUNK):
+        some = begin + np.flatnonzero(posed[begin : begin + _CHUNK])
         q[some, :-1], flags[some, :-1] = _refined_branches(description, solver, rows[some], free[some])
 
     missing = posed & np.isnan(q).any(axis=-1).all(axis=-1) & ~is_beyond_all_links(description, rows[:, :3, 3])
     if missing.any():
-        iterated = solve_numerically(description, rows[missing], restarts=OTHER_STARTS, limits=False)
+        iterated = solve_numerically(description, rows[missing], restarts=_OTHER_STARTS, limits=False)
         q[missing, -1] = iterated.q[:, 0]
     return collect(
         description,
@@ -94,7 +94,7 @@ def solve_from_neighbour(description: Description, T: ArrayLike, seed: ArrayLike
         np.full(batch, np.nan),
         positions=poses[..., :3, 3],
         posed=posed.reshape(batch),
-        branches=(*solver.fit.branches, OTHER),
+        branches=(*solver.fit.branches, _OTHER),
         met=ALL_COORDINATES,
         flags=(flags & SINGULARITIES | np.uint8(IKFlag.refined)).reshape(*batch, B),
         complete=False,
@@ -149,12 +149,12 @@ def _followed(description: Description, starts: Array, goals: Array) -> Array:
     way = T_goal[:, :3, 3] - T_start[:, :3, 3]
     turn = Rotation.from_matrix(T_goal[:, :3, :3] @ np.swapaxes(T_start[:, :3, :3], 1, 2)).as_rotvec()
     q = starts
-    for share in np.arange(1, PATH_STEPS) / PATH_STEPS:
+    for share in np.arange(1, _PATH_STEPS) / _PATH_STEPS:
         T = T_start.copy()
         T[:, :3, 3] += share * way
         T[:, :3, :3] = Rotation.from_rotvec(share * turn).as_matrix() @ T[:, :3, :3]
         with np.errstate(all="ignore"):
-            q, _ = descend(newton, T.reshape(-1, 16), q, PATH_ERROR)
+            q, _ = descend(newton, T.reshape(-1, 16), q, _PATH_ERROR)
     return _refined(description, q, goals)
 
 
@@ -174,7 +174,7 @@ def _starts(description: Description, solver: Solver, poses: Array, free: Array)
 
 def _displaced(description: Description, poses: Array) -> Iterator[Array]:
     """Yield poses (N, 4, 4) moved along each axis of the world, to both sides, and turned about each axis."""
-    size = MISSES * _largest_miss(description)
+    size = _MISSES * _largest_miss(description)
     for direction in (*np.eye(3), *-np.eye(3)):
         moved = poses.copy()
         moved[:, :3, 3] += size * Axes.of(description).scale * direction
@@ -190,9 +190,9 @@ def _largest_miss(description: Description) -> float:
     """Return the largest miss of the neighbour's solutions at random poses: share of the reach, and rad."""
     solver = _neighbour(description)
     span = np.where(description.numbers.prismatic, Axes.of(description).scale, np.pi)
-    states = np.random.default_rng(0).uniform(-span, span, (SAMPLES, description.n))
+    states = np.random.default_rng(0).uniform(-span, span, (_SAMPLES, description.n))
     T = world_to_tool(description, states)
-    found = solve_in_closed_form(description, solver, T, np.zeros((SAMPLES, 2)))
+    found = solve_in_closed_form(description, solver, T, np.zeros((_SAMPLES, 2)))
     goals = np.broadcast_to(T[:, None], (*found.valid.shape, 4, 4))[found.valid]
     newton = Newton.of(description, position_only=False, limits=False)
     return float(np.abs(newton.error(found.q[found.valid], goals.reshape(-1, 16))).max(initial=0.0))
@@ -203,8 +203,8 @@ def _are_twins(description: Description, starts: Array, q: Array) -> NDArray[np.
 
     Branches whose starts coincide, at singularities of the neighbour, are no twins.
     """
-    together = _largest_difference(description, q[:, :, None], q[:, None]) < SAME_ANGLE
-    apart = _largest_difference(description, starts[:, :, None], starts[:, None]) > SAME_ANGLE
+    together = _largest_difference(description, q[:, :, None], q[:, None]) < _SAME_ANGLE
+    apart = _largest_difference(description, starts[:, :, None], starts[:, None]) > _SAME_ANGLE
     moved = _largest_difference(description, q, starts)
     order = np.arange(q.shape[1])
     farther = (moved[:, :, None] > moved[:, None]) | ((moved[:, :, None] == moved[:, None]) & (order[:, None] > order))

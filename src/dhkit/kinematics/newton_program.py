@@ -9,11 +9,11 @@ import casadi as ca
 
 from dhkit.symbolic import Graph
 
-SX: TypeAlias = Any
+_SX: TypeAlias = Any
 """A CasADi SX scalar or matrix."""
-MAX_STEP = 1.0
+_MAX_STEP = 1.0
 """Largest step of a joint, rad or share of the reach, so that a search does not leave its neighbourhood."""
-TINY = 1e-300
+_TINY = 1e-300
 """Added to denominators to avoid 0 / 0."""
 
 
@@ -44,32 +44,32 @@ def step_program(n: int, size: int) -> Graph:
         dq = _solve(A.T @ A + damping * ca.SX.eye(n), A.T @ error)
     else:
         dq = A.T @ _solve(A @ A.T + damping * ca.SX.eye(size), error)
-    new = q + dq * units * ca.fmin(1.0, MAX_STEP / (ca.norm_inf(dq) + TINY))
+    new = q + dq * units * ca.fmin(1.0, _MAX_STEP / (ca.norm_inf(dq) + _TINY))
     ends = [_ends(new[i], lower[i], upper[i], endless[i]) for i in range(n)]
     parameters = ca.vertcat(length, units, turns, lower, upper)
     inputs = {"parameters": parameters, "q": q, "error": error, "J": J, "damping": damping}
     return Graph.of("newton_step", inputs, {"q": ca.vertcat(*ends)})
 
 
-def _stays(x: SX, push: SX, lower: SX, upper: SX, endless: SX) -> SX:
+def _stays(x: _SX, push: _SX, lower: _SX, upper: _SX, endless: _SX) -> _SX:
     outward = ca.logic_or(ca.logic_and(x >= upper, push > 0), ca.logic_and(x <= lower, push < 0))
     return ca.logic_and(outward, ca.logic_not(endless))
 
 
-def _ends(x: SX, lower: SX, upper: SX, endless: SX) -> SX:
+def _ends(x: _SX, lower: _SX, upper: _SX, endless: _SX) -> _SX:
     """Return a joint position inside its limits, by a whole turn back where the range allows one."""
     x = ca.if_else(ca.logic_and(x > upper, endless), x - math.tau, x)
     x = ca.if_else(ca.logic_and(x < lower, endless), x + math.tau, x)
     return ca.fmin(ca.fmax(x, lower), upper)
 
 
-def _solve(A: SX, b: SX) -> SX:
+def _solve(A: _SX, b: _SX) -> _SX:
     """Return A^-1 b of a positive definite matrix, by its factors L D L^T."""
     D, LT, order = ca.ldl(A, False)
     return ca.ldl_solve(b, D, LT, order)
 
 
-def _rotation_vector(R: SX) -> SX:
+def _rotation_vector(R: _SX) -> _SX:
     """Return the rotation vector of a matrix, of length up to pi, accurate near 0 and near pi.
 
     It is computed from the quaternion, whose entries are taken from the products with its largest entry (Shepperd 1978,
@@ -88,4 +88,4 @@ def _rotation_vector(R: SX) -> SX:
     w, v = best[0], best[1:]
     w, v = ca.fabs(w), ca.if_else(w < 0, -v, v)
     size = ca.norm_2(v)
-    return v * (2 * ca.atan2(size, w) / (size + TINY))
+    return v * (2 * ca.atan2(size, w) / (size + _TINY))

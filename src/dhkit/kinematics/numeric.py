@@ -23,22 +23,22 @@ Progress: TypeAlias = Callable[[int, int], None]
 
 CHUNK = 8_192
 """Number of searches that run together; their arrays take about 5 MB."""
-MIN_POSES_PER_THREAD = 64
-MIN_CANDIDATES = 512
+_MIN_POSES_PER_THREAD = 64
+_MIN_CANDIDATES = 512
 """Smallest number of random joint positions from which starts are chosen."""
-ALWAYS_STEP = 1e-2
+_ALWAYS_STEP = 1e-2
 """Squared error, (rad, share of the reach)^2, below which every step is taken, because along a curved valley the error
 of Newton's method grows before it falls."""
-STALL_RATIO, STALL_STEPS = 0.7, 10
-"""A search is stalled, and given up, when its squared error has not fallen below STALL_RATIO times its value
-STALL_STEPS steps earlier."""
-MIN_DAMPING, DAMPING_DECREASE, DAMPING_INCREASE = 1e-4, 0.25, 4.0
+_STALL_RATIO, _STALL_STEPS = 0.7, 10
+"""A search is stalled, and given up, when its squared error has not fallen below _STALL_RATIO times its value
+_STALL_STEPS steps earlier."""
+_MIN_DAMPING, _DAMPING_DECREASE, _DAMPING_INCREASE = 1e-4, 0.25, 4.0
 """Damping over the squared error: its smallest value, and its factors after a step that helps and one that does not."""
-BASE_DAMPING = 1e-13
+_BASE_DAMPING = 1e-13
 """Damping that is always added, for Jacobians without full rank."""
-REFINED = 1e-13
+_REFINED = 1e-13
 """Error at which Newton's method stops refining a solution of another solver: share of the reach, and rad."""
-REFINED_CLOSES = 1e-10
+_REFINED_CLOSES = 1e-10
 """Largest error of a refined solution: position as a share of the reach, rotation in rad."""
 
 
@@ -138,7 +138,7 @@ def solve_numerically(
         return int(rows[some][-1]) + 1
 
     for done in in_threads(
-        solve, _chunks(len(rows), min(CHUNK, max(MIN_POSES_PER_THREAD, -(-len(rows) // threads)))), threads
+        solve, _chunks(len(rows), min(CHUNK, max(_MIN_POSES_PER_THREAD, -(-len(rows) // threads)))), threads
     ):
         if progress is not None:
             progress(done, posed.size)
@@ -189,7 +189,7 @@ class Search:
 
     def _polish(self, q: Array, error: Array, goals: Array) -> None:
         """Take one more step where that helps: it squares the error, down to rounding."""
-        last = self.newton.step(q, error, np.full(len(q), BASE_DAMPING))
+        last = self.newton.step(q, error, np.full(len(q), _BASE_DAMPING))
         last_error = self.newton.error(last, goals)
         helps = np.sum(last_error**2, axis=1) < np.sum(error**2, axis=1)
         q[helps], error[helps] = last[helps], last_error[helps]
@@ -198,7 +198,7 @@ class Search:
         """Return random joint positions whose poses are near the goals, nearest first, shape (N, restarts, n)."""
         newton = self.newton
         lower, upper = newton.ranges(np.where(newton.description.numbers.prismatic, newton.length, np.pi))
-        draws = np.random.default_rng(self.seed).random((max(MIN_CANDIDATES, self.restarts), newton.description.n))
+        draws = np.random.default_rng(self.seed).random((max(_MIN_CANDIDATES, self.restarts), newton.description.n))
         q = lower + (upper - lower) * draws
         theirs = self._coordinates(forward_kinematics(newton.description, q).reshape(-1, 16))
         # |a - b|^2 = a a - 2 a b + b b; a a is the same for all candidates.
@@ -235,7 +235,7 @@ class Search:
 
 
 @dataclass(frozen=True, eq=False)
-class Descent:
+class _Descent:
     """Running searches, N rows."""
 
     row: NDArray[np.intp]
@@ -248,38 +248,38 @@ class Descent:
     damping: Array
     """Damping over the squared error."""
     reference_cost: Array
-    """Squared error at the last progress by STALL_RATIO."""
+    """Squared error at the last progress by _STALL_RATIO."""
     steps_since: NDArray[np.intp]
     """Number of steps since that progress."""
 
     @classmethod
-    def start(cls, newton: Newton, goals: Array, q: Array) -> Descent:
+    def start(cls, newton: Newton, goals: Array, q: Array) -> _Descent:
         """Begin at q, shape (N, n)."""
         error, N = newton.error(q, goals), len(q)
         cost = np.sum(error**2, axis=1)
         return cls(np.arange(N), goals, q, error, cost, np.ones(N), cost, np.zeros(N, dtype=np.intp))
 
-    def selected(self, keep: NDArray[np.bool_]) -> Descent:
+    def selected(self, keep: NDArray[np.bool_]) -> _Descent:
         """Return the searches marked in ``keep``, shape (N,)."""
-        return self if keep.all() else Descent(*(getattr(self, field.name)[keep] for field in fields(self)))
+        return self if keep.all() else _Descent(*(getattr(self, field.name)[keep] for field in fields(self)))
 
-    def step(self, newton: Newton) -> Descent:
+    def step(self, newton: Newton) -> _Descent:
         """Return the searches after a step; where it does not help, the damping is raised instead."""
-        q = newton.step(self.q, self.error, self.damping * self.cost + BASE_DAMPING)
+        q = newton.step(self.q, self.error, self.damping * self.cost + _BASE_DAMPING)
         error = newton.error(q, self.goals)
         cost = np.sum(error**2, axis=1)
         helps = cost < self.cost
-        taken = helps | (np.maximum(cost, self.cost) < ALWAYS_STEP)
+        taken = helps | (np.maximum(cost, self.cost) < _ALWAYS_STEP)
         cost = np.where(taken, cost, self.cost)
-        gets_on = cost < STALL_RATIO * self.reference_cost
-        eased = np.maximum(self.damping * DAMPING_DECREASE, MIN_DAMPING)
-        return Descent(
+        gets_on = cost < _STALL_RATIO * self.reference_cost
+        eased = np.maximum(self.damping * _DAMPING_DECREASE, _MIN_DAMPING)
+        return _Descent(
             self.row,
             self.goals,
             np.where(taken[:, None], q, self.q),
             np.where(taken[:, None], error, self.error),
             cost,
-            np.where(helps, eased, np.where(taken, self.damping, self.damping * DAMPING_INCREASE)),
+            np.where(helps, eased, np.where(taken, self.damping, self.damping * _DAMPING_INCREASE)),
             np.where(gets_on, cost, self.reference_cost),
             np.where(gets_on, 0, self.steps_since + 1),
         )
@@ -288,9 +288,9 @@ class Descent:
 def descend(newton: Newton, goals: Array, q: Array, tolerance: float) -> tuple[Array, Array]:
     """Search for poses (N, 16) from q (N, n) until all are reached or stalled; return joint positions and errors."""
     last_q, last_error = np.empty_like(q), np.empty((len(q), newton.size))
-    searches = Descent.start(newton, goals, q)
+    searches = _Descent.start(newton, goals, q)
     while len(searches.row):
-        over = closes(searches.error, tolerance) | (searches.steps_since >= STALL_STEPS)
+        over = closes(searches.error, tolerance) | (searches.steps_since >= _STALL_STEPS)
         last_q[searches.row[over]], last_error[searches.row[over]] = searches.q[over], searches.error[over]
         searches = searches.selected(~over)
         if len(searches.row):
@@ -313,13 +313,13 @@ def refined(description: Description, q: Array, goals: Array) -> tuple[Array, ND
     Returns
     -------
     tuple[Array, NDArray[np.bool_]]
-        Joint values (K, n), angles in (-pi, pi], and whether their pose is the goal to ``REFINED_CLOSES``, shape (K,).
+        Joint values (K, n), angles in (-pi, pi], and whether their pose is the goal to ``_REFINED_CLOSES``, shape (K,).
     """
     newton = Newton.of(description, position_only=False, limits=False)
     # Not counted, so that many solutions of one pose do not start a compilation in a control loop.
     with np.errstate(all="ignore"), uncounted():
-        q, error = descend(newton, goals, q, REFINED)
-    return wrap_angles(q, ~description.numbers.prismatic), closes(error, REFINED_CLOSES)
+        q, error = descend(newton, goals, q, _REFINED)
+    return wrap_angles(q, ~description.numbers.prismatic), closes(error, _REFINED_CLOSES)
 
 
 def closes(error: Array, tolerance: float) -> NDArray[np.bool_]:

@@ -17,9 +17,9 @@ from dhkit.kinematics.jacobian import jacobian
 from dhkit.kinematics.manipulability import Motion, freedoms
 from dhkit.kinematics.solutions import IKFlag, IKSolutions
 
-MAX_STEP = np.pi / 4
+_MAX_STEP = np.pi / 4
 """Largest motion of a joint between two poses, rad or share of the reach; a larger one means another branch."""
-NEAR_SINGULAR = 0.02
+_NEAR_SINGULAR = 0.02
 """A pose counts as near a singularity if a singular value of its Jacobian, lengths over the reach, is below this."""
 
 
@@ -123,7 +123,7 @@ def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits
     q0 = joint_vector(description, q0, "q0")
     solutions = inverse_kinematics(description, poses, seed=q0)
     usable = solutions.allowed if limits else solutions.valid
-    jump = MAX_STEP * np.where(description.numbers.prismatic, description.reach / 2 / np.pi, 1.0)
+    jump = _MAX_STEP * np.where(description.numbers.prismatic, description.reach / 2 / np.pi, 1.0)
     q = np.full((len(poses), description.n), np.nan)
     places = np.full(len(poses), -1)
     switches, lost, at = [], [], q0
@@ -169,4 +169,4 @@ def _near_singular(description: Description, q: Array, motion: Motion) -> tuple[
     J[:, :3] /= description.reach or 1.0
     J = J if motion == "whole" else J[:, :3]
     smallest = np.linalg.svd(J, compute_uv=False)[:, freedoms(description, motion) - 1]
-    return tuple(int(k) for k in np.flatnonzero((smallest < NEAR_SINGULAR) & ~np.isnan(q).any(axis=-1)))
+    return tuple(int(k) for k in np.flatnonzero((smallest < _NEAR_SINGULAR) & ~np.isnan(q).any(axis=-1)))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dhkit.description import Array
 
 Kind: TypeAlias = Literal["shoulder", "elbow", "wrist"]
-MIN_TERM = 1e-12
+_MIN_TERM = 1e-12
 """Terms below this share of the largest length are rounding and are left out of equations."""
 
 
@@ -173,7 +173,7 @@ class ShoulderFactor:
     @property
     def equation(self) -> str:
         """The equation x = 0 with the arm's numbers, m, the first of them positive."""
-        least = MIN_TERM * self.size
+        least = _MIN_TERM * self.size
         terms = [(self.a1, "")] if abs(self.a1) > least else []
         terms += [term for link in self.links for term in link.terms(least)]
         turned = np.sign(terms[0][0])
@@ -220,7 +220,7 @@ def _degrees(angle: float) -> str:
 def _product(number: float, name: str) -> str:
     if not name:
         return f"{number:.6g}"
-    return name if name.startswith("q") and abs(number - 1) < MIN_TERM else f"{number:.6g} {name}"
+    return name if name.startswith("q") and abs(number - 1) < _MIN_TERM else f"{number:.6g} {name}"
 
 
 def _wrap_angle(angle: float) -> float:

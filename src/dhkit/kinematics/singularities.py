@@ -27,10 +27,10 @@ from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import Fit
 from dhkit.kinematics.singular_factors import AngleFactor, Factor, Kind, Link, ShoulderFactor, SlideFactor
 
-DRAWS, MAX_BATCHES = 256, 64
+_DRAWS, _MAX_BATCHES = 256, 64
 """Random states drawn at once, and largest number of such batches, to find states that are singular inside limits."""
-STRETCHED = ("stretched", "folded")
-MAX_WORDS_LENGTH = 200
+_STRETCHED = ("stretched", "folded")
+_MAX_WORDS_LENGTH = 200
 """Longest description of a kind in a notebook, characters."""
 
 
@@ -75,7 +75,7 @@ class Singularities:
         return repr_line("Singularities", summary=", ".join(self.kinds))
 
     def _repr_html_(self) -> str:
-        return html_table(("singular", "where"), list(self.words.items()), longest=MAX_WORDS_LENGTH)
+        return html_table(("singular", "where"), list(self.words.items()), longest=_MAX_WORDS_LENGTH)
 
 
 @takes_robot
@@ -97,7 +97,7 @@ def singularities(description: Description) -> Singularities:
     wrist: q5 = 0° or 180°: axes 4 and 6 coincide
     """
     found = classify(description)
-    build = None if found.family is None else BUILDERS.get(found.family.name)
+    build = None if found.family is None else _BUILDERS.get(found.family.name)
     if build is None or found.fit is None:
         raise ModelError(
             f"{description.name} is {found.words}; its singularities are not known in closed form: manipulability and"
@@ -192,10 +192,10 @@ def singular_configurations(description: Description, kind: str, count: int, see
     lower, upper = _ranges(description)
     rng = np.random.default_rng(seed)
     inside, outside = [np.empty((0, description.n))], [np.empty((0, description.n))]
-    for batch in range(MAX_BATCHES):
-        limited = batch < MAX_BATCHES / 2 or bool(sum(map(len, inside)))
+    for batch in range(_MAX_BATCHES):
+        limited = batch < _MAX_BATCHES / 2 or bool(sum(map(len, inside)))
         low, high = (lower, upper) if limited else (-_room(description), _room(description))
-        drawn = low + (high - low) * rng.random((max(DRAWS, count), description.n))
+        drawn = low + (high - low) * rng.random((max(_DRAWS, count), description.n))
         moved = factor.moved_onto_singularity(drawn, lower, upper, rng)
         moved = moved[np.isfinite(moved).all(axis=1)]
         within = ((moved >= lower) & (moved <= upper)).all(axis=1)
@@ -232,50 +232,50 @@ def _room(description: Description) -> Array:
 
 # Factors from the parameters of the families in closed_form. A task is given in the axes x, u, v of the arm's plane.
 
-Parts: TypeAlias = tuple[tuple[Factor, ...], str, Array]
-WHOLE, VELOCITY, TURNING_TOO = np.eye(6), np.eye(6)[:3], np.eye(6)[[0, 1, 2, 5]]
+_Parts: TypeAlias = tuple[tuple[Factor, ...], str, Array]
+_WHOLE, _VELOCITY, _TURNING_TOO = np.eye(6), np.eye(6)[:3], np.eye(6)[[0, 1, 2, 5]]
 
 
-def _elbow_wrist(fit: Fit) -> Parts:
+def _elbow_wrist(fit: Fit) -> _Parts:
     p = _parameters(fit)
-    return (_side(p, _links(p)), _elbow(p), _wrist(p, "axes 4 and 6 coincide")), "the wrist centre", WHOLE
+    return (_side(p, _links(p)), _elbow(p), _wrist(p, "axes 4 and 6 coincide")), "the wrist centre", _WHOLE
 
 
-def _slide_wrist(fit: Fit) -> Parts:
+def _slide_wrist(fit: Fit) -> _Parts:
     p = _parameters(fit)
     boom, length = complex(*p["boom"]), complex(p["start"], p["lift"])
     side = _side(p, (Link(boom, slide=2), Link(boom * length)))
-    return (side, _slide(p, 2), _wrist(p, "axes 4 and 6 coincide")), "the wrist centre", WHOLE
+    return (side, _slide(p, 2), _wrist(p, "axes 4 and 6 coincide")), "the wrist centre", _WHOLE
 
 
-def _three_parallel(fit: Fit) -> Parts:
+def _three_parallel(fit: Fit) -> _Parts:
     p = _parameters(fit)
     factors = _side(p, (*_links(p), _lever(p))), _elbow(p), _wrist(p, "axis 6 is parallel to axes 2, 3 and 4")
-    return factors, "the point where axes 5 and 6 meet", WHOLE
+    return factors, "the point where axes 5 and 6 meet", _WHOLE
 
 
-def _yaw_two(fit: Fit) -> Parts:
+def _yaw_two(fit: Fit) -> _Parts:
     p = _parameters(fit)
-    return (_side(p, _links(p)), _elbow(p)), "the tool", VELOCITY
+    return (_side(p, _links(p)), _elbow(p)), "the tool", _VELOCITY
 
 
-def _yaw_three(fit: Fit) -> Parts:
+def _yaw_three(fit: Fit) -> _Parts:
     p = _parameters(fit)
-    return (_side(p, (*_links(p), _lever(p))), _elbow(p)), "the tool", TURNING_TOO
+    return (_side(p, (*_links(p), _lever(p))), _elbow(p)), "the tool", _TURNING_TOO
 
 
-def _parallel_chain(fit: Fit) -> Parts:
+def _parallel_chain(fit: Fit) -> _Parts:
     p, kinds = _parameters(fit), fit.structure
     second = [i for i, letter in enumerate(kinds) if letter == "R"][1]
     rows = [0, 1, *([2] if "P" in kinds else []), *([5] if kinds.count("R") == 3 else [])]
     return (_elbow(p, second, float(p["senses"][second])),), "the tool", np.eye(6)[rows]
 
 
-def _polar(fit: Fit) -> Parts:
+def _polar(fit: Fit) -> _Parts:
     return (_slide(_parameters(fit), 1),), "the tool", np.eye(6)[:2]
 
 
-BUILDERS: Mapping[str, Callable[[Fit], Parts]] = {
+_BUILDERS: Mapping[str, Callable[[Fit], _Parts]] = {
     "elbow_wrist": _elbow_wrist,
     "slide_wrist": _slide_wrist,
     "three_parallel": _three_parallel,
@@ -307,7 +307,7 @@ def _side(p: Mapping[str, Array], links: tuple[Link, ...]) -> ShoulderFactor:
 def _elbow(p: Mapping[str, Array], joint: int = 2, sense: float | None = None) -> AngleFactor:
     sense = float(p["sense3"]) if sense is None else sense
     size = float(p["L2"] * p["L3"])
-    return AngleFactor("elbow", joint, sense, float(np.angle(complex(*p["bend"]))), size, STRETCHED)
+    return AngleFactor("elbow", joint, sense, float(np.angle(complex(*p["bend"]))), size, _STRETCHED)
 
 
 def _wrist(p: Mapping[str, Array], words: str) -> AngleFactor:

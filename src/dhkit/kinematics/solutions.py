@@ -17,7 +17,7 @@ from dhkit.errors import UnreachableError
 
 LIMIT_SLACK = 1e-9
 """rad or m: how far outside its limits a joint still counts as inside, for rounding."""
-FIRST = 5
+_FIRST = 5
 """Poses of a batch that a notebook shows."""
 
 
@@ -247,7 +247,7 @@ class IKSolutions:
         """Return how many poses ended how, and what became of the first."""
         shape = self.distance.shape
         counts = [(status.name, str(count)) for status, count in self._counts]
-        first = [tuple(int(k) for k in np.unravel_index(at, shape)) for at in range(min(FIRST, self.distance.size))]
+        first = [tuple(int(k) for k in np.unravel_index(at, shape)) for at in range(min(_FIRST, self.distance.size))]
         rows = [
             (
                 str(place[0] if len(place) == 1 else place),

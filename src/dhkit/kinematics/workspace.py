@@ -14,7 +14,7 @@ from dhkit.display import counted, html_block, html_lines, html_table, listed, r
 from dhkit.kinematics.forward import forward_kinematics
 from dhkit.kinematics.manipulability import freedoms, manipulability
 
-STATES_FOR_REACH = 5_000
+_STATES_FOR_REACH = 5_000
 Progress: TypeAlias = Callable[[int, int], None]
 """Called with how many samples are done and how many there will be."""
 
@@ -22,11 +22,11 @@ CHUNK = 65_536
 """Samples worked on at once: their Jacobians take about 20 MB."""
 PER_CELL = 20
 """Samples for each cell of the box around them: fewer leave holes in what is reached."""
-FINEST = 256
+_FINEST = 256
 """Cells along the longest edge at most."""
-MOST_CELLS = 1 << 24
+_MOST_CELLS = 1 << 24
 """Cells of a grid at most: their counts take 128 MB."""
-FLAT = 1e-9
+_FLAT = 1e-9
 """Points that leave a plane, a line or a point by less than this share of the arm's size lie in it."""
 
 
@@ -161,7 +161,7 @@ def tool_reach(description: Description) -> float:
     ``description.reach`` is an upper bound of another distance: the sum of all lengths.
     """
     lower, upper, _ = _ranges(description)
-    q = lower + (upper - lower) * np.random.default_rng(0).random((STATES_FOR_REACH, description.n))
+    q = lower + (upper - lower) * np.random.default_rng(0).random((_STATES_FOR_REACH, description.n))
     return _radii(description, world_to_tool(description, q)[:, :3, 3])[1]
 
 
@@ -236,7 +236,7 @@ def workspace(
         manipulability=measures,
         best=best,
         freedoms=freedoms(description),
-        grid=occupancy(positions, edge, FLAT * max(description.reach, float(np.abs(positions).max()))),
+        grid=occupancy(positions, edge, _FLAT * max(description.reach, float(np.abs(positions).max()))),
     )
 
 
@@ -269,9 +269,9 @@ def occupancy(points: Array, edge: float | None = None, flat: float = 0.0) -> Gr
     low, spans = places.min(axis=0), np.ptp(places, axis=0)
     edge = _fitting_edge(spans, len(points)) if edge is None else float(edge)
     wanted = [float(span / edge) for span in spans]
-    if np.prod(np.ceil(wanted)) > MOST_CELLS:
-        least = float(np.prod(spans) / MOST_CELLS) ** (1 / len(spans))
-        raise ValueError(f"edge {edge:g} m makes more than {MOST_CELLS} cells; expected about {least:.2g} m or more")
+    if np.prod(np.ceil(wanted)) > _MOST_CELLS:
+        least = float(np.prod(spans) / _MOST_CELLS) ** (1 / len(spans))
+        raise ValueError(f"edge {edge:g} m makes more than {_MOST_CELLS} cells; expected about {least:.2g} m or more")
     shape = tuple(max(1, int(np.ceil(cells * (1 - 1e-12)))) for cells in wanted)
     # The box's middle is the grid's, so that no border cell is a sliver by rounding.
     corner = low + spans / 2 - edge * np.array(shape) / 2
@@ -323,7 +323,7 @@ def _fitting_edge(spans: Array, count: int) -> float:
     """Return the edge of cells of which a box has one for every so many points."""
     edge = float(np.prod(spans) * PER_CELL / count) ** (1 / len(spans))
     longest = float(spans.max())
-    return float(np.clip(edge, longest / FINEST, longest))
+    return float(np.clip(edge, longest / _FINEST, longest))
 
 
 def _without_border(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:

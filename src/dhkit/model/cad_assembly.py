@@ -41,8 +41,8 @@ from dhkit.model.stl import binary_stl
 from dhkit.model.triangle_mesh import TriangleMesh, joined_meshes
 from dhkit.model.urdf import urdf_text
 
-ROBOT_FILE, URDF_FILE = "robot.toml", "robot.urdf"
-USUAL_SIZES = (0.1, 20.0)
+_ROBOT_FILE, _URDF_FILE = "robot.toml", "robot.urdf"
+_USUAL_SIZES = (0.1, 20.0)
 """Size of an assembly as a share of the arm's length, outside of which a stated unit is probably wrong."""
 
 
@@ -120,11 +120,11 @@ class CadImport:
         }
         copies = {path: file for path, file in others.items() if file is not None and file.is_file()}
         copy_files(copies, folder)
-        write_robot(description, folder / ROBOT_FILE)
-        written = read_robot(folder / ROBOT_FILE)
+        write_robot(description, folder / _ROBOT_FILE)
+        written = read_robot(folder / _ROBOT_FILE)
         text = urdf_text(written, mesh_path=lambda path: path, collision_path=lambda path: hulls.get(path, path))
-        write_atomically(folder / URDF_FILE, text)
-        return [ROBOT_FILE, URDF_FILE, *files, *copies]
+        write_atomically(folder / _URDF_FILE, text)
+        return [_ROBOT_FILE, _URDF_FILE, *files, *copies]
 
 
 def import_cad(
@@ -242,7 +242,7 @@ def _in_metres(
     sizes = f"the assembly is {size:.4g} m across, the arm {length:.4g} m long"
     if unit is None:
         return assembly, f"unit: {found_unit}, found by size: {sizes}", True
-    is_usual = USUAL_SIZES[0] * length <= size <= USUAL_SIZES[1] * length
+    is_usual = _USUAL_SIZES[0] * length <= size <= _USUAL_SIZES[1] * length
     is_overridden = any(file_unit != UNITS[unit] for file_unit in file_units)
     override = f", for all files in place of the {listed} that files state" if is_overridden else ""
     return assembly, f"unit: {unit}, as stated{override}: {sizes}", is_usual

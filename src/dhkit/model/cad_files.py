@@ -10,16 +10,16 @@ from typing import cast
 
 from dhkit.description.assets import MESH_FORMATS, inside
 from dhkit.errors import DescriptionError, ModelError
+from dhkit.model.bounds import BOUNDS
 
 LEFT_OUT = -1
 """Key of a mapping from links to parts for the parts that belong to no link."""
-MAX_FILES = 500
-MAX_LISTED_NAMES = 12
+_MAX_LISTED_NAMES = 12
 """Largest number of names that a message lists."""
-BASE = re.compile(r"(?<![a-z])(base|pedestal|foot|fixed)(?![a-z])", re.IGNORECASE)
-NUMBERED_LINK = re.compile(r"(?:link|part|body|segment|teil)[ _.\-]*(\d{1,3})(?!\d)", re.IGNORECASE)
-NUMBER = re.compile(r"(?<!\d)\d{1,3}(?!\d)")
-INSTANCE = re.compile(r"-\d+$")
+_BASE = re.compile(r"(?<![a-z])(base|pedestal|foot|fixed)(?![a-z])", re.IGNORECASE)
+_NUMBERED_LINK = re.compile(r"(?:link|part|body|segment|teil)[ _.\-]*(\d{1,3})(?!\d)", re.IGNORECASE)
+_NUMBER = re.compile(r"(?<!\d)\d{1,3}(?!\d)")
+_INSTANCE = re.compile(r"-\d+$")
 """Number of an instance of a part in SolidWorks: "Assem1 - Part2-1" is the first instance of Part2."""
 
 
@@ -37,7 +37,7 @@ def mesh_file_names(folder: Path) -> tuple[str, ...]:
     Raises
     ------
     ModelError
-        No such folder, more files than :data:`MAX_FILES`, or a symbolic link to a file outside the folder.
+        No such folder, more files than ``BOUNDS.cad_files``, or a symbolic link to a file outside the folder.
     """
     try:
         if not folder.is_dir():
@@ -45,8 +45,8 @@ def mesh_file_names(folder: Path) -> tuple[str, ...]:
         names = _visible_names(folder, MESH_FORMATS)
     except OSError as error:
         raise ModelError(f"{folder}: {error.strerror or error}") from None
-    if len(names) > MAX_FILES:
-        raise ModelError(f"{folder}: {len(names)} mesh files; expected at most {MAX_FILES}")
+    if len(names) > BOUNDS.cad_files:
+        raise ModelError(f"{folder}: {len(names)} mesh files; expected at most {BOUNDS.cad_files}")
     for name in names:
         file_inside(folder, name)
     return names
@@ -95,12 +95,12 @@ def link_number(name: str) -> int | None:
     (3, 0, 4, None)
     """
     name = name.rsplit(" - ", 1)[-1]
-    without_instance = INSTANCE.sub("", name)
-    if NUMBER.search(without_instance) or BASE.search(without_instance):
+    without_instance = _INSTANCE.sub("", name)
+    if _NUMBER.search(without_instance) or _BASE.search(without_instance):
         name = without_instance
-    if BASE.search(name.replace("_", " ")):
+    if _BASE.search(name.replace("_", " ")):
         return 0
-    numbers = set(map(int, NUMBERED_LINK.findall(name))) or set(map(int, NUMBER.findall(name)))
+    numbers = set(map(int, _NUMBERED_LINK.findall(name))) or set(map(int, _NUMBER.findall(name)))
     return numbers.pop() if len(numbers) == 1 else None
 
 
@@ -150,7 +150,7 @@ def assign_parts(
         if len(several) > 1:
             raise ModelError(
                 f"{where}: {_name_list(several)} have the same link number{names_found}if all are of that link, "
-                f'--map "{number}={",".join(several[:MAX_LISTED_NAMES])}"; --map "-={several[-1]}" leaves a part out'
+                f'--map "{number}={",".join(several[:_MAX_LISTED_NAMES])}"; --map "-={several[-1]}" leaves a part out'
             )
     note = "parts by the numbers in their names"
     if 0 not in parts and not stated and set(parts) == set(range(1, links + 2)):
@@ -190,5 +190,5 @@ def _check_stated(stated: Mapping[int, Sequence[str]], names: Sequence[str], lin
 
 
 def _name_list(names: Sequence[str]) -> str:
-    more = f" and {len(names) - MAX_LISTED_NAMES} more" if len(names) > MAX_LISTED_NAMES else ""
-    return (", ".join(name[:60] for name in names[:MAX_LISTED_NAMES]) + more) or "nothing"
+    more = f" and {len(names) - _MAX_LISTED_NAMES} more" if len(names) > _MAX_LISTED_NAMES else ""
+    return (", ".join(name[:60] for name in names[:_MAX_LISTED_NAMES]) + more) or "nothing"

@@ -15,13 +15,13 @@ from dhkit.model.mass_report import ReportedMass, read_mass_report
 from dhkit.model.shape_inertia import MassProperties, shape_inertia
 from dhkit.model.triangle_mesh import TriangleMesh, common_bounds
 
-INTEGRATION_ERROR = 1e-13
+_INTEGRATION_ERROR = 1e-13
 """Coordinates and products below this share of a link's size and moments are set to 0: integrals are exact to 1e-15."""
-MOMENT_TOLERANCE = 0.01
+_MOMENT_TOLERANCE = 0.01
 """Share by which reported moments may exceed what is possible: reports are rounded."""
-USUAL_DENSITIES = (20.0, 25_000.0)
+_USUAL_DENSITIES = (20.0, 25_000.0)
 """kg/m^3: foam, and platinum metals; a density outside is probably in another unit."""
-COM_TOLERANCE = 0.1
+_COM_TOLERANCE = 0.1
 """Distance of a reported centre of mass outside its link's box without a warning, as a share of the link's size."""
 
 
@@ -82,9 +82,9 @@ class StatedMasses:
     @property
     def notes(self) -> tuple[str, ...]:
         """A warning about a density that no material of arms has."""
-        if self.density is None or USUAL_DENSITIES[0] <= self.density <= USUAL_DENSITIES[1]:
+        if self.density is None or _USUAL_DENSITIES[0] <= self.density <= _USUAL_DENSITIES[1]:
             return ()
-        hint = "g/cm^3 meant? then times 1000" if self.density < USUAL_DENSITIES[0] else "steel has 7850"
+        hint = "g/cm^3 meant? then times 1000" if self.density < _USUAL_DENSITIES[0] else "steel has 7850"
         return (f"warning: the density is {self.density:g} kg/m^3; {hint}",)
 
     def body(self, link: int, meshes: Sequence[TriangleMesh], T_frame_world: Array) -> LinkBody | None:
@@ -128,7 +128,7 @@ def _reported_body(report: ReportedMass, meshes: Sequence[TriangleMesh], T_frame
     body = report.properties.moved(T_frame_world)
     notes = [f"body from the report of {report.part[:60]!r}, {report.source}", *report.notes]
     moments = np.linalg.eigvalsh(body.inertia)
-    if moments[0] + moments[1] < (1 - MOMENT_TOLERANCE) * moments[2]:
+    if moments[0] + moments[1] < (1 - _MOMENT_TOLERANCE) * moments[2]:
         listed = ", ".join(f"{moment:.3g}" for moment in moments)
         notes.append(
             f"warning: no body has its principal moments {listed} kg m^2: one is larger than the sum of the others"
@@ -138,13 +138,13 @@ def _reported_body(report: ReportedMass, meshes: Sequence[TriangleMesh], T_frame
         extent = high - low
         # Points within an extent of s have a variance of s^2/4 at most (Popoviciu 1935).
         largest = body.mass * float(extent @ extent) / 4
-        if moments[2] > (1 + MOMENT_TOLERANCE) * largest:
+        if moments[2] > (1 + _MOMENT_TOLERANCE) * largest:
             notes.append(
                 f"warning: its largest moment is {moments[2]:.3g} kg m^2, a body of its mass within the link's box has "
                 f"{largest:.3g} at most; are the units of the report right?"
             )
         distance = np.linalg.norm(np.maximum(np.maximum(low - body.com, body.com - high), 0))
-        if distance > COM_TOLERANCE * np.linalg.norm(extent):
+        if distance > _COM_TOLERANCE * np.linalg.norm(extent):
             notes.append(
                 f"warning: its centre of mass lies {distance:.3g} m outside the link; was the report "
                 "made in the coordinates of the assembly?"
@@ -154,6 +154,6 @@ def _reported_body(report: ReportedMass, meshes: Sequence[TriangleMesh], T_frame
 
 def _without_rounding(body: MassProperties, size: float) -> MassProperties:
     """Return mass properties with 0 for coordinates and products that are rounding errors: people read the file."""
-    com = np.where(np.abs(body.com) < INTEGRATION_ERROR * size, 0.0, body.com)
-    is_rounding = np.abs(body.inertia) < INTEGRATION_ERROR * np.trace(body.inertia)
+    com = np.where(np.abs(body.com) < _INTEGRATION_ERROR * size, 0.0, body.com)
+    is_rounding = np.abs(body.inertia) < _INTEGRATION_ERROR * np.trace(body.inertia)
     return MassProperties(body.mass, com, np.where(is_rounding & ~np.eye(3, dtype=bool), 0.0, body.inertia))

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from dhkit.errors import ModelError
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.cad_files import assign_parts, file_inside, mat_file, mesh_file_names
 from dhkit.model.cad_units import UNITS
 from dhkit.model.collada import collada_unit
@@ -18,13 +19,7 @@ from dhkit.model.mat_parts import mat_parts
 from dhkit.model.mesh_reader import mesh_header, read_mesh
 from dhkit.model.triangle_mesh import TriangleMesh
 
-MAX_CAD_BYTES = 600_000_000
-"""Largest file of a part, in bytes."""
-MAX_CAD_TRIANGLES = 200_000
-"""Largest number of triangles of a part without ``simplify``: a browser draws seven such parts well."""
-MAX_READ_TRIANGLES = 6_000_000
-"""Largest number of triangles of a part that is simplified."""
-MIN_TRIANGLES = 4
+_MIN_TRIANGLES = 4
 """Smallest number of triangles that a part may be simplified to."""
 
 log = logging.getLogger(__name__)
@@ -61,7 +56,7 @@ def cad_parts(
     files
         Names of files by link; other files are assigned by the numbers in their names.
     simplify
-        Whether files over :data:`MAX_CAD_TRIANGLES` are read at all; they are reduced later, by :func:`simplified`.
+        Whether files over ``BOUNDS.cad_triangles`` are read at all; they are reduced later, by :func:`simplified`.
 
     Returns
     -------
@@ -74,8 +69,8 @@ def cad_parts(
         See :func:`dhkit.model.cad_files.assign_parts` and :func:`dhkit.model.mesh_reader.read_mesh`; a file with too
         many triangles, judged by its header.
     """
-    if simplify is not None and simplify < MIN_TRIANGLES:
-        raise ModelError(f"simplify is {simplify}; expected the number of triangles to keep, {MIN_TRIANGLES} at least")
+    if simplify is not None and simplify < _MIN_TRIANGLES:
+        raise ModelError(f"simplify is {simplify}; expected the number of triangles to keep, {_MIN_TRIANGLES} at least")
     is_mat = folder.suffix.lower() == ".mat" and not folder.is_dir()
     mat = folder if is_mat else mat_file(folder)
     if mat is not None:
@@ -91,25 +86,27 @@ def cad_parts(
         assignment = assign_parts(names, links, files, str(folder))
         paths = {name: file_inside(folder, name) for several in assignment.parts.values() for name in several}
         for path in paths.values():  # all headers before the first file is read
-            _check_count(str(path), mesh_header(path, MAX_CAD_BYTES).triangles or 0, simplify)
-        max_triangles = MAX_CAD_TRIANGLES if simplify is None else MAX_READ_TRIANGLES
+            _check_count(str(path), mesh_header(path, BOUNDS.cad_bytes).triangles or 0, simplify)
+        max_triangles = BOUNDS.cad_triangles if simplify is None else BOUNDS.simplified_triangles
         parts = {name: _read_part(name, path, max_triangles) for name, path in paths.items()}
     return {i: tuple(parts[name] for name in several) for i, several in assignment.parts.items()}, assignment.note
 
 
 def _check_count(where: str, count: int, simplify: int | None) -> None:
-    if simplify is None and count > MAX_CAD_TRIANGLES:
+    if simplify is None and count > BOUNDS.cad_triangles:
         raise ModelError(
-            f"{where}: {count} triangles; expected at most {MAX_CAD_TRIANGLES}; export it more coarsely, or reduce "
+            f"{where}: {count} triangles; expected at most {BOUNDS.cad_triangles}; export it more coarsely, or reduce "
             "it with --simplify 20000"
         )
-    if count > MAX_READ_TRIANGLES:
-        raise ModelError(f"{where}: {count} triangles; expected at most {MAX_READ_TRIANGLES}, even to simplify")
+    if count > BOUNDS.simplified_triangles:
+        raise ModelError(
+            f"{where}: {count} triangles; expected at most {BOUNDS.simplified_triangles}, even to simplify"
+        )
 
 
 def _read_part(name: str, path: Path, max_triangles: int) -> CadPart:
     started = time.perf_counter()
-    mesh = read_mesh(path, max_triangles=max_triangles, max_bytes=MAX_CAD_BYTES).merged()
+    mesh = read_mesh(path, max_triangles=max_triangles, max_bytes=BOUNDS.cad_bytes).merged()
     if not len(mesh.faces):
         raise ModelError(f"{path}: no triangles with three different corners")
     if (duration := time.perf_counter() - started) > 1:

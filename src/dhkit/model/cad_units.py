@@ -14,25 +14,25 @@ from dhkit.model.triangle_mesh import TriangleMesh, common_bounds
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 """Length units by name, m."""
-SIZE_RANGE = (0.25, 6.0)
+_SIZE_RANGE = (0.25, 6.0)
 """Smallest and largest plausible size of an assembly, as a share of the arm's length.
 
 The size is the diagonal of the box around the assembly in the pose of the export; the length sums |a| and |d|."""
-WIDE_SIZE_RANGE = (0.05, 40.0)
+_WIDE_SIZE_RANGE = (0.05, 40.0)
 """Sizes, likewise, of a small arm on a large base, at which the joints' axes can still decide for a unit."""
-CORNER_TOLERANCE = 1e-5
+_CORNER_TOLERANCE = 1e-5
 """Distance of a part's lowest corner from the origin, as a share of its size, if it was moved there on export.
 
 Text files have six digits."""
-MAX_MEAN_AXIS_DISTANCE = 0.05
+_MAX_MEAN_AXIS_DISTANCE = 0.05
 """Largest mean distance of the axes from their links' boxes in the right unit, as a share of the arm's length."""
-MIN_DISTANCE_RATIO = 2.0
+_MIN_DISTANCE_RATIO = 2.0
 """In the second best unit the axes must be this many times farther from the boxes than in the best."""
-MAX_AXIS_DISTANCE = 0.1
+_MAX_AXIS_DISTANCE = 0.1
 """Largest distance of an axis from a link's box without a warning, as a share of the arm's length."""
-MIN_DECISIVE_AXES = 2
+_MIN_DECISIVE_AXES = 2
 """Joints that are needed to decide by axes: one axis through the origin passes through a part of any size."""
-AXIS_POINTS = 401
+_AXIS_POINTS = 401
 """Number of points of an axis whose distances from a box are computed."""
 
 
@@ -79,7 +79,7 @@ class Assembly:
 
         ``metres`` is the meshes' unit, m.
         """
-        along = np.linspace(-2, 2, AXIS_POINTS) * self.description.reach
+        along = np.linspace(-2, 2, _AXIS_POINTS) * self.description.reach
         distances = {}
         for joint, frame in enumerate(carrying(self.description.convention, self.frames), start=1):
             points = frame[:3, 3] + along[:, None] * frame[:3, 2]
@@ -104,7 +104,7 @@ def check_positions(parts: Mapping[str, TriangleMesh], where: str) -> None:
     ModelError
         All parts but one, and two at least, have their own lowest corner at the origin.
     """
-    moved = [name for name, part in parts.items() if np.abs(part.bounds[0]).max() <= CORNER_TOLERANCE * part.size]
+    moved = [name for name, part in parts.items() if np.abs(part.bounds[0]).max() <= _CORNER_TOLERANCE * part.size]
     if len(moved) >= max(2, len(parts) - 1):
         raise ModelError(
             f"{where}: {len(moved)} of {len(parts)} parts have their own corner at the origin: each was moved into "
@@ -127,7 +127,7 @@ def unit_of(assembly: Assembly) -> str:
     where, length, size = assembly.where, assembly.arm_length, assembly.size
     if length == 0:
         raise ModelError(f"{where}: the table has no lengths to compare with; state the unit, such as --unit mm")
-    fitting = [unit for unit, metres in UNITS.items() if SIZE_RANGE[0] <= size * metres / length <= SIZE_RANGE[1]]
+    fitting = [unit for unit, metres in UNITS.items() if _SIZE_RANGE[0] <= size * metres / length <= _SIZE_RANGE[1]]
     sizes = f"the assembly is {size:.4g} across, the arm of the table {length:.4g} m long"
     if len(fitting) == 1:
         _check_other_units(assembly, fitting[0], f"{where}: {sizes}")
@@ -136,13 +136,13 @@ def unit_of(assembly: Assembly) -> str:
         raise ModelError(f"{where}: {sizes}: no unit of {', '.join(UNITS)} fits; is it the same arm? else state --unit")
     distances = {unit: assembly.mean_axis_distance(UNITS[unit]) / length for unit in fitting}
     best, second = sorted(distances, key=distances.__getitem__)[:2]
-    if distances[best] > MAX_MEAN_AXIS_DISTANCE:
+    if distances[best] > _MAX_MEAN_AXIS_DISTANCE:
         raise ModelError(
             f"{where}: {sizes}: {' and '.join(fitting)} fit, but in all of them the parts lie beside the joints' axes; "
             "is the pose of the export the table's? else state the unit, such as --unit mm"
         )
-    clear_distance = MIN_DISTANCE_RATIO * distances[best] + MAX_MEAN_AXIS_DISTANCE / 5
-    if assembly.description.n < MIN_DECISIVE_AXES or distances[second] < clear_distance:
+    clear_distance = _MIN_DISTANCE_RATIO * distances[best] + _MAX_MEAN_AXIS_DISTANCE / 5
+    if assembly.description.n < _MIN_DECISIVE_AXES or distances[second] < clear_distance:
         raise ModelError(f"{where}: {sizes}: {' and '.join(fitting)} fit; state the unit, such as --unit {best}")
     return best
 
@@ -153,10 +153,10 @@ def _check_other_units(assembly: Assembly, unit: str, sizes: str) -> None:
     This happens with a small arm on a large base, or with a large tool: it seems a large arm in a smaller unit.
     """
     length, size = assembly.arm_length, assembly.size
-    allowed = MAX_MEAN_AXIS_DISTANCE * length
-    if assembly.description.n < MIN_DECISIVE_AXES or assembly.mean_axis_distance(UNITS[unit]) <= allowed:
+    allowed = _MAX_MEAN_AXIS_DISTANCE * length
+    if assembly.description.n < _MIN_DECISIVE_AXES or assembly.mean_axis_distance(UNITS[unit]) <= allowed:
         return
-    low, high = WIDE_SIZE_RANGE
+    low, high = _WIDE_SIZE_RANGE
     possible = [other for other in UNITS if other != unit and low <= size * UNITS[other] / length <= high]
     others = [other for other in possible if assembly.mean_axis_distance(UNITS[other]) <= allowed]
     if others:
@@ -175,7 +175,7 @@ def check_size(assembly: Assembly) -> None:
         Names the option that states the unit.
     """
     length, size = assembly.arm_length, assembly.size
-    if length and not SIZE_RANGE[0] <= size / length <= SIZE_RANGE[1]:
+    if length and not _SIZE_RANGE[0] <= size / length <= _SIZE_RANGE[1]:
         raise ModelError(
             f"{assembly.where}: by the unit that the files state the assembly is {size:.4g} m across, the arm of the "
             f"table {length:.4g} m long; is it the same arm? else state the unit of all files, such as --unit mm"
@@ -187,7 +187,7 @@ def distant_part_warnings(assembly: Assembly) -> tuple[str, ...]:
 
     Causes are a pose that is not that of the export, another origin, or a lost placement in the CAD program.
     """
-    allowed = MAX_AXIS_DISTANCE * assembly.description.reach
+    allowed = _MAX_AXIS_DISTANCE * assembly.description.reach
     return tuple(
         f"warning: link {link}: its part lies {distance:.3g} m beside the axis of joint {joint}; is the pose of the "
         "export the table's, the assembly's origin frame 0, and the unit right?"

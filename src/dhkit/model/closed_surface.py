@@ -14,20 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.shells import Shells
 from dhkit.model.triangle_mesh import TriangleMesh, area_vectors, component_labels, same_vertices
 
-MERGE_DISTANCE = 1e-6
+_MERGE_DISTANCE = 1e-6
 """Distance, as a share of a mesh's size, below which vertices of an open mesh are merged: files round each corner."""
-MAX_CAP_AREA = 0.02
+_MAX_CAP_AREA = 0.02
 """Largest area of the caps over all holes, as a share of the whole area: with larger holes the shape is unknown."""
-MAX_SHELLS = 400
-"""Largest number of shells that are tested for lying inside others."""
 MIN_VOLUME = 1e-13
 """Smallest enclosed volume, as a share of the mesh's size cubed; a wire of 1 m length and 1 um width has 1e-12."""
-DOUBLED = "warning: the surface lies over itself, and the material inside counts twice"
+_DOUBLED = "warning: the surface lies over itself, and the material inside counts twice"
 """Note on a surface that is written twice, in two tessellations."""
-INVERTED = "inside out: all triangles were turned"
+_INVERTED = "inside out: all triangles were turned"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +52,7 @@ def repaired(mesh: TriangleMesh) -> Surface:
         return _closed_surface(merged)
     near = _merged_nearby(mesh)
     if is_closed(near):
-        return _closed_surface(near, f"vertices nearer than {MERGE_DISTANCE:g} of the size were joined")
+        return _closed_surface(near, f"vertices nearer than {_MERGE_DISTANCE:g} of the size were joined")
     for with_orientation in (True, False):
         fewer, notes = _without_duplicates(merged, with_orientation=with_orientation)
         if notes and is_closed(fewer := _consistently_oriented(fewer)[0]):
@@ -143,7 +142,7 @@ def _edges(faces: NDArray[np.intp]) -> NDArray[np.int64]:
 
 
 def _merged_nearby(mesh: TriangleMesh) -> TriangleMesh:
-    step = MERGE_DISTANCE * mesh.size
+    step = _MERGE_DISTANCE * mesh.size
     if step == 0:
         return mesh
     origin = mesh.bounds[0]
@@ -199,7 +198,7 @@ def _capped(mesh: TriangleMesh) -> tuple[TriangleMesh, float]:
     filled = TriangleMesh(np.concatenate([mesh.vertices, middles]), np.concatenate([mesh.faces, fans]))
     area = np.linalg.norm(area_vectors(filled.corners), axis=1)
     share = float(area[len(mesh.faces) :].sum() / max(area.sum(), np.finfo(float).tiny))
-    return (filled, share) if share <= MAX_CAP_AREA else (mesh, share)
+    return (filled, share) if share <= _MAX_CAP_AREA else (mesh, share)
 
 
 def outwards(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
@@ -207,19 +206,19 @@ def outwards(mesh: TriangleMesh) -> tuple[TriangleMesh, tuple[str, ...]]:
     is_inverted = signed_volume(mesh) < 0
     if is_inverted:
         mesh = mesh.turned()
-    inversion = (INVERTED,) if is_inverted else ()
+    inversion = (_INVERTED,) if is_inverted else ()
     shells = Shells(mesh)
     if shells.count == 1:
         is_doubled = _has_crowded_edges(mesh) and shells.doubled()
-        return mesh, (*inversion, *([DOUBLED] if is_doubled else []))
-    if shells.count > MAX_SHELLS:
+        return mesh, (*inversion, *([_DOUBLED] if is_doubled else []))
+    if shells.count > BOUNDS.shells:
         return mesh, (*inversion, f"{shells.count} shells: which of them lie in others was not looked at")
     # The shells around a cavity have a winding number of 1; any other shell of negative volume is inside out.
     shells.turn(shells.inside_out())
     flipped = shells.flipped ^ is_inverted
     notes = []
     if flipped.all():
-        notes.append(INVERTED)
+        notes.append(_INVERTED)
     elif flipped.any():
         notes.append(f"{int(flipped.sum())} of {shells.count} shells were inside out and were turned")
     return shells.mesh, (*notes, *_shell_notes(shells))

@@ -16,22 +16,19 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 from dhkit.errors import ModelError
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.polygons import triangles_of
 from dhkit.model.triangle_mesh import TriangleMesh, joined_meshes
 
-Element = ElementTree.Element
-MAX_PIECES = 5_000
-"""Largest number of geometries that a file's nodes may place: nodes can repeat each other without a limit."""
-MAX_NODE_DEPTH = 64
-"""Largest nesting depth of nodes, nodes that name other nodes included."""
-TO_Z_UP = {
+_Element = ElementTree.Element
+_TO_Z_UP = {
     "X_UP": np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]),
     "Y_UP": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
     "Z_UP": np.eye(3),
 }
 """Rotations from a file's axes to those of Z_UP, x to the right and z up: X_UP has -y, Y_UP x to the right (ibid.)."""
-POLYGON_TAGS = ("triangles", "polylist", "polygons")
-TRANSFORM_LENGTHS = {"matrix": 16, "translate": 3, "rotate": 4, "scale": 3}
+_POLYGON_TAGS = ("triangles", "polylist", "polygons")
+_TRANSFORM_LENGTHS = {"matrix": 16, "translate": 3, "rotate": 4, "scale": 3}
 """Numbers of a node's transform elements."""
 
 
@@ -41,7 +38,7 @@ def collada_mesh(content: bytes) -> TriangleMesh:
     Raises
     ------
     ModelError
-        A reference to nothing, a number that is none, or more pieces than :data:`MAX_PIECES`.
+        A reference to nothing, a number that is none, or more pieces than ``BOUNDS.collada_pieces``.
     """
     return _Document(content).mesh()
 
@@ -88,13 +85,13 @@ class _Document:
         mesh = joined_meshes(pieces)
         scale = self.unit() or 1.0
         up = (self.root.findtext("asset/up_axis") or "Y_UP").strip()
-        if up not in TO_Z_UP:
+        if up not in _TO_Z_UP:
             raise ModelError(f"<up_axis> is {up[:20]!r}; expected X_UP, Y_UP or Z_UP")
         T = np.eye(4)
-        T[:3, :3] = TO_Z_UP[up]
+        T[:3, :3] = _TO_Z_UP[up]
         return mesh.scaled(scale).moved(T)
 
-    def _named(self, element: Element) -> Element:
+    def _named(self, element: _Element) -> _Element:
         """Return the element of this file that an element's url or source names."""
         url = element.get("url") or element.get("source") or ""
         named = self.by_id.get(url.removeprefix("#"))
@@ -102,10 +99,10 @@ class _Document:
             raise ModelError(f"<{element.tag}> names {url[:60]!r}; expected an element of this file")
         return named
 
-    def _node(self, node: Element, T: Array, depth: int) -> Iterator[TriangleMesh]:
+    def _node(self, node: _Element, T: Array, depth: int) -> Iterator[TriangleMesh]:
         """Yield the geometries of a node and the nodes in it, T the pose of the node around it."""
-        if depth > MAX_NODE_DEPTH:
-            raise ModelError(f"nodes that name each other more than {MAX_NODE_DEPTH} deep")
+        if depth > BOUNDS.collada_nesting:
+            raise ModelError(f"nodes that name each other more than {BOUNDS.collada_nesting} deep")
         for element in node:
             T = T @ _transform(element)
         linear = T[:3, :3]
@@ -113,8 +110,8 @@ class _Document:
             colours = self._material_colours(instance)
             for symbol, mesh in self._geometry(self._named(instance)):
                 self.pieces += 1
-                if self.pieces > MAX_PIECES:
-                    raise ModelError(f"more than {MAX_PIECES} pieces")
+                if self.pieces > BOUNDS.collada_pieces:
+                    raise ModelError(f"more than {BOUNDS.collada_pieces} pieces")
                 placed = mesh.turned() if np.linalg.det(linear) < 0 else mesh
                 colour = colours.get(symbol)
                 face_colours = None if colour is None else np.tile(colour, (len(mesh.faces), 1))
@@ -122,7 +119,7 @@ class _Document:
         for child in (*node.findall("node"), *map(self._named, node.findall("instance_node"))):
             yield from self._node(child, T, depth + 1)
 
-    def _material_colours(self, instance: Element) -> dict[str, NDArray[np.uint8]]:
+    def _material_colours(self, instance: _Element) -> dict[str, NDArray[np.uint8]]:
         """Return the diffuse colour of each material symbol of a geometry."""
         colours = {}
         for bound in instance.iter("instance_material"):
@@ -135,19 +132,19 @@ class _Document:
                 colours[bound.get("symbol", "")] = np.round(255 * rgb).astype(np.uint8)
         return colours
 
-    def _named_or_none(self, element: Element, key: str) -> Element | None:
+    def _named_or_none(self, element: _Element, key: str) -> _Element | None:
         return self.by_id.get((element.get(key) or "").removeprefix("#"))
 
-    def _geometry(self, geometry: Element) -> list[tuple[str, TriangleMesh]]:
+    def _geometry(self, geometry: _Element) -> list[tuple[str, TriangleMesh]]:
         """Return a geometry's triangles for each material symbol, in its own coordinates."""
         key = geometry.get("id", "")
         if key not in self.geometries:
             mesh = geometry.find("mesh")
-            elements = [] if mesh is None else [element for element in mesh if element.tag in POLYGON_TAGS]
+            elements = [] if mesh is None else [element for element in mesh if element.tag in _POLYGON_TAGS]
             self.geometries[key] = [(element.get("material", ""), self._polygons(element)) for element in elements]
         return self.geometries[key]
 
-    def _polygons(self, element: Element) -> TriangleMesh:
+    def _polygons(self, element: _Element) -> TriangleMesh:
         inputs = {source.get("semantic"): source for source in element.findall("input")}
         if "VERTEX" not in inputs:
             raise ModelError(f"<{element.tag}> without an input of vertices")
@@ -159,7 +156,7 @@ class _Document:
             raise ModelError(f"a face with vertex {corners.max()}; the file has vertices 0 to {len(vertices) - 1}")
         return TriangleMesh(vertices, triangles_of(vertices, corners, counts))
 
-    def _positions(self, vertices: Element) -> Array:
+    def _positions(self, vertices: _Element) -> Array:
         inputs = {source.get("semantic"): source for source in reversed(vertices.findall("input"))}
         position = inputs.get("POSITION")
         if position is None:
@@ -173,7 +170,7 @@ class _Document:
         return numbers.reshape(-1, stride)[:, :3]
 
 
-def _without_namespaces(content: bytes) -> Element:
+def _without_namespaces(content: bytes) -> _Element:
     """Return the root of an XML document, its tags without namespaces."""
     try:
         iterator = ElementTree.iterparse(io.BytesIO(content), events=("end",))  # noqa: S314 - no entities, bounded
@@ -181,11 +178,11 @@ def _without_namespaces(content: bytes) -> Element:
             element.tag = element.tag.rpartition("}")[2]
     except (ElementTree.ParseError, LookupError, ValueError) as error:
         raise ModelError(f"no XML: {error}") from None
-    root: Element = iterator.root  # type: ignore[attr-defined]
+    root: _Element = iterator.root  # type: ignore[attr-defined]
     return root
 
 
-def _corners(element: Element, stride: int, offset: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _corners(element: _Element, stride: int, offset: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the vertex indices of an element's polygons, one after the other, and how many each polygon has."""
     lists = [_numbers(p.text or "").astype(np.intp) for p in element.findall("p")]
     if any(len(p) % stride for p in lists):
@@ -203,13 +200,13 @@ def _corners(element: Element, stride: int, offset: int) -> tuple[NDArray[np.int
     return indices, counts
 
 
-def _transform(element: Element) -> Array:
+def _transform(element: _Element) -> Array:
     """Return the (4, 4) matrix of a node's transform element, the identity for any other."""
     T = np.eye(4)
-    if element.tag not in TRANSFORM_LENGTHS:
+    if element.tag not in _TRANSFORM_LENGTHS:
         return T
     numbers = _numbers(element.text or "")
-    if len(numbers) != TRANSFORM_LENGTHS[element.tag]:
+    if len(numbers) != _TRANSFORM_LENGTHS[element.tag]:
         raise ModelError(f"<{element.tag}> has {len(numbers)} numbers")
     if element.tag == "matrix":
         T = numbers.reshape(4, 4)

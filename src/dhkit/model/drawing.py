@@ -21,33 +21,33 @@ from dhkit.expressions import Expression, exact
 Solid: TypeAlias = tuple[Geometry, Array]
 """A geometry and its pose in its link's DH frame, shape (4, 4), m."""
 
-FIRST_DRUM_RADIUS, LAST_DRUM_RADIUS = 0.05, 0.028
+_FIRST_DRUM_RADIUS, _LAST_DRUM_RADIUS = 0.05, 0.028
 """Radius of the first and of the last drum, relative to the reach: arms taper."""
-TUBE_RADIUS = 0.62
+_TUBE_RADIUS = 0.62
 """Radius of a tube, relative to the smaller drum at its ends, so that drums stay visible."""
-DRUM_HALF_HEIGHT = 0.9
+_DRUM_HALF_HEIGHT = 0.9
 """Half the height of a drum, relative to its radius: the tube, which is narrower, ends inside the drum."""
-HUB_RADIUS, HUB_HALF_LENGTH = 0.8, 1.2
+_HUB_RADIUS, _HUB_HALF_LENGTH = 0.8, 1.2
 """Radius and half length of a hub, relative to its drum: slimmer, and visible at both faces."""
-NESTED_RADIUS, NESTED_HALF_HEIGHT = 0.78, 1.25
+_NESTED_RADIUS, _NESTED_HALF_HEIGHT = 0.78, 1.25
 """Of drums about one point each is slimmer and longer than the one before by these factors, so that all are visible."""
-MAX_FIRST_DRUM_HALF = 0.3
+_MAX_FIRST_DRUM_HALF = 0.3
 """Half the height of the first drum, at most, relative to the height of the next axis: the drum stays below it."""
-BLOCK_HALF_LENGTH = 1.3
+_BLOCK_HALF_LENGTH = 1.3
 """Half the length of a slider's block, relative to its half width."""
-BAR_HALF_WIDTH, STOP_HALF_WIDTH = 0.55, 0.8
+_BAR_HALF_WIDTH, _STOP_HALF_WIDTH = 0.55, 0.8
 """Half widths of a slider's bar and of the stops at a rail's ends, relative to the block's."""
-PLATE_RADIUS, POST_HEIGHT = 1.8, 2.0
+_PLATE_RADIUS, _POST_HEIGHT = 1.8, 2.0
 """Radius of the foot's plate and height of the post below a drum at frame 0, relative to the drum's radius."""
-THICKNESS = 0.25
+_THICKNESS = 0.25
 """Thickness of plates and stops, relative to the radius of the drum or the half width of the block."""
-GRIPPER_START = 1.25
+_GRIPPER_START = 1.25
 """Distance at which the gripper begins on an arm that ends in its last drum, relative to the joint's extent."""
-MIN_NECK_LENGTH = 1e-3
+_MIN_NECK_LENGTH = 1e-3
 """Shortest neck that is drawn, relative to its radius."""
 
-IDENTITY: Array = np.eye(4)
-ALONG_X: Array = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+_IDENTITY: Array = np.eye(4)
+_ALONG_X: Array = np.array([[0.0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 """The rotation that takes z to x."""
 
 
@@ -103,7 +103,7 @@ class _Joint:
     @property
     def extent(self) -> float:
         """Largest distance of the joint's solids from the corner of the link after it, m."""
-        return 0.0 if self.is_rod else max(self.radius, HUB_HALF_LENGTH * self.half)
+        return 0.0 if self.is_rod else max(self.radius, _HUB_HALF_LENGTH * self.half)
 
 
 def _links(description: Description) -> list[_Link]:
@@ -114,26 +114,26 @@ def _links(description: Description) -> list[_Link]:
     # A row's a and alpha describe the end of its own link, in the modified convention that of the link before.
     if description.convention is Convention.STANDARD:
         return [
-            _Link(x, a, _normal_pose(-a, c, -s), IDENTITY) for x, (a, c, s) in zip(d, [straight, *rows], strict=True)
+            _Link(x, a, _normal_pose(-a, c, -s), _IDENTITY) for x, (a, c, s) in zip(d, [straight, *rows], strict=True)
         ]
-    return [_Link(x, a, IDENTITY, _normal_pose(a, c, s)) for x, (a, c, s) in zip(d, [*rows, straight], strict=True)]
+    return [_Link(x, a, _IDENTITY, _normal_pose(a, c, s)) for x, (a, c, s) in zip(d, [*rows, straight], strict=True)]
 
 
 def _joints(description: Description, links: Sequence[_Link]) -> list[_Joint]:
     """Return the sizes of joints 1 to n."""
     numbers, n = description.numbers, description.n
     scale = max(description.reach, float(np.linalg.norm(numbers.T_last_tool[:3, 3]))) or 1.0
-    taper = LAST_DRUM_RADIUS - FIRST_DRUM_RADIUS
+    taper = _LAST_DRUM_RADIUS - _FIRST_DRUM_RADIUS
     joints: list[_Joint] = []
     for i, (before, after) in enumerate(pairwise(links)):
-        prismatic, radius, lift = bool(numbers.prismatic[i]), scale * (FIRST_DRUM_RADIUS + taper * i / n), 0.0
-        half = radius * (BLOCK_HALF_LENGTH if prismatic else DRUM_HALF_HEIGHT)
+        prismatic, radius, lift = bool(numbers.prismatic[i]), scale * (_FIRST_DRUM_RADIUS + taper * i / n), 0.0
+        half = radius * (_BLOCK_HALF_LENGTH if prismatic else _DRUM_HALF_HEIGHT)
         if joints and abs(before.d) + abs(before.a) < joints[-1].extent:
-            radius = min(radius, NESTED_RADIUS * joints[-1].radius)
-            half = max(half, NESTED_HALF_HEIGHT * joints[-1].extent / HUB_HALF_LENGTH)
+            radius = min(radius, _NESTED_RADIUS * joints[-1].radius)
+            half = max(half, _NESTED_HALF_HEIGHT * joints[-1].extent / _HUB_HALF_LENGTH)
         if not joints and abs(after.d) > radius:  # frame 0 is on the floor: the drum stands on it, not in it
-            half = min(half, MAX_FIRST_DRUM_HALF * abs(after.d))
-            lift = float(np.copysign(HUB_HALF_LENGTH * half, after.d))
+            half = min(half, _MAX_FIRST_DRUM_HALF * abs(after.d))
+            lift = float(np.copysign(_HUB_HALF_LENGTH * half, after.d))
         if not prismatic:
             joints.append(_Joint(False, radius, half, lift))
             continue
@@ -158,7 +158,7 @@ class Drawing:
         """Draw link i in its DH frame."""
         link = self.links[i]
         ends = self.joints[max(i - 1, 0) : i + 1]
-        tube = TUBE_RADIUS * min(joint.radius for joint in ends)
+        tube = _TUBE_RADIUS * min(joint.radius for joint in ends)
         if self.far_ends is not None:
             yield from self._between(self.far_ends.begin[i], self.far_ends.end[i], ends[0].radius, tube)
             return
@@ -167,7 +167,7 @@ class Drawing:
         elif not self.joints[0].prismatic:
             yield from self._foot()
         if link.a:
-            yield _cylinder(link.T_corner @ ALONG_X, tube, 0.0, link.a)
+            yield _cylinder(link.T_corner @ _ALONG_X, tube, 0.0, link.a)
         if link.a and link.d:
             yield Sphere(_size(tube)), link.T_corner
         if i < len(self.joints):
@@ -177,7 +177,7 @@ class Drawing:
         """Draw a ball at the centre of a link's own joint, and a tube from it to that of the next."""
         yield Sphere(_size(radius)), _at(begin)
         length = float(np.linalg.norm(end - begin))
-        if length > MIN_NECK_LENGTH * tube:
+        if length > _MIN_NECK_LENGTH * tube:
             yield _cylinder(_at(begin) @ _frame_towards(end - begin), tube, 0.0, length)
 
     def _foot(self) -> Iterator[Solid]:
@@ -189,8 +189,10 @@ class Drawing:
         T_world_end = self.T_world_base @ T_base_end
         up = -1.0 if joint.lift < 0 else 1.0
         raised = T_world_end[2, 3] if np.isclose(up * T_world_end[2, 2], 1.0) else 0.0
-        depth = max(raised, 0.0 if joint.lift else joint.extent + POST_HEIGHT * joint.radius)
-        yield _cylinder(T_base_end, PLATE_RADIUS * joint.radius, -up * depth, -up * (depth - THICKNESS * joint.radius))
+        depth = max(raised, 0.0 if joint.lift else joint.extent + _POST_HEIGHT * joint.radius)
+        yield _cylinder(
+            T_base_end, _PLATE_RADIUS * joint.radius, -up * depth, -up * (depth - _THICKNESS * joint.radius)
+        )
         if depth:
             yield _cylinder(T_base_end, joint.radius, -up * depth, joint.lift)
 
@@ -198,10 +200,10 @@ class Drawing:
         """Draw the neck between the last link and the gripper, in DH frame n."""
         if self.far_ends is not None:
             return
-        radius, T_end_gripper, root = TUBE_RADIUS * self.joints[-1].radius, *self._gripper_place()
+        radius, T_end_gripper, root = _TUBE_RADIUS * self.joints[-1].radius, *self._gripper_place()
         offset = self.T_last_tool[:3, 3]
         length = float(np.linalg.norm(offset))
-        if length > MIN_NECK_LENGTH * radius:
+        if length > _MIN_NECK_LENGTH * radius:
             yield _cylinder(_frame_towards(offset), radius, 0.0, length)
         if root:
             yield _cylinder(T_end_gripper, radius, 0.0, root)
@@ -222,18 +224,18 @@ class Drawing:
         before, last, joint = *self.links[-2:], self.joints[-1]
         T = self.T_last_tool
         length = abs(last.d) + abs(last.a) + float(np.linalg.norm(T[:3, 3]))
-        root = max(0.0, GRIPPER_START * joint.extent - length)
-        if last.d or not np.array_equal(T, IDENTITY):
+        root = max(0.0, _GRIPPER_START * joint.extent - length)
+        if last.d or not np.array_equal(T, _IDENTITY):
             return T, root
         a = last.a or (before.a if before.is_parallel and not joint.prismatic else 0.0)
-        return (_about_z(0.0 if a > 0 else np.pi) @ ALONG_X if a else T), root
+        return (_about_z(0.0 if a > 0 else np.pi) @ _ALONG_X if a else T), root
 
 
 def _own_joint_solids(link: _Link, joint: _Joint, tube: float) -> Iterator[Solid]:
     """Draw a link's part of its own joint: a hub and the column above it, a rod, or a block on a rail."""
     if not joint.prismatic:
-        T_start, half = link.T_corner @ _shift(z=-link.d), HUB_HALF_LENGTH * joint.half
-        yield _cylinder(T_start, HUB_RADIUS * joint.radius, joint.lift - half, joint.lift + half)
+        T_start, half = link.T_corner @ _shift(z=-link.d), _HUB_HALF_LENGTH * joint.half
+        yield _cylinder(T_start, _HUB_RADIUS * joint.radius, joint.lift - half, joint.lift + half)
         if link.d:
             yield _cylinder(T_start, tube, 0.0, link.d)
         return
@@ -241,7 +243,7 @@ def _own_joint_solids(link: _Link, joint: _Joint, tube: float) -> Iterator[Solid
     if joint.is_rod:
         yield _box(
             T,
-            (BAR_HALF_WIDTH * wide, BAR_HALF_WIDTH * wide),
+            (_BAR_HALF_WIDTH * wide, _BAR_HALF_WIDTH * wide),
             *_bar_ends(joint.near - high, joint.near - low, joint.half),
         )
     else:
@@ -256,10 +258,10 @@ def _next_joint_solids(link: _Link, joint: _Joint) -> Iterator[Solid]:
     elif joint.is_rod:
         yield _box(T, (wide, wide), min(-joint.half, joint.near), max(joint.half, joint.near))
     else:
-        low, high = _bar_ends(*joint.stroke, joint.half + THICKNESS * wide)
-        yield _box(T, (BAR_HALF_WIDTH * wide, BAR_HALF_WIDTH * wide), low, high)
-        yield _box(T, (STOP_HALF_WIDTH * wide, STOP_HALF_WIDTH * wide), low, low + THICKNESS * wide)
-        yield _box(T, (STOP_HALF_WIDTH * wide, STOP_HALF_WIDTH * wide), high - THICKNESS * wide, high)
+        low, high = _bar_ends(*joint.stroke, joint.half + _THICKNESS * wide)
+        yield _box(T, (_BAR_HALF_WIDTH * wide, _BAR_HALF_WIDTH * wide), low, high)
+        yield _box(T, (_STOP_HALF_WIDTH * wide, _STOP_HALF_WIDTH * wide), low, low + _THICKNESS * wide)
+        yield _box(T, (_STOP_HALF_WIDTH * wide, _STOP_HALF_WIDTH * wide), high - _THICKNESS * wide, high)
 
 
 def _bar_ends(low: float, high: float, margin: float) -> tuple[float, float]:

@@ -15,11 +15,11 @@ from dhkit.model.urdf_chain import chain_tips, only_tip, tool_frame
 from dhkit.model.urdf_reader import read_urdf
 from dhkit.model.urdf_tree import UrdfJoint, UrdfTree
 
-PACKAGE = "example-robot-data"
-PREFIX = "example:"
-MAX_ARM_JOINTS = 7
+_PACKAGE = "example-robot-data"
+_PREFIX = "example:"
+_MAX_ARM_JOINTS = 7
 """Largest number of joints of an arm; longer chains go through a trunk."""
-NAME_ENDINGS = ("_robot", "_description", "_data")
+_NAME_ENDINGS = ("_robot", "_description", "_data")
 """Endings of names of files and folders that are left out of names of robots."""
 
 
@@ -57,9 +57,9 @@ def example_robots() -> dict[str, Path]:
         The package is not installed.
     """
     try:
-        files = distribution(PACKAGE).files or []
+        files = distribution(_PACKAGE).files or []
     except PackageNotFoundError:
-        raise ModelError(f"the package {PACKAGE} is not installed; pip install {PACKAGE} (414 MB)") from None
+        raise ModelError(f"the package {_PACKAGE} is not installed; pip install {_PACKAGE} (414 MB)") from None
     paths = sorted(Path(str(file.locate())).resolve() for file in files if file.name.endswith(".urdf"))
     paths = [path for path in paths if b"<link" in path.read_bytes()]  # ur3.urdf is a robot without links
     stems = [_without_ending(path.stem) for path in paths]
@@ -96,11 +96,11 @@ def urdf_source(name: str) -> tuple[Path, str | None, str | None]:
     ModelError
         No such example robot.
     """
-    if not name.startswith(PREFIX) and Path(name).is_file():
+    if not name.startswith(_PREFIX) and Path(name).is_file():
         return Path(name), None, None
     source, _, links = name.rpartition("#") if "#" in name else (name, "", "")
     base, between, tip = links.partition("..")
-    path = example_urdf(source.removeprefix(PREFIX)) if source.startswith(PREFIX) else Path(source)
+    path = example_urdf(source.removeprefix(_PREFIX)) if source.startswith(_PREFIX) else Path(source)
     return (path, base or None, tip or None) if between else (path, None, links or None)
 
 
@@ -116,12 +116,12 @@ def example_chains() -> Iterator[ExampleChain]:
         for joints, leaves in tips.items():
             tip = tool_frame(leaves) or leaves[0]
             ending = "" if tip == only_tip(tree, tree.root) else f"#{tip}"
-            yield ExampleChain(f"{PREFIX}{name}{ending}", path, None, tip, joints)
-            limb = _limb(tree, tip) if len(joints) > MAX_ARM_JOINTS else ()
+            yield ExampleChain(f"{_PREFIX}{name}{ending}", path, None, tip, joints)
+            limb = _limb(tree, tip) if len(joints) > _MAX_ARM_JOINTS else ()
             if 0 < len(limb) < len(joints):
                 base = limb[0].parent
                 limb_joints = tuple(joint.name for joint in limb)
-                yield ExampleChain(f"{PREFIX}{name}#{base}..{tip}", path, base, tip, limb_joints)
+                yield ExampleChain(f"{_PREFIX}{name}#{base}..{tip}", path, base, tip, limb_joints)
 
 
 def _limb(tree: UrdfTree, tip: str) -> tuple[UrdfJoint, ...]:
@@ -140,11 +140,11 @@ def _limb(tree: UrdfTree, tip: str) -> tuple[UrdfJoint, ...]:
 
 
 def _without_ending(name: str) -> str:
-    for ending in NAME_ENDINGS:
+    for ending in _NAME_ENDINGS:
         name = name.removesuffix(ending)
     return name
 
 
 def _robot_folder(path: Path) -> str:
     """Return the name of a robot's folder in the package: the one that holds urdf/ or robots/."""
-    return next((parent.name for parent in path.parents if parent.name.endswith(NAME_ENDINGS)), path.parent.name)
+    return next((parent.name for parent in path.parents if parent.name.endswith(_NAME_ENDINGS)), path.parent.name)

@@ -14,22 +14,20 @@ import numpy as np
 from dhkit.description.files import read_bounded
 from dhkit.display import repr_line
 from dhkit.errors import ModelError
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.cad_units import UNITS
 from dhkit.model.shape_inertia import MassProperties
 from dhkit.model.solidworks_report import REPORT, read_solidworks_report
 
-MAX_BYTES = 1_000_000
-MAX_ROWS = 200
-"""Largest number of lines of a table, and of reports in a text."""
 COLUMNS = ("link", "mass", "com_x", "com_y", "com_z", "Ixx", "Iyy", "Izz", "Ixy", "Iyz", "Ixz")
-HEADING = re.compile(r"\s*(\w+)\s*(?:\[([^\]]*)\])?\s*")
-NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-PRODUCT_SIGN = re.compile(r"#\s*products\s*=\s*([-+])\s*integral\s*", re.IGNORECASE)
-MASSES = {"kg": 1.0, "g": 1e-3, "lb": 0.45359237}
+_HEADING = re.compile(r"\s*(\w+)\s*(?:\[([^\]]*)\])?\s*")
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+_PRODUCT_SIGN = re.compile(r"#\s*products\s*=\s*([-+])\s*integral\s*", re.IGNORECASE)
+_MASSES = {"kg": 1.0, "g": 1e-3, "lb": 0.45359237}
 """Mass units by name, kg."""
-MOMENTS = {f"{m} {l}^2": mass * length**2 for m, mass in MASSES.items() for l, length in UNITS.items()}  # noqa: E741
+_MOMENTS = {f"{m} {l}^2": mass * length**2 for m, mass in _MASSES.items() for l, length in UNITS.items()}  # noqa: E741
 """Units of moments of inertia by name, kg m^2."""
-EXAMPLE = "link,mass [kg],com_x [mm],com_y [mm],com_z [mm],Ixx [kg mm^2],Iyy [kg mm^2],..."
+_EXAMPLE = "link,mass [kg],com_x [mm],com_y [mm],com_z [mm],Ixx [kg mm^2],Iyy [kg mm^2],..."
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +62,7 @@ def read_mass_report(path: str | Path) -> tuple[ReportedMass, ...]:
         It cannot be read: one line with file, line, what was found and what was expected.
     """
     path = Path(path)
-    content = read_bounded(path, MAX_BYTES, "a report of mass properties", ModelError)
+    content = read_bounded(path, BOUNDS.report_bytes, "a report of mass properties", ModelError)
     try:
         text = content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
     except UnicodeDecodeError:
@@ -72,8 +70,8 @@ def read_mass_report(path: str | Path) -> tuple[ReportedMass, ...]:
     if path.suffix.lower() == ".csv":
         return _table_parts(path, text)
     starts = [match.start() for match in REPORT.finditer(text)] or [0]
-    if len(starts) > MAX_ROWS:
-        raise ModelError(f"{path}: {len(starts)} reports; expected at most {MAX_ROWS}")
+    if len(starts) > BOUNDS.report_rows:
+        raise ModelError(f"{path}: {len(starts)} reports; expected at most {BOUNDS.report_rows}")
     reports = []
     for start, end in zip(starts, [*starts[1:], len(text)], strict=True):
         first_line = text.count("\n", 0, start) + 1
@@ -87,12 +85,12 @@ def _table_parts(path: Path, text: str) -> tuple[ReportedMass, ...]:
     sign: str | None = None
     lines: list[tuple[str, str]] = []
     for number, line in enumerate(text.splitlines(), start=1):
-        if match := PRODUCT_SIGN.fullmatch(line.strip()):
+        if match := _PRODUCT_SIGN.fullmatch(line.strip()):
             sign = match[1]
         elif line.strip() and not line.lstrip().startswith("#"):
             lines.append((f"{path}, line {number}", line))
-    if len(lines) < 2 or len(lines) > MAX_ROWS:
-        raise ModelError(f"{path}: {len(lines)} lines; expected a heading and 1 to {MAX_ROWS - 1} rows")
+    if len(lines) < 2 or len(lines) > BOUNDS.report_rows:
+        raise ModelError(f"{path}: {len(lines)} lines; expected a heading and 1 to {BOUNDS.report_rows - 1} rows")
     separator = ";" if ";" in lines[0][1] else ","
     factors: Mapping[str, float] = {}
     parts = []
@@ -113,13 +111,13 @@ def _column_factors(where: str, cells: Sequence[str]) -> dict[str, float]:
     names = {key.lower(): key for key in COLUMNS}
     units: dict[str, str] = {}
     for cell in cells:
-        heading = HEADING.fullmatch(cell)
+        heading = _HEADING.fullmatch(cell)
         name = names.get(heading[1].lower()) if heading else None
         if heading is None or name is None or name in units:
-            raise ModelError(f"{where}: column {cell[:40]!r}; expected {EXAMPLE}")
+            raise ModelError(f"{where}: column {cell[:40]!r}; expected {_EXAMPLE}")
         units[name] = " ".join((heading[2] or "").replace("*", " ").replace("²", "^2").split())
     if missing := [name for name in COLUMNS if name not in units]:
-        raise ModelError(f"{where}: no column {', '.join(missing)}; expected {EXAMPLE}")
+        raise ModelError(f"{where}: no column {', '.join(missing)}; expected {_EXAMPLE}")
     for name in COLUMNS[1:]:
         known = _known_units(name)
         if units[name] not in known:
@@ -130,7 +128,7 @@ def _column_factors(where: str, cells: Sequence[str]) -> dict[str, float]:
 
 
 def _known_units(column: str) -> Mapping[str, float]:
-    return MASSES if column == "mass" else UNITS if column.startswith("com") else MOMENTS
+    return _MASSES if column == "mass" else UNITS if column.startswith("com") else _MOMENTS
 
 
 def _table_part(where: str, cells: Sequence[str], factors: Mapping[str, float], sign: str | None) -> ReportedMass:
@@ -161,7 +159,7 @@ def _plain_number(text: str, where: str) -> float:
     ModelError
         Something else; if it has a comma, with a hint.
     """
-    if not NUMBER.fullmatch(text) or not math.isfinite(float(text)):
+    if not _NUMBER.fullmatch(text) or not math.isfinite(float(text)):
         hint = "; decimal commas are not read, write 1.5 for 1,5" if "," in text else ""
         raise ModelError(f"{where}: found {text[:40]!r}; expected a number{hint}")
     return float(text)

@@ -18,17 +18,13 @@ from dhkit.description import Array
 from dhkit.description.files import read_bounded
 from dhkit.description.mat_files import MatVariable, read_mat
 from dhkit.errors import DhkitError, ModelError
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.mesh_reader import check_coordinates
 from dhkit.model.polygons import triangles_of
 from dhkit.model.triangle_mesh import TriangleMesh
 
-MAX_FILE_BYTES = 100_000_000
-MAX_UNPACKED_BYTES = 400_000_000
-MAX_PARTS = 100
-MAX_POLYGON_CORNERS = 16
-"""Largest number of columns of a matrix of faces."""
-EXPORT_ADVICE = "save it with save('robot.mat', 's1', ..., '-v7')"
-FIELD = re.compile(r"([FVC]|faces|vertices|facevertexcdata)(\d{0,3})", re.IGNORECASE)
+_EXPORT_ADVICE = "save it with save('robot.mat', 's1', ..., '-v7')"
+_FIELD = re.compile(r"([FVC]|faces|vertices|facevertexcdata)(\d{0,3})", re.IGNORECASE)
 """Names of fields: the course's, and those of MATLAB's patch and isosurface."""
 
 
@@ -40,9 +36,9 @@ def mat_parts(path: Path) -> dict[str, TriangleMesh]:
     ModelError
         No MAT file of format 5, damaged, too large, or without faces and vertices; one line that begins with the path.
     """
-    content = read_bounded(path, MAX_FILE_BYTES, "a MAT file", ModelError)
+    content = read_bounded(path, BOUNDS.mat_bytes, "a MAT file", ModelError)
     try:
-        variables = read_mat(content, MAX_UNPACKED_BYTES, advice=EXPORT_ADVICE)
+        variables = read_mat(content, BOUNDS.mat_unpacked_bytes, advice=_EXPORT_ADVICE)
         parts: dict[str, TriangleMesh] = {}
         for name, mesh in _parts(variables):
             if name in parts:
@@ -64,15 +60,15 @@ def _parts(variables: Mapping[str, MatVariable]) -> Iterator[tuple[str, Triangle
         if not isinstance(records, tuple):
             continue
         for k, record in enumerate(records, start=1):
-            matches = [(FIELD.fullmatch(field), value) for field, value in record.items()]
+            matches = [(_FIELD.fullmatch(field), value) for field, value in record.items()]
             fields = {_field_letter(match) + match[2]: value for match, value in matches if match}
             numbers = sorted({field[1:] for field in fields}, key=lambda text: int(text or 0))
             for number in numbers:
                 if f"F{number}" not in fields or f"V{number}" not in fields:
                     continue
                 count += 1
-                if count > MAX_PARTS:
-                    raise ModelError(f"more than {MAX_PARTS} parts")
+                if count > BOUNDS.mat_parts:
+                    raise ModelError(f"more than {BOUNDS.mat_parts} parts")
                 # Parts of an array are numbered by their place, those of one struct by the numbers of its fields.
                 part = f"{name}{k}" if len(records) > 1 else name
                 if len(numbers) > 1:
@@ -94,8 +90,8 @@ def _mesh(
     if vertices.shape[1] not in (3, 4):
         raise ModelError(f"{part}: vertices of shape {vertices.shape}; expected (k, 3) or (k, 4)")
     points = np.array(vertices[:, :3], dtype=np.float64)
-    if not 3 <= faces.shape[1] <= MAX_POLYGON_CORNERS:
-        raise ModelError(f"{part}: faces of shape {faces.shape}; expected 3 to {MAX_POLYGON_CORNERS} columns")
+    if not 3 <= faces.shape[1] <= BOUNDS.mat_face_columns:
+        raise ModelError(f"{part}: faces of shape {faces.shape}; expected 3 to {BOUNDS.mat_face_columns} columns")
     is_missing = np.isnan(faces)  # patch fills the rows of smaller polygons with NaN
     indices = faces[~is_missing]
     if np.any(indices != np.round(indices)) or np.any(is_missing[:, :3]):

@@ -9,11 +9,9 @@ from pathlib import Path, PurePosixPath
 from xml.etree import ElementTree
 
 from dhkit.errors import ModelError
+from dhkit.model.bounds import BOUNDS
 
-MAX_PARENTS = 20
-"""Largest number of folders above a URDF that are searched for a package.xml."""
-MAX_PACKAGE_BYTES = 100_000
-SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.\-]*:")
+_SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.\-]*:")
 
 
 class MeshFinder:
@@ -84,7 +82,7 @@ class MeshFinder:
             if not folders:
                 raise ModelError(f"{mesh}: no package {package!r}; package_dirs names the folder it lies in")
             return folders[0] / inner
-        if SCHEME.match(name):
+        if _SCHEME.match(name):
             raise ModelError(f"{mesh}: expected package:// or a path relative to the URDF")
         if PurePosixPath(name).is_absolute():
             raise ModelError(f"{mesh} is an absolute path; expected one relative to the URDF")
@@ -94,10 +92,10 @@ class MeshFinder:
 def _packages_above(folder: Path) -> list[tuple[Path, str]]:
     """Return the folders at and above a folder that are packages, with their names, the nearest first."""
     packages = []
-    for parent in (folder, *folder.parents)[:MAX_PARENTS]:
+    for parent in (folder, *folder.parents)[: BOUNDS.parent_folders]:
         manifest = parent / "package.xml"
         try:
-            if not manifest.is_file() or manifest.stat().st_size > MAX_PACKAGE_BYTES:
+            if not manifest.is_file() or manifest.stat().st_size > BOUNDS.package_bytes:
                 continue
             packages.append((parent, _package_name(manifest.read_text(encoding="utf-8", errors="replace"))))
         except OSError:

@@ -15,24 +15,21 @@ from pathlib import Path
 import numpy as np
 
 from dhkit.description import Mesh
-from dhkit.description.mesh_files import MAX_MESH_BYTES, MeshFileError, MeshHeader, check_mesh_file
+from dhkit.description.bounds import BOUNDS as ROBOT_BOUNDS
+from dhkit.description.mesh_files import MeshFileError, MeshHeader, check_mesh_file
 from dhkit.errors import ModelError
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.collada import collada_mesh
 from dhkit.model.polygons import triangles_of
 from dhkit.model.shapes import Part
 from dhkit.model.stl import ascii_corners, binary_corners, coordinates
 from dhkit.model.triangle_mesh import TriangleMesh
 
-MAX_TRIANGLES = 2_000_000
-"""Largest number of triangles of a file that is drawn or measured; 50 MB of binary STL hold a million."""
-MAX_COORDINATE = 1e12
-"""Largest absolute value of a coordinate, in a file's units: squares and cubes of it are finite doubles."""
-MAX_POLYGON_CORNERS = 1_000
-OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
-OBJ_FACE_OR_VERTEX = re.compile(rb"^[ \t]*(?:f|v)[ \t]+([^\r\n]*)", re.MULTILINE)
+_OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+_OBJ_FACE_OR_VERTEX = re.compile(rb"^[ \t]*(?:f|v)[ \t]+([^\r\n]*)", re.MULTILINE)
 
 
-def mesh_header(path: Path, max_bytes: int = MAX_MESH_BYTES) -> MeshHeader:
+def mesh_header(path: Path, max_bytes: int = ROBOT_BOUNDS.mesh_bytes) -> MeshHeader:
     """Return a mesh file's header; see :func:`dhkit.description.mesh_files.check_mesh_file`.
 
     Raises
@@ -57,7 +54,9 @@ def _byte_order_mark_hint(path: Path) -> str:
     return "; it begins with a byte order mark: save the text as ASCII, or as UTF-8 without BOM"
 
 
-def read_mesh(path: str | Path, *, max_triangles: int = MAX_TRIANGLES, max_bytes: int = MAX_MESH_BYTES) -> TriangleMesh:
+def read_mesh(
+    path: str | Path, *, max_triangles: int = BOUNDS.triangles, max_bytes: int = ROBOT_BOUNDS.mesh_bytes
+) -> TriangleMesh:
     """Return the triangles of an STL, OBJ, PLY or COLLADA file.
 
     Coordinates are in the file's units; those of COLLADA, which states its unit and its up axis, in metres with z up.
@@ -100,7 +99,7 @@ def _check_count(count: int, max_triangles: int) -> None:
 
 
 def check_coordinates(mesh: TriangleMesh, where: str = "") -> None:
-    """Refuse a mesh with a coordinate that is not finite or larger than :data:`MAX_COORDINATE`.
+    """Refuse a mesh with a coordinate that is not finite or larger than ``BOUNDS.coordinate``.
 
     Raises
     ------
@@ -108,10 +107,10 @@ def check_coordinates(mesh: TriangleMesh, where: str = "") -> None:
         Names the first such vertex; begins with ``where``.
     """
     with np.errstate(invalid="ignore"):
-        is_odd = ~(np.abs(mesh.vertices) <= MAX_COORDINATE).all(axis=1)
+        is_odd = ~(np.abs(mesh.vertices) <= BOUNDS.coordinate).all(axis=1)
     if is_odd.any():
         number = int(np.argmax(is_odd))
-        fault = "not finite" if not np.isfinite(mesh.vertices[number]).all() else f"beyond {MAX_COORDINATE:g}"
+        fault = "not finite" if not np.isfinite(mesh.vertices[number]).all() else f"beyond {BOUNDS.coordinate:g}"
         raise ModelError(f"{where}vertex {number} (from 0) has coordinates that are {fault}")
 
 
@@ -152,7 +151,7 @@ def _obj_mesh(content: bytes) -> TriangleMesh:
     """Return an OBJ file's faces as triangles, in the file's units; a material file that it names is not opened."""
     content = content.replace(b"\\\n", b" ").replace(b"\\\r\n", b" ")
     try:
-        vertices = coordinates(OBJ_VERTEX.findall(content))
+        vertices = coordinates(_OBJ_VERTEX.findall(content))
         polygons = _obj_polygons(content, len(vertices))
     except ValueError as error:
         raise ModelError(f"{' '.join(str(error).split())[:80]}; expected a number") from None
@@ -165,13 +164,13 @@ def _obj_polygons(content: bytes, count: int) -> list[list[int]]:
     """Return the vertices of each face, from 0; a negative index counts back from the vertices above the face."""
     polygons: list[list[int]] = []
     vertices_above = 0
-    for line in OBJ_FACE_OR_VERTEX.finditer(content):
+    for line in _OBJ_FACE_OR_VERTEX.finditer(content):
         if line.group().lstrip().startswith(b"v"):
             vertices_above += 1
             continue
         words = line[1].split(b"#")[0].split()
-        if not 3 <= len(words) <= MAX_POLYGON_CORNERS:
-            raise ModelError(f"a face of {len(words)} corners; expected 3 to {MAX_POLYGON_CORNERS}")
+        if not 3 <= len(words) <= BOUNDS.polygon_corners:
+            raise ModelError(f"a face of {len(words)} corners; expected 3 to {BOUNDS.polygon_corners}")
         indices = [int(word.partition(b"/")[0]) for word in words]
         corners = [index - 1 if index > 0 else vertices_above + index for index in indices]
         for index, corner in zip(indices, corners, strict=True):

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from dhkit.description import Array
 
-CONCAVE_SINE = 1e-9
+_CONCAVE_SINE = 1e-9
 """A corner is concave if its turn, relative to the squared length of the longest edge, is below minus this number."""
 
 
@@ -52,7 +52,7 @@ def _is_concave(points: Array) -> NDArray[np.bool_]:
         edges = np.roll(points, -1, axis=1) - points
         turns = np.einsum("pki,pi->pk", np.cross(edges, np.roll(edges, -1, axis=1)), _normals(points))
         longest = (edges**2).sum(axis=2).max(axis=1) * np.linalg.norm(_normals(points), axis=1)
-        concave: NDArray[np.bool_] = (turns < -CONCAVE_SINE * longest[:, None]).any(axis=1)
+        concave: NDArray[np.bool_] = (turns < -_CONCAVE_SINE * longest[:, None]).any(axis=1)
     return concave
 
 

@@ -23,11 +23,11 @@ from dhkit.description.validation import shapes_left_out
 from dhkit.display import repr_line
 from dhkit.model.drawing import Drawing, Solid
 
-BASE_COLOR = "#4a4f57"
+_BASE_COLOR = "#4a4f57"
 """Foot and gripper: dark, to tell them from links."""
-PALETTE = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#bbbbbb")
+_PALETTE = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#bbbbbb")
 """Links 1, 2 ...: Tol's bright scheme (SRON/EPS/TN/09-002, 2021), which colour-blind people can tell apart too."""
-IDENTITY: Array = np.eye(4)
+_IDENTITY: Array = np.eye(4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +168,7 @@ def with_drawn_shapes(description: Description) -> Description:
 def _parts(description: Description) -> tuple[list[list[Part]], list[list[Part]]]:
     """Return the described and the drawn parts of the base, each link and the tool; drawn are those without shapes."""
     n, T_last_tool, arm = description.n, description.numbers.T_last_tool, Drawing(description)
-    colors = [BASE_COLOR, *(PALETTE[i % len(PALETTE)] for i in range(n))]
+    colors = [_BASE_COLOR, *(_PALETTE[i % len(_PALETTE)] for i in range(n))]
     own = (description.base.shapes, *(joint.shapes for joint in description.joints))
     described = [_described_parts(description, shapes, i, colors[i]) for i, shapes in enumerate(own)]
     at_tool = _tool_parts(description, described[-1])
@@ -176,8 +176,8 @@ def _parts(description: Description) -> tuple[list[list[Part]], list[list[Part]]
         return [*described, at_tool], [[] for _ in range(n + 2)]
     drawn = [[] if parts else _drawn_parts(i, arm.link(i), colors[i]) for i, parts in enumerate(described)]
     gripper: list[Part] = []
-    if not at_tool and (not described[-1] or not np.array_equal(T_last_tool, IDENTITY)):
-        gripper = [*_drawn_parts(n, arm.neck(), colors[-1]), *_drawn_parts(n, arm.gripper(), BASE_COLOR)]
+    if not at_tool and (not described[-1] or not np.array_equal(T_last_tool, _IDENTITY)):
+        gripper = [*_drawn_parts(n, arm.neck(), colors[-1]), *_drawn_parts(n, arm.gripper(), _BASE_COLOR)]
     return [*described, at_tool], [*drawn, gripper]
 
 
@@ -189,9 +189,9 @@ def _tool_parts(description: Description, last_link: Sequence[Part]) -> list[Par
     """Return the tool's shapes as parts of the last body of the last link."""
     n = description.n
     T_last_tool = description.numbers.T_last_tool
-    in_tool = _described_parts(description, description.tool.shapes, n, BASE_COLOR)
-    body, T_link_body = (last_link[-1].body, last_link[-1].T_link_body) if last_link else (0, IDENTITY)
-    T_body_tool = T_last_tool if np.array_equal(T_link_body, IDENTITY) else np.linalg.solve(T_link_body, T_last_tool)
+    in_tool = _described_parts(description, description.tool.shapes, n, _BASE_COLOR)
+    body, T_link_body = (last_link[-1].body, last_link[-1].T_link_body) if last_link else (0, _IDENTITY)
+    T_body_tool = T_last_tool if np.array_equal(T_link_body, _IDENTITY) else np.linalg.solve(T_link_body, T_last_tool)
     return [
         replace(part, T_body_part=T_body_tool @ part.T_link_part, body=body, T_link_body=T_link_body)
         for part in in_tool

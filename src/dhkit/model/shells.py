@@ -13,27 +13,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.triangle_mesh import TriangleMesh, area_vectors, component_labels, unit_normals
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-TEST_POINT_DEPTH = 1e-6
+_TEST_POINT_DEPTH = 1e-6
 """Distance of a test point behind its triangle, as a share of the mesh's size."""
-TEST_POINTS = 16
+_TEST_POINTS = 16
 """Number of a shell's triangles behind whose middles points are tested."""
-MIN_INSIDE_WINDING = 0.5
+_MIN_INSIDE_WINDING = 0.5
 """Winding number above which a point is inside: it is 1 inside a shell and 0 outside."""
-MIN_CAVITY_SHARE = 0.3
+_MIN_CAVITY_SHARE = 0.3
 """Smallest share of a cavity's test points that lie in material: a cavity may reach out of it, with a warning."""
-TOUCHING_DEPTH = 1e-6
+_TOUCHING_DEPTH = 1e-6
 """Depth to which touching shells may overlap, as a share of the mesh's size: files round their vertices."""
-MAX_SHARED_VOLUME = 1e-3
+_MAX_SHARED_VOLUME = 1e-3
 """Volume that two shells may share, relative to the smaller one: round parts that fit overlap by their facets."""
-MAX_BOOLEAN_TRIANGLES = 3_000_000
-"""Largest number of triangles given to manifold3d in all; for more, the test points alone decide."""
-OBLIQUE_ROTATION = np.linalg.qr(np.array([[0.61, 0.23, 0.37], [0.17, 0.71, 0.53], [0.43, 0.31, 0.67]]))[0]
-OBLIQUE_ROTATION *= np.linalg.det(OBLIQUE_ROTATION)
+_OBLIQUE_ROTATION = np.linalg.qr(np.array([[0.61, 0.23, 0.37], [0.17, 0.71, 0.53], [0.43, 0.31, 0.67]]))[0]
+_OBLIQUE_ROTATION *= np.linalg.det(_OBLIQUE_ROTATION)
 """A rotation that maps no usual direction of a machine part to z."""
 
 
@@ -88,7 +87,7 @@ class Shells:
         each other.
         """
         inverted = np.flatnonzero(self.volume < 0)
-        wrong = [k for k in inverted if np.mean(self._windings(int(k)) > MIN_INSIDE_WINDING) < MIN_CAVITY_SHARE]
+        wrong = [k for k in inverted if np.mean(self._windings(int(k)) > _MIN_INSIDE_WINDING) < _MIN_CAVITY_SHARE]
         return np.isin(np.arange(self.count), wrong)
 
     def doubled(self) -> int:
@@ -97,8 +96,8 @@ class Shells:
         The same surface in two tessellations is one shell, since both have the same vertices, and encloses twice.
         """
         solid = [int(k) for k in np.flatnonzero(self.volume > 0)]
-        others = [bool((self._windings(k) > MIN_INSIDE_WINDING).any()) for k in solid]
-        own = [bool((self._own_windings(k) > 1 + MIN_INSIDE_WINDING).any()) for k in solid]
+        others = [bool((self._windings(k) > _MIN_INSIDE_WINDING).any()) for k in solid]
+        own = [bool((self._own_windings(k) > 1 + _MIN_INSIDE_WINDING).any()) for k in solid]
         return sum(in_others or in_own for in_others, in_own in zip(others, own, strict=True))
 
     def shared(self) -> tuple[float, int]:
@@ -106,7 +105,7 @@ class Shells:
         low, high = self._bounds
         near = np.asarray(((low[:, None] < high[None]) & (low[None] < high[:, None])).all(axis=2))
         sizes = np.diff(self._ends)
-        if int((near @ sizes).sum() - sizes.sum()) > MAX_BOOLEAN_TRIANGLES:
+        if int((near @ sizes).sum() - sizes.sum()) > BOUNDS.boolean_triangles:
             return 0.0, 0
         twice, reaching, solids = 0.0, 0, dict[int, "Manifold | None"]()
         order = np.argsort(-np.abs(self.volume), kind="stable")
@@ -131,7 +130,7 @@ class Shells:
 
     def _allowed_overlap(self, k: int) -> float:
         area = np.linalg.norm(area_vectors(self.mesh.vertices[self._faces(k)]), axis=1).sum() / 2
-        return max(TOUCHING_DEPTH * self._size * float(area), MAX_SHARED_VOLUME * abs(float(self.volume[k])))
+        return max(_TOUCHING_DEPTH * self._size * float(area), _MAX_SHARED_VOLUME * abs(float(self.volume[k])))
 
     def _solid(self, k: int) -> Manifold | None:
         """Return a shell, or a cavity's inside, as a solid; None if an edge belongs to more than two triangles."""
@@ -164,8 +163,8 @@ class Shells:
     def _test_points(self, k: int) -> Array:
         """Return points just inside triangles' middles; points on a face that two shells share would be undecided."""
         faces = self._faces(k)
-        corners = self.mesh.vertices[faces[:: max(1, len(faces) // TEST_POINTS)][:TEST_POINTS]]
-        inwards = -np.sign(self.volume[k]) * TEST_POINT_DEPTH * self._size
+        corners = self.mesh.vertices[faces[:: max(1, len(faces) // _TEST_POINTS)][:_TEST_POINTS]]
+        inwards = -np.sign(self.volume[k]) * _TEST_POINT_DEPTH * self._size
         points: Array = corners.mean(axis=1) + inwards * unit_normals(corners)
         return points
 
@@ -213,7 +212,7 @@ class _Rays:
 
     def __init__(self, corners: Array) -> None:
         # Rotated, so that no ray runs along a usual face of a machine part or through its edges.
-        self.corners = corners @ OBLIQUE_ROTATION
+        self.corners = corners @ _OBLIQUE_ROTATION
         self.low, self.high = self.corners[:, :, :2].min(axis=1).T.copy(), self.corners[:, :, :2].max(axis=1).T.copy()
 
     def windings(self, chosen: slice, points: Array) -> Array:
@@ -221,7 +220,7 @@ class _Rays:
         (x0, y0), (x1, y1) = self.low[:, chosen], self.high[:, chosen]
         corners = self.corners[chosen]
         windings = np.zeros(len(points))
-        for i, point in enumerate(points @ OBLIQUE_ROTATION):
+        for i, point in enumerate(points @ _OBLIQUE_ROTATION):
             x, y, _ = point
             hit = np.flatnonzero((x0 <= x) & (x <= x1) & (y0 <= y) & (y <= y1))
             windings[i] = _exits_minus_entries(corners[hit] - point)

@@ -22,29 +22,29 @@ from dhkit.errors import ModelError
 from dhkit.model.shape_inertia import MassProperties
 
 REPORT = re.compile(r"^[ \t]*Mass properties of\b[ \t]*(.*?)[ \t]*$", re.IGNORECASE | re.MULTILINE)
-ASSEMBLY = re.compile(r"Mass properties of\b.*\.sldasm\b|\([ \t]*Assembly Configuration\b", re.IGNORECASE)
-DECIMAL = r"[-+]?\d[\d.,]*(?:[eE][-+]?\d+)?"
-MASS = re.compile(rf"^[ \t]*Mass[ \t]*=[ \t]*({DECIMAL})[ \t]*([a-z]+)", re.IGNORECASE | re.MULTILINE)
-CENTRE = re.compile(r"Cent(?:er|re) of mass:?[ \t]*\([ \t]*([a-z]+)[ \t]*\)", re.IGNORECASE)
-BLOCK = re.compile(r"moments of inertia:?[ \t]*\(([^)]*)\)[^\n]*\n([^\n]*)", re.IGNORECASE)
-NOTATION = re.compile(r"\b(positive|negative)\s+tensor\s+notation", re.IGNORECASE)
-ENTRY = re.compile(rf"\b([LIP])([xyz]{{1,2}})[ \t]*=[ \t]*({DECIMAL})")
-AXIS = re.compile(
-    rf"\bI([xyz])[ \t]*=[ \t]*\([ \t]*({DECIMAL})[ \t]*,[ \t]+({DECIMAL})[ \t]*,[ \t]+({DECIMAL})[ \t]*\)"
+_ASSEMBLY = re.compile(r"Mass properties of\b.*\.sldasm\b|\([ \t]*Assembly Configuration\b", re.IGNORECASE)
+_DECIMAL = r"[-+]?\d[\d.,]*(?:[eE][-+]?\d+)?"
+_MASS = re.compile(rf"^[ \t]*Mass[ \t]*=[ \t]*({_DECIMAL})[ \t]*([a-z]+)", re.IGNORECASE | re.MULTILINE)
+_CENTRE = re.compile(r"Cent(?:er|re) of mass:?[ \t]*\([ \t]*([a-z]+)[ \t]*\)", re.IGNORECASE)
+_BLOCK = re.compile(r"moments of inertia:?[ \t]*\(([^)]*)\)[^\n]*\n([^\n]*)", re.IGNORECASE)
+_NOTATION = re.compile(r"\b(positive|negative)\s+tensor\s+notation", re.IGNORECASE)
+_ENTRY = re.compile(rf"\b([LIP])([xyz]{{1,2}})[ \t]*=[ \t]*({_DECIMAL})")
+_AXIS = re.compile(
+    rf"\bI([xyz])[ \t]*=[ \t]*\([ \t]*({_DECIMAL})[ \t]*,[ \t]+({_DECIMAL})[ \t]*,[ \t]+({_DECIMAL})[ \t]*\)"
 )
-COORDINATE = re.compile(rf"^[ \t]*([XYZ])[ \t]*=[ \t]*({DECIMAL})", re.MULTILINE)
-MASS_UNITS = {"grams": 1e-3, "gram": 1e-3, "kilograms": 1.0, "kilogram": 1.0, "milligrams": 1e-6, "pounds": 0.45359237}
+_COORDINATE = re.compile(rf"^[ \t]*([XYZ])[ \t]*=[ \t]*({_DECIMAL})", re.MULTILINE)
+_MASS_UNITS = {"grams": 1e-3, "gram": 1e-3, "kilograms": 1.0, "kilogram": 1.0, "milligrams": 1e-6, "pounds": 0.45359237}
 """Mass units by SolidWorks' names, kg."""
-LENGTH_UNITS = {"millimeters": 1e-3, "centimeters": 1e-2, "meters": 1.0, "inches": 0.0254, "feet": 0.3048}
+_LENGTH_UNITS = {"millimeters": 1e-3, "centimeters": 1e-2, "meters": 1.0, "inches": 0.0254, "feet": 0.3048}
 """Length units by SolidWorks' names, m."""
-ENTRY_NAMES = [["xx", "xy", "xz"], ["yx", "yy", "yz"], ["zx", "zy", "zz"]]
-MAX_MISFIT_RATIO = 0.2
+_ENTRY_NAMES = [["xx", "xy", "xz"], ["yx", "yy", "yz"], ["zx", "zy", "zz"]]
+_MAX_MISFIT_RATIO = 0.2
 """The sign is decided if one tensor's misfit to another block is below this share of the other tensor's misfit."""
-WARNED_ROUNDING, MAX_ROUNDING = 1e-3, 0.05
+_WARNED_ROUNDING, _MAX_ROUNDING = 1e-3, 0.05
 """Half a unit of the last decimal above which a warning is given, and above which the report is refused.
 
 Relative to the mass, the largest moment, and, for the centre of mass, the radius of gyration."""
-MISFIT_ROUNDINGS = 4.0
+_MISFIT_ROUNDINGS = 4.0
 """Half units of the last decimals that blocks may differ by: several rounded numbers enter each comparison."""
 
 
@@ -111,19 +111,19 @@ class _Reader:
 
     def report(self) -> tuple[str, MassProperties, tuple[str, ...]]:
         title = REPORT.search(self.text)
-        if assembly := ASSEMBLY.search(self.text):
+        if assembly := _ASSEMBLY.search(self.text):
             raise self._error(
                 "a report of an assembly; expected one of the part of a link: select the part alone in Mass Properties",
                 assembly,
             )
-        mass_line = self._match(MASS, "a line 'Mass = ... grams'")
+        mass_line = self._match(_MASS, "a line 'Mass = ... grams'")
         number = self._number(mass_line[1], mass_line)
-        mass = number.value * self._unit(mass_line[2], MASS_UNITS, mass_line)
+        mass = number.value * self._unit(mass_line[2], _MASS_UNITS, mass_line)
         if not mass > 0:
             raise self._error(f"mass is {mass_line[1]}; expected a positive number", mass_line)
         centre = _Centre(mass, number.half / number.value, *self._centre_of_mass())
         warnings = self._rounding_warning("mass", centre.relative_half, "", mass_line)
-        blocks = {self._block_kind(match): match for match in BLOCK.finditer(self.text)}
+        blocks = {self._block_kind(match): match for match in _BLOCK.finditer(self.text)}
         if _Block.CENTRE not in blocks:
             raise ModelError(
                 f"{self.path}, line {self.first}: no block 'Moments of inertia: Taken at the center of mass and "
@@ -144,20 +144,20 @@ class _Reader:
     def _rounding_warning(self, what: str, share: float, of: str, at: re.Match[str]) -> tuple[str, ...]:
         """Return a warning if half a unit of the last decimal is a large share of a quantity; refuse a larger one."""
         verb, are = ("have", "are") if what == "moments" else ("has", "is")
-        if share > MAX_ROUNDING:
+        if share > _MAX_ROUNDING:
             raise self._error(
                 f"its {what} {verb} too few digits, {100 * min(share, 1.0):.0f} %{of}; choose smaller units or more "
                 "decimal places in the options of Mass Properties",
                 at,
             )
-        is_warned = share > WARNED_ROUNDING
+        is_warned = share > _WARNED_ROUNDING
         return (f"warning: its {what} {are} rounded to {100 * share:.1g} %{of}",) if is_warned else ()
 
     def _centre_of_mass(self) -> tuple[Array, float]:
         """Return the centre of mass, shape (3,), m, and half a unit of its last decimals."""
-        heading = self._match(CENTRE, "a line 'Center of mass: ( millimeters )'")
-        unit = self._unit(heading[1], LENGTH_UNITS, heading)
-        matches = COORDINATE.finditer(self.text, heading.end())
+        heading = self._match(_CENTRE, "a line 'Center of mass: ( millimeters )'")
+        unit = self._unit(heading[1], _LENGTH_UNITS, heading)
+        matches = _COORDINATE.finditer(self.text, heading.end())
         numbers = {match[1]: self._number(match[2], match) for match in matches}
         if set(numbers) != set("XYZ"):
             raise self._error("no X, Y and Z of the centre of mass; expected three lines 'X = ...'", heading)
@@ -173,17 +173,17 @@ class _Reader:
     def _tensor(self, block: re.Match[str], letter: str) -> tuple[Array, Array]:
         """Return a block's nine entries as listed, kg m^2, and half a unit of the last decimals, shape (3, 3)."""
         unit, entries = self._moment_unit(block), self._entries(block, letter)
-        if missing := [name for row in ENTRY_NAMES for name in row if name not in entries]:
+        if missing := [name for row in _ENTRY_NAMES for name in row if name not in entries]:
             raise self._error(f"no {letter}{missing[0]}; expected nine entries {letter}xx ... {letter}zz", block)
-        numbers = np.array([[entries[name] for name in row] for row in ENTRY_NAMES])
+        numbers = np.array([[entries[name] for name in row] for row in _ENTRY_NAMES])
         listed, half = unit * numbers[..., 0], unit * numbers[..., 1]
         if np.any(np.abs(listed - listed.T) > 2 * (half + half.T)):
             raise self._error(f"{letter}xy and {letter}yx differ; expected a symmetric tensor", block)
         return (listed + listed.T) / 2, half
 
     def _entries(self, block: re.Match[str], letter: str) -> dict[str, _Number]:
-        following = BLOCK.search(self.text, block.end())
-        matches = ENTRY.finditer(self.text, block.end(), following.start() if following else len(self.text))
+        following = _BLOCK.search(self.text, block.end())
+        matches = _ENTRY.finditer(self.text, block.end(), following.start() if following else len(self.text))
         return {match[2]: self._number(match[3], match) for match in matches if match[1] == letter}
 
     def _moment_unit(self, block: re.Match[str]) -> float:
@@ -192,7 +192,7 @@ class _Reader:
             raise self._error(
                 f"the unit {block[1].strip()[:40]!r}; expected such as 'grams * square millimeters'", block
             )
-        return self._unit(words[0], MASS_UNITS, block) * self._unit(words[2], LENGTH_UNITS, block) ** 2
+        return self._unit(words[0], _MASS_UNITS, block) * self._unit(words[2], _LENGTH_UNITS, block) ** 2
 
     def _sign(
         self, listed: Array, half: Array, centre: _Centre, blocks: Mapping[_Block, re.Match[str]]
@@ -214,7 +214,7 @@ class _Reader:
         evidence = {
             block: 1.0 if plus < minus else -1.0
             for block, plus, minus, allowed in misfits
-            if max(plus, minus) > allowed and min(plus, minus) < MAX_MISFIT_RATIO * max(plus, minus)
+            if max(plus, minus) > allowed and min(plus, minus) < _MAX_MISFIT_RATIO * max(plus, minus)
         }
         signs = set(evidence.values())
         if len(signs) > 1:
@@ -223,7 +223,7 @@ class _Reader:
         if signs:
             sign = signs.pop()
             return sign, f"products listed as {names[sign]}, found by {' and '.join(evidence)}"
-        if notation := NOTATION.search(self.text):
+        if notation := _NOTATION.search(self.text):
             word = notation[1].lower()
             sign = 1.0 if word == "positive" else -1.0
             return sign, f"products listed as {names[sign]}, as the report states ({word} tensor notation)"
@@ -235,9 +235,9 @@ class _Reader:
         if missing := [k for k in "xyz" if k not in entries]:
             raise self._error(f"no P{missing[0]}; expected the principal moments Px, Py, Pz", block)
         moments = unit * np.array([entries[k].value for k in "xyz"])
-        rounding = MISFIT_ROUNDINGS * (np.abs(half).max() + unit * max(entries[k].half for k in "xyz"))
+        rounding = _MISFIT_ROUNDINGS * (np.abs(half).max() + unit * max(entries[k].half for k in "xyz"))
         deviations = []
-        axes = {match[1]: match for match in AXIS.finditer(self.text, block.end())}
+        axes = {match[1]: match for match in _AXIS.finditer(self.text, block.end())}
         for sign in (1.0, -1.0):
             tensor = _with_products_times(-sign, listed)
             deviation = float(np.abs(np.linalg.eigvalsh(tensor) - np.sort(moments)).max())
@@ -257,10 +257,10 @@ class _Reader:
         steiner = mass * (com @ com * np.eye(3) - np.outer(com, com))
         reach = float(np.abs(com).max()) + com_half
         allowed = (
-            MISFIT_ROUNDINGS * (float(half.max() + origin_half.max()) + mass * com_half * 2 * reach)
+            _MISFIT_ROUNDINGS * (float(half.max() + origin_half.max()) + mass * com_half * 2 * reach)
             + 1e-9 * np.abs(origin).max()
         )
-        allowed += MISFIT_ROUNDINGS * centre.relative_half * float(np.abs(steiner).max())
+        allowed += _MISFIT_ROUNDINGS * centre.relative_half * float(np.abs(steiner).max())
         difference = origin - listed
         plus, minus = (float(np.abs(difference - _with_products_times(-s, steiner)).max()) for s in (1.0, -1.0))
         return _Misfit("Steiner's terms of the block at the output coordinate system", plus, minus, float(allowed))

@@ -9,19 +9,18 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.errors import ModelError
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.triangle_mesh import unit_normals
 
-FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
-HEADER_LENGTH = 84
-NORMAL_DECIMALS = 6
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
+_HEADER_LENGTH = 84
+_NORMAL_DECIMALS = 6
 """Decimals of the normals that are written: sines of different machines agree to far more."""
-VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
-DECIMAL_COMMA = re.compile(rb"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
-FACET_END = re.compile(rb"\bendfacet\b", re.IGNORECASE)
-NAME_LINE = re.compile(rb"^[ \t]*(?:end)?solid\b[^\r\n]*", re.IGNORECASE | re.MULTILINE)
+_VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
+_DECIMAL_COMMA = re.compile(rb"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
+_FACET_END = re.compile(rb"\bendfacet\b", re.IGNORECASE)
+_NAME_LINE = re.compile(rb"^[ \t]*(?:end)?solid\b[^\r\n]*", re.IGNORECASE | re.MULTILINE)
 """Line with the name of a solid, which may have keywords in it."""
-MAX_DIGITS = 64
-"""Longest text of a coordinate; 17 significant digits, a sign and an exponent have 24 characters."""
 
 
 def binary_corners(content: bytes) -> Array:
@@ -32,9 +31,9 @@ def binary_corners(content: bytes) -> Array:
     ModelError
         No whole number of facets.
     """
-    if len(content) < HEADER_LENGTH or (len(content) - HEADER_LENGTH) % FACET.itemsize:
-        raise ModelError(f"{len(content)} bytes; expected a header of {HEADER_LENGTH} and facets of {FACET.itemsize}")
-    return np.frombuffer(content, dtype=FACET, offset=HEADER_LENGTH)["corners"].astype(np.float64)
+    if len(content) < _HEADER_LENGTH or (len(content) - _HEADER_LENGTH) % _FACET.itemsize:
+        raise ModelError(f"{len(content)} bytes; expected a header of {_HEADER_LENGTH} and facets of {_FACET.itemsize}")
+    return np.frombuffer(content, dtype=_FACET, offset=_HEADER_LENGTH)["corners"].astype(np.float64)
 
 
 def ascii_corners(content: bytes) -> Array:
@@ -45,15 +44,15 @@ def ascii_corners(content: bytes) -> Array:
     ModelError
         A facet without three vertices, or a coordinate that is no number.
     """
-    content = NAME_LINE.sub(b"", content)
-    vertices = VERTEX.findall(content)
-    facets = len(FACET_END.findall(content))
+    content = _NAME_LINE.sub(b"", content)
+    vertices = _VERTEX.findall(content)
+    facets = len(_FACET_END.findall(content))
     if len(vertices) != 3 * facets:
         raise ModelError(f"{facets} facets with {len(vertices)} vertices; expected 3 each")
     try:
         numbers = coordinates(vertices)
     except ValueError as error:
-        if comma := next((text for row in vertices for text in row if DECIMAL_COMMA.fullmatch(text)), None):
+        if comma := next((text for row in vertices for text in row if _DECIMAL_COMMA.fullmatch(text)), None):
             raise ModelError(
                 f"found {comma[:20].decode()!r}: decimal commas are not read; export 1.5 for 1,5"
             ) from None
@@ -70,9 +69,9 @@ def coordinates(rows: Sequence[tuple[bytes, bytes, bytes]]) -> Array:
         A text that is not a number.
     """
     for text in (text for row in rows for text in row):
-        if len(text) > MAX_DIGITS or b"_" in text:
+        if len(text) > BOUNDS.coordinate_characters or b"_" in text:
             raise ValueError(f"found {text[:20].decode('ascii', 'replace')!r}, {len(text)} characters long")
-    return np.array(rows, dtype=f"S{MAX_DIGITS}").astype(np.float64).reshape(-1, 3)
+    return np.array(rows, dtype=f"S{BOUNDS.coordinate_characters}").astype(np.float64).reshape(-1, 3)
 
 
 def binary_stl(title: str, corners: Array) -> bytes:
@@ -80,8 +79,8 @@ def binary_stl(title: str, corners: Array) -> bytes:
 
     The normal of a triangle without area is 0.
     """
-    facets = np.zeros(len(corners), dtype=FACET)
-    facets["normal"] = np.round(unit_normals(corners), NORMAL_DECIMALS) + 0.0
+    facets = np.zeros(len(corners), dtype=_FACET)
+    facets["normal"] = np.round(unit_normals(corners), _NORMAL_DECIMALS) + 0.0
     facets["corners"] = corners
     # The title must be ASCII and must not begin with "solid": many readers would take the file for a text.
     header = title.encode("ascii", "replace")[:80].ljust(80, b"\0")

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from dhkit.description import Array
 from dhkit.display import repr_line
 
-HASH_FACTORS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
+_HASH_FACTORS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
 """Odd factors that spread three coordinates over 64 bits."""
 
 
@@ -170,9 +170,9 @@ def same_vertices(vertices: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """
     rows = np.ascontiguousarray(vertices + 0.0, dtype=np.float64)  # adding zero turns -0.0 into 0.0
     bits = rows.view(np.uint64)
-    digest = bits[:, 0] * HASH_FACTORS[0]
+    digest = bits[:, 0] * _HASH_FACTORS[0]
     for k in (1, 2):
-        digest = (digest ^ (digest >> np.uint64(29))) * HASH_FACTORS[k] + bits[:, k] * HASH_FACTORS[(k + 1) % 3]
+        digest = (digest ^ (digest >> np.uint64(29))) * _HASH_FACTORS[k] + bits[:, k] * _HASH_FACTORS[(k + 1) % 3]
     # As np.unique works, but with a sort that need not be stable: a third of the time.
     order = np.argsort(digest)
     ordered = digest[order]

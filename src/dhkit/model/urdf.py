@@ -41,10 +41,10 @@ from dhkit.model.shapes import Part, link_parts
 
 UNLIMITED = 1e6
 """Effort and velocity of a joint that the description leaves unlimited; a URDF must give numbers."""
-SHAPE_DECIMALS = 12
+_SHAPE_DECIMALS = 12
 """Decimals of the poses of shapes, m and rad: further decimals are rounding errors."""
 
-Element = ElementTree.Element
+_Element = ElementTree.Element
 PathMap = Callable[[str], str]
 """From a mesh's path in the robot file to its path in the URDF."""
 
@@ -189,7 +189,7 @@ def _joint_origin(description: Description, i: int) -> Origin:
     return Origin(np.array([ct * x - st * y, st * x + ct * y, z]), (n.alpha[k], 0.0, theta))
 
 
-def _add_joint(robot: Element, description: Description, i: int) -> None:
+def _add_joint(robot: _Element, description: Description, i: int) -> None:
     k, numbers, joint = i - 1, description.numbers, description.joints[i - 1]
     element = _child(robot, "joint", name=joint.name, type=joint.type.value)
     _add_origin(element, _joint_origin(description, i))
@@ -211,14 +211,14 @@ def _add_joint(robot: Element, description: Description, i: int) -> None:
         _child(element, "dynamics", damping=_texts([numbers.viscous[k]]), friction=_texts([friction]))
 
 
-def _add_fixed_joint(robot: Element, parent: str, child: str, origin: Origin) -> None:
+def _add_fixed_joint(robot: _Element, parent: str, child: str, origin: Origin) -> None:
     joint = _child(robot, "joint", name=f"{child}_fixed", type="fixed")
     _add_origin(joint, origin)
     _child(joint, "parent", link=parent)
     _child(joint, "child", link=child)
 
 
-def _add_inertial(link: Element, origin: Origin, mass: float, tensor: Array) -> None:
+def _add_inertial(link: _Element, origin: Origin, mass: float, tensor: Array) -> None:
     inertial = _child(link, "inertial")
     _add_origin(inertial, origin)
     _child(inertial, "mass", value=_texts([mass]))
@@ -226,7 +226,7 @@ def _add_inertial(link: Element, origin: Origin, mass: float, tensor: Array) -> 
     _child(inertial, "inertia", **moments)
 
 
-def _add_part(link: Element, part: Part, T_link_frame: Array, paths: Mapping[str, PathMap]) -> None:
+def _add_part(link: _Element, part: Part, T_link_frame: Array, paths: Mapping[str, PathMap]) -> None:
     """Add a drawn part as visual and as collision."""
     rgb = [int(part.color[k : k + 2], 16) / 255 for k in (1, 3, 5)]
     for z, tag, attributes in _solids(part):
@@ -237,7 +237,7 @@ def _add_part(link: Element, part: Part, T_link_frame: Array, paths: Mapping[str
             named = {key: path(text) if key == "filename" else text for key, text in attributes.items()}
             element = _child(link, purpose)
             _add_origin(
-                element, Origin(np.round(origin.xyz, SHAPE_DECIMALS), tuple(np.round(origin.rpy, SHAPE_DECIMALS)))
+                element, Origin(np.round(origin.xyz, _SHAPE_DECIMALS), tuple(np.round(origin.rpy, _SHAPE_DECIMALS)))
             )
             _child(_child(element, "geometry"), tag, **named)
             if purpose == "visual":
@@ -267,11 +267,11 @@ def _origin_of(T: Array) -> Origin:
     return Origin(xyz, (float(roll), float(pitch), float(yaw)))
 
 
-def _add_origin(element: Element, origin: Origin) -> None:
+def _add_origin(element: _Element, origin: Origin) -> None:
     _child(element, "origin", xyz=_texts(origin.xyz), rpy=_texts(origin.rpy))
 
 
-def _child(parent: Element, tag: str, **attributes: str) -> Element:
+def _child(parent: _Element, tag: str, **attributes: str) -> _Element:
     return ElementTree.SubElement(parent, tag, attributes)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from dhkit.description import Array
 from dhkit.errors import ModelError
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.reference import PinocchioModel, import_pinocchio
 from dhkit.model.urdf_reader import read_urdf
 from dhkit.model.urdf_tree import JointKind, UrdfJoint, UrdfLink, UrdfTree
@@ -27,11 +28,9 @@ JointNames: TypeAlias = tuple[str, ...]
 
 BASE_FRAME, TIP_FRAME = "dhkit:base", "dhkit:tip"
 """Links that are added for Pinocchio: links and joints of a URDF may share a name, these names are unique."""
-CONVENTIONAL_TIPS = ("tool", "tool0")
+_CONVENTIONAL_TIPS = ("tool", "tool0")
 """Names of tool frames: dhkit's own, and that of ROS-Industrial's robots (REP 199)."""
-MAX_NOTES = 50
-"""Largest number of the reader's warnings that are listed; robot files hold 20,000 characters of notes."""
-UNLIMITED = 1e3
+_UNLIMITED = 1e3
 """rad or m: limits of joints that a URDF leaves unlimited, since Pinocchio requires numbers."""
 
 
@@ -194,7 +193,7 @@ def tool_frame(leaves: Sequence[str]) -> str | None:
     """Return the tool among several frames behind the same joint: the only one, or the one of a conventional name."""
     if len(leaves) == 1:
         return leaves[0]
-    return next((name for name in CONVENTIONAL_TIPS if name in leaves), None)
+    return next((name for name in _CONVENTIONAL_TIPS if name in leaves), None)
 
 
 def only_tip(tree: UrdfTree, base: str) -> str | None:
@@ -206,7 +205,7 @@ def only_tip(tree: UrdfTree, base: str) -> str | None:
     longest = max(tips, key=len, default=())
     tip = tool_frame(tips[longest]) if tips else None
     chains = {*tips, *_mimic_chains(tree, base)}
-    if len(chains) > 1 and (tip not in CONVENTIONAL_TIPS or any(longest[: len(chain)] != chain for chain in chains)):
+    if len(chains) > 1 and (tip not in _CONVENTIONAL_TIPS or any(longest[: len(chain)] != chain for chain in chains)):
         return None
     return tip
 
@@ -330,12 +329,13 @@ def _notes(
         for warning in tree.warnings
         if warning.element.name in (names if warning.element.tag == "joint" else links)
     ]
-    if len(notes) > MAX_NOTES:
-        notes = [*notes[:MAX_NOTES], f"and {len(notes) - MAX_NOTES} more notes of this kind"]
+    if len(notes) > BOUNDS.listed_warnings:
+        notes = [*notes[: BOUNDS.listed_warnings], f"and {len(notes) - BOUNDS.listed_warnings} more notes of this kind"]
     others = [joint for joint in tree.joints.values() if joint.name not in names]
     outside: list[UrdfJoint | UrdfLink] = [*others]
     outside += [tree.links[link] for link in tree.links if link not in links]
-    notes += [f"{part.fault}; the chain does not use it" for part in outside if part.fault is not None][:MAX_NOTES]
+    faults = [f"{part.fault}; the chain does not use it" for part in outside if part.fault is not None]
+    notes += faults[: BOUNDS.listed_warnings]
     if tree.unconnected:
         notes.append(f"links that no joint connects with {tree.root!r} left out: {_shortened(tree.unconnected, 300)}")
     beside = [
@@ -457,8 +457,8 @@ def _make_movable(joint: Element, axis: Array) -> None:
     if joint.get("type") == JointKind.CONTINUOUS:
         joint.set("type", JointKind.REVOLUTE)
     _remove_all(joint, "limit", "safety_controller", "calibration")
-    limits = dict.fromkeys(("upper", "effort", "velocity"), f"{UNLIMITED}")
-    ElementTree.SubElement(joint, "limit", {"lower": f"{-UNLIMITED}"} | limits)
+    limits = dict.fromkeys(("upper", "effort", "velocity"), f"{_UNLIMITED}")
+    ElementTree.SubElement(joint, "limit", {"lower": f"{-_UNLIMITED}"} | limits)
 
 
 def _shortened(names: Collection[str], max_length: int) -> str:

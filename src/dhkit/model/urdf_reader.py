@@ -16,9 +16,10 @@ import numpy as np
 
 from dhkit.description import Array, Box, Capsule, Cylinder, Geometry, Mesh, Sphere, pose
 from dhkit.description.bodies import eigenvalue_tolerance
-from dhkit.description.validation import MAX_NUMBER
+from dhkit.description.bounds import BOUNDS as ROBOT_BOUNDS
 from dhkit.errors import ModelError
 from dhkit.expressions import exact
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.urdf_tree import (
     AXIS_KINDS,
     ElementName,
@@ -32,26 +33,20 @@ from dhkit.model.urdf_tree import (
 )
 from dhkit.model.urdf_xml import Element, child_name, number, numbers, parse_urdf
 
-MAX_LINKS = 500
-"""Largest number of links, and of joints: thousands of fixed joints in a row crash Pinocchio."""
-MAX_SHAPES = 2_000
-"""Largest number of visual or collision elements of a link."""
-UNIT_LENGTH_TOLERANCE = 1e-6
+_UNIT_LENGTH_TOLERANCE = 1e-6
 """Largest difference of an axis' length from 1 without a warning: other axes were hardly meant as unit vectors."""
-QUATERNION_TOLERANCE = 1e-4
+_QUATERNION_TOLERANCE = 1e-4
 """Largest difference of a quaternion's length from 1; it is normalized."""
-MAX_SHAPE_DISTANCE = 1e6
-"""Largest size and distance of a shape, m."""
-NO_LIMIT = -1
+_NO_LIMIT = -1
 """Speed or effort that stands for "no limit" in files of some exporters, as 0 does."""
-OWN_PREFIX = "dhkit:"
+_OWN_PREFIX = "dhkit:"
 """Beginning of the names that dhkit adds for other readers."""
-MIN_DIGITS = 3
+_MIN_DIGITS = 3
 """Smallest number of significant digits of a decimal that is taken for a rounded multiple of 15 degrees."""
-ROUND_SIZES = (("radius", 1), ("length", 1))
-GEOMETRY_SIZES = {"box": (("size", 3),), "cylinder": ROUND_SIZES, "capsule": ROUND_SIZES, "sphere": (("radius", 1),)}
+_ROUND_SIZES = (("radius", 1), ("length", 1))
+_GEOMETRY_SIZES = {"box": (("size", 3),), "cylinder": _ROUND_SIZES, "capsule": _ROUND_SIZES, "sphere": (("radius", 1),)}
 """Attributes with the sizes of a geometry, and how many numbers each has."""
-ROUNDED_DECIMALS = range(3, 10)
+_ROUNDED_DECIMALS = range(3, 10)
 """Numbers of decimals of rounded right angles whose differences from the right angle are read as 0."""
 
 
@@ -163,8 +158,8 @@ class _Reader:
     def _joint_origin(self, where: str, origin: Element | None) -> Array:
         T = self._origin(where, origin)
         largest = float(np.abs(T[:3, 3]).max())
-        if largest > MAX_NUMBER:
-            raise ModelError(f"{where}: <origin xyz>: found {largest:.3g} m; expected at most {MAX_NUMBER:g}")
+        if largest > ROBOT_BOUNDS.number:
+            raise ModelError(f"{where}: <origin xyz>: found {largest:.3g} m; expected at most {ROBOT_BOUNDS.number:g}")
         return T
 
     def _origin(self, where: str, origin: Element | None) -> Array:
@@ -173,7 +168,7 @@ class _Reader:
         if quaternion := numbers(where, origin, "quat_xyzw", 4):  # of URDF 1.2
             if origin is not None and origin.get("rpy") is not None:
                 raise ModelError(f"{where}: <origin> has both rpy and quat_xyzw; expected one of them")
-            if abs(math.hypot(*quaternion) - 1) > QUATERNION_TOLERANCE:
+            if abs(math.hypot(*quaternion) - 1) > _QUATERNION_TOLERANCE:
                 raise ModelError(f"{where}: <origin quat_xyzw>: found length {math.hypot(*quaternion):.4g}; expected 1")
             return pose(xyz, quat=quaternion)
         rpy = numbers(where, origin, "rpy", 3) or [0.0] * 3
@@ -197,7 +192,7 @@ class _Reader:
             raise ModelError(f"{name}: <axis xyz>: found 0 0 0; expected a direction")
         axis = np.array(entries) / largest  # first, since squares of 1e200 overflow
         length = float(np.linalg.norm(axis))
-        if not 1 - UNIT_LENGTH_TOLERANCE < length * largest < 1 + UNIT_LENGTH_TOLERANCE:
+        if not 1 - _UNIT_LENGTH_TOLERANCE < length * largest < 1 + _UNIT_LENGTH_TOLERANCE:
             self._warn(name, f": axis has length {length * largest:.6g}; read as a direction")
         axis = axis / length
         nearest = np.round(axis)
@@ -230,7 +225,7 @@ class _Reader:
             self._warn(name, f": {key} {limit.get(key)}; read as unlimited")
             return None
         value = number(str(name), limit, key)
-        if value in (0, NO_LIMIT):
+        if value in (0, _NO_LIMIT):
             self._warn(name, f": {key} {value:g}; read as unlimited")
             return None
         if value is not None and value < 0:
@@ -265,8 +260,8 @@ class _Reader:
         return Inertial(mass, T[:3, 3], T[:3, :3] @ tensor @ T[:3, :3].T)
 
     def _shapes(self, name: ElementName, elements: Sequence[Element], colors: Mapping[str, str]) -> Iterator[UrdfShape]:
-        if len(elements) > MAX_SHAPES:
-            raise ModelError(f"{name} has {len(elements)} shapes; expected {MAX_SHAPES} at most")
+        if len(elements) > BOUNDS.shape_elements:
+            raise ModelError(f"{name} has {len(elements)} shapes; expected {BOUNDS.shape_elements} at most")
         for element in elements:
             T = self._origin(f"{name}: {element.tag}", element.find("origin"))
             color, material = None, element.find("material")
@@ -275,8 +270,8 @@ class _Reader:
             geometry, size = self._geometry(name, element)
             if geometry is None:
                 self._warn(name, f": {element.tag} has no geometry that dhkit knows; left out")
-            elif max(size, np.abs(T[:3, 3]).max()) > MAX_SHAPE_DISTANCE:
-                text = f": {element.tag} is larger than {MAX_SHAPE_DISTANCE:g} m or farther away; left out"
+            elif max(size, np.abs(T[:3, 3]).max()) > BOUNDS.shape_distance:
+                text = f": {element.tag} is larger than {BOUNDS.shape_distance:g} m or farther away; left out"
                 self._warn(name, text)
             else:
                 yield UrdfShape(geometry, T, color)
@@ -286,7 +281,7 @@ class _Reader:
         where = f"{name}: {shape.tag}"
         parent = shape.find("geometry")
         for element in [] if parent is None else parent:
-            keys = GEOMETRY_SIZES.get(element.tag, ())
+            keys = _GEOMETRY_SIZES.get(element.tag, ())
             sizes = [size for key, count in keys for size in numbers(where, element, key, count)]
             entries = [exact(size) for size in sizes] if sizes and min(sizes) > 0 else []
             match element.tag, entries:
@@ -311,12 +306,12 @@ class _Reader:
 def _by_name(robot: Element, tag: str) -> dict[str, Element]:
     """Return a robot's links or joints by name; refuse too many, invalid names and repeated ones."""
     elements = robot.findall(tag)
-    if len(elements) > MAX_LINKS:
-        raise ModelError(f"{len(elements)} {tag}s; expected {MAX_LINKS} at most")
+    if len(elements) > BOUNDS.links:
+        raise ModelError(f"{len(elements)} {tag}s; expected {BOUNDS.links} at most")
     named: dict[str, Element] = {}
     for element in elements:
         name = element.get("name", "")
-        if not name or not name.isprintable() or name.startswith(OWN_PREFIX):
+        if not name or not name.isprintable() or name.startswith(_OWN_PREFIX):
             raise ModelError(f"a {tag} has the name {name[:60]!r}; expected text")
         if name in named:
             raise ModelError(f"two {tag}s have the name {name[:60]!r}")
@@ -392,7 +387,7 @@ def _designed_angle(word: str, value: float) -> float:
         return multiple
     decimal = Decimal(word)
     digits, exponent = decimal.as_tuple().digits, decimal.as_tuple().exponent
-    if len(digits) < MIN_DIGITS or not isinstance(exponent, int) or abs(multiple) > math.tau + 1e-9 or exponent > 0:
+    if len(digits) < _MIN_DIGITS or not isinstance(exponent, int) or abs(multiple) > math.tau + 1e-9 or exponent > 0:
         return value
     unit = Decimal(1).scaleb(exponent)
     roundings = (Decimal(multiple).quantize(unit, rounding) for rounding in (ROUND_HALF_EVEN, ROUND_DOWN))
@@ -412,7 +407,7 @@ def _decimal_rounding(word: str) -> float:
     if _is_rounding_of_zero(value):
         return value
     decimal = Decimal(word).as_tuple()
-    if len(decimal.digits) < MIN_DIGITS or not isinstance(decimal.exponent, int) or decimal.exponent >= 0:
+    if len(decimal.digits) < _MIN_DIGITS or not isinstance(decimal.exponent, int) or decimal.exponent >= 0:
         return 0.0
     unit = float(10.0**decimal.exponent)
     multiple = round(value * 12 / math.pi) * math.pi / 12
@@ -428,6 +423,6 @@ def _is_rounding_of_zero(value: float, rel_tol: float = 1e-3) -> bool:
 def _rounding_errors() -> tuple[float, ...]:
     """Return the differences of right angles and their decimals, rounded and cut, rad."""
     right_angles = [k * math.pi / 2 for k in range(1, 5)]
-    rounded = {abs(round(right, k) - right) for right in right_angles for k in ROUNDED_DECIMALS}
-    cut = {abs(math.floor(right * 10**k) / 10**k - right) for right in right_angles for k in ROUNDED_DECIMALS}
+    rounded = {abs(round(right, k) - right) for right in right_angles for k in _ROUNDED_DECIMALS}
+    cut = {abs(math.floor(right * 10**k) / 10**k - right) for right in right_angles for k in _ROUNDED_DECIMALS}
     return tuple(error for error in rounded | cut if error < 2e-4)

@@ -13,19 +13,13 @@ from xml.parsers import expat
 from dhkit.description.files import error_reason
 from dhkit.description.quantities import NUMBER
 from dhkit.errors import ModelError
+from dhkit.model.bounds import BOUNDS
 
 Element = ElementTree.Element
 
-MAX_BYTES = 5_000_000
-MAX_DEPTH = 64
-"""Largest nesting depth of elements."""
-MAX_ELEMENTS = 100_000
-"""Largest number of elements; a humanoid with hands has 5,000."""
-MAX_ATTRIBUTE_LENGTH = 1_000
-"""Longest attribute, in characters: a name, a path or a list of numbers."""
-RUN_XACRO = "run xacro on it first, and give its output"
-DECLARED_ENCODING = re.compile(rb"\s*<\?xml[^>]{0,100}?encoding\s*=\s*[\"']([A-Za-z0-9_.\-]{1,40})[\"']")
-REFUSED_ENCODINGS = {"idna", "punycode"}
+_RUN_XACRO = "run xacro on it first, and give its output"
+_DECLARED_ENCODING = re.compile(rb"\s*<\?xml[^>]{0,100}?encoding\s*=\s*[\"']([A-Za-z0-9_.\-]{1,40})[\"']")
+_REFUSED_ENCODINGS = {"idna", "punycode"}
 """Encodings of names, not of texts: long ones take quadratic time."""
 
 
@@ -44,19 +38,19 @@ def parse_urdf(path: Path) -> Element:
         if not stat.S_ISREG(mode):
             raise ModelError(f"{'a folder' if stat.S_ISDIR(mode) else 'not a regular file'}; expected a URDF")
         with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
+            content = file.read(BOUNDS.urdf_bytes + 1)
     except (OSError, ValueError) as error:
         raise ModelError(error_reason(error)) from None
-    if len(content) > MAX_BYTES:
-        raise ModelError(f"more than {MAX_BYTES // 1_000_000} MB; expected a URDF")
+    if len(content) > BOUNDS.urdf_bytes:
+        raise ModelError(f"more than {BOUNDS.urdf_bytes // 1_000_000} MB; expected a URDF")
     text = _decoded(content).lstrip()  # blank lines before <?xml, which other readers skip
     try:
         robot = _BoundedTree().read(text)
     except expat.ExpatError as error:
-        hint = f"; {RUN_XACRO}" if "xacro:" in text else ""
+        hint = f"; {_RUN_XACRO}" if "xacro:" in text else ""
         raise ModelError(f"not well-formed XML: {error}{hint}") from None
     if any(element.tag.startswith("xacro:") for element in robot.iter()):
-        raise ModelError(f"has elements of xacro; {RUN_XACRO}")
+        raise ModelError(f"has elements of xacro; {_RUN_XACRO}")
     if robot.tag != "robot":
         raise ModelError(f"found <{robot.tag[:40]}>; expected <robot>")
     return robot
@@ -65,9 +59,9 @@ def parse_urdf(path: Path) -> Element:
 def _decoded(content: bytes) -> str:
     """Return the text of an XML file: by its byte order mark, as UTF-8, or in the encoding that it declares."""
     begins = {codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16", b"<\0": "utf-16-le", b"\0<": "utf-16-be"}
-    declared = DECLARED_ENCODING.match(content)
+    declared = _DECLARED_ENCODING.match(content)
     encodings = [name for begin, name in begins.items() if content.startswith(begin)] or ["utf-8-sig"]
-    if declared and declared[1].decode().lower() not in REFUSED_ENCODINGS:
+    if declared and declared[1].decode().lower() not in _REFUSED_ENCODINGS:
         encodings.append(declared[1].decode())
     for encoding in encodings:
         try:
@@ -104,12 +98,12 @@ class _BoundedTree:
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         self._depth += 1
         self._count += 1
-        if self._depth > MAX_DEPTH:
-            raise ModelError(f"elements nested more than {MAX_DEPTH} deep")
-        if self._count > MAX_ELEMENTS:
-            raise ModelError(f"more than {MAX_ELEMENTS} elements; expected a URDF")
+        if self._depth > BOUNDS.xml_nesting:
+            raise ModelError(f"elements nested more than {BOUNDS.xml_nesting} deep")
+        if self._count > BOUNDS.xml_elements:
+            raise ModelError(f"more than {BOUNDS.xml_elements} elements; expected a URDF")
         for key, value in attributes.items():
-            if len(value) > MAX_ATTRIBUTE_LENGTH:
+            if len(value) > BOUNDS.attribute_characters:
                 raise ModelError(f"<{tag[:40]} {key[:40]}> has {len(value)} characters; expected fewer")
         self._builder.start(tag, attributes)
 

@@ -8,19 +8,14 @@ from typing import Any
 
 from dhkit.description import Array
 from dhkit.execution.process import WAITING_FACTOR, Failure, ProgramError
+from dhkit.programs.bounds import BOUNDS
 from dhkit.programs.program import Program
 
 LENGTH_UNITS = {"mm": 1e3, "cm": 1e2, "inches": 1 / 0.0254}
 """Units of length that programs may use in place of metres, and how many a metre has."""
 POSE_TOLERANCE = 1e-6
 """Largest difference of poses that agree: entries of rotations, and positions as shares of the arm's reach."""
-MAX_DETAILS = 5
-"""Most kinds of failures that a report lists."""
-MAX_FATAL_FAILURES = 3
-"""Failures in a row that end a program, after which it is not called again."""
-MAX_TIME = 600.0
-"""Largest processor time of all calls of a function together, s; on the clock it may be four times as long."""
-FATAL = {Failure.LATE, Failure.MEMORY, Failure.PROCESSES, Failure.FILES, Failure.ENDED, Failure.GARBAGE}
+_FATAL = {Failure.LATE, Failure.MEMORY, Failure.PROCESSES, Failure.FILES, Failure.ENDED, Failure.GARBAGE}
 
 
 class Caller:
@@ -50,18 +45,18 @@ class Caller:
         ProgramError
             The call failed, or too many calls have failed.
         """
-        if self._fatal >= MAX_FATAL_FAILURES:
+        if self._fatal >= BOUNDS.fatal_failures:
             raise ProgramError("not called any more", Failure.ENDED)
         processor = self.program.processor_time - self._processor_begun
-        if processor > MAX_TIME or time.perf_counter() - self._begun > WAITING_FACTOR * MAX_TIME:
-            self.failures[f"scoring took longer than {MAX_TIME:g} s: not called any more"] = 1
+        if processor > BOUNDS.time or time.perf_counter() - self._begun > WAITING_FACTOR * BOUNDS.time:
+            self.failures[f"scoring took longer than {BOUNDS.time:g} s: not called any more"] = 1
             raise ProgramError("not called any more", Failure.LATE)
         begin = time.perf_counter()
         try:
             value: Array = getattr(self.program, self.function)(*arguments)
         except ProgramError as error:
             self.failures[str(error)] += 1
-            self._fatal = self._fatal + 1 if error.failure in FATAL else 0
+            self._fatal = self._fatal + 1 if error.failure in _FATAL else 0
             raise
         self._fatal = 0
         self.seconds.append(time.perf_counter() - begin)
@@ -71,5 +66,5 @@ class Caller:
         """Return the failures as text, the most frequent first."""
         return tuple(
             f"{text} ({count} {'time' if count == 1 else 'times'})"
-            for text, count in self.failures.most_common(MAX_DETAILS)
+            for text, count in self.failures.most_common(BOUNDS.listed_failures)
         )

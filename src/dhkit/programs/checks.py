@@ -12,18 +12,19 @@ from dhkit.description import Array, Robot, description_of
 from dhkit.display import listed
 from dhkit.errors import AnswerError, DhkitError
 from dhkit.execution.process import ProgramError
-from dhkit.programs.caller import LENGTH_UNITS, MAX_DETAILS, POSE_TOLERANCE, Caller
+from dhkit.programs.bounds import BOUNDS
+from dhkit.programs.caller import LENGTH_UNITS, POSE_TOLERANCE, Caller
 from dhkit.programs.inverse import score_inverse
 from dhkit.programs.program import Program
 from dhkit.programs.random_poses import random_states
 from dhkit.programs.report import CheckReport, Part, share_within
 from dhkit.programs.rubric import CheckRubric, ControllerTask
 
-MAX_ROUNDING = 2e-3
+_MAX_ROUNDING = 2e-3
 """Largest difference of poses that may come from rounded numbers."""
-SAME_STATE = 1e-6
+_SAME_STATE = 1e-6
 """Largest difference of joint values, rad and m, of configurations that are the same."""
-MAX_MOTION = 0.5
+_MAX_MOTION = 0.5
 """Farthest that joints move, rad and shares of the reach, where both configurations of a task are the same."""
 
 
@@ -131,10 +132,10 @@ def _pose_hint(poses: Array, error: float) -> tuple[str, ...]:
         return ("it gives the same pose for every q",)
     if np.abs(poses[:, 3] - [0, 0, 0, 1]).max() > POSE_TOLERANCE:
         return ("its last row is not 0 0 0 1",)
-    if error < MAX_ROUNDING:
+    if error < _MAX_ROUNDING:
         return (f"it differs by {error:.1g} at most: are its numbers rounded? {POSE_TOLERANCE:g} is allowed",)
     skew = float(np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max())
-    if skew > MAX_ROUNDING or np.any(np.linalg.det(R) < 0):
+    if skew > _MAX_ROUNDING or np.any(np.linalg.det(R) < 0):
         return (f"its upper left 3 x 3 part is no rotation: R^T R differs from 1 by {skew:.2g}; look at signs in A_i",)
     return ()
 
@@ -189,7 +190,9 @@ def _score_controller(
     try:
         result = arm.simulate(call, motion, rate=task.rate, plant=plant)
     except DhkitError as error:
-        yield Part("follows", 0.0, most, "the run failed", (*call.failure_texts(), str(error))[:MAX_DETAILS])
+        yield Part(
+            "follows", 0.0, most, "the run failed", (*call.failure_texts(), str(error))[: BOUNDS.listed_failures]
+        )
         return
     errors = np.abs(result.q - result.reference_q)
     peak = float(errors.max())
@@ -210,9 +213,9 @@ def _ends(arm: Arm, start: str, goal: str) -> tuple[Array, Array]:
         if name not in known:
             raise AnswerError(f"controller.{key}: {arm.name} has no configuration {name!r}; it has {', '.join(known)}")
     first, second = known[start], known[goal]
-    if np.abs(second - first).max() > SAME_STATE:
+    if np.abs(second - first).max() > _SAME_STATE:
         return first, second
     numbers = arm.description.numbers
     room = np.where(numbers.upper - first >= first - numbers.lower, numbers.upper - first, numbers.lower - first)
-    distance = np.where(numbers.prismatic, MAX_MOTION * (arm.description.reach or 1.0), MAX_MOTION)
+    distance = np.where(numbers.prismatic, _MAX_MOTION * (arm.description.reach or 1.0), _MAX_MOTION)
     return first, first + np.clip(room / 2, -distance, distance)

@@ -13,22 +13,21 @@ from dhkit.description import Array
 from dhkit.display import listed
 from dhkit.execution.process import ProgramError
 from dhkit.kinematics import classify
-from dhkit.programs.caller import LENGTH_UNITS, MAX_DETAILS, POSE_TOLERANCE, Caller
+from dhkit.programs.bounds import BOUNDS
+from dhkit.programs.caller import LENGTH_UNITS, POSE_TOLERANCE, Caller
 from dhkit.programs.random_poses import poses_out_of_reach, random_states, regular_states, singular_states
 from dhkit.programs.report import Part, share_within
 from dhkit.programs.rubric import CheckRubric
 
-SAME_SOLUTION = 1e-5
+_SAME_SOLUTION = 1e-5
 """Largest difference of joint values, rad and m, of one solution; near singular poses they are less exact."""
-MIN_SINGULAR_POSES = 10
+_MIN_SINGULAR_POSES = 10
 """Smallest number of singular poses, or the number of samples if that is smaller."""
-MAX_JOINT_VALUE = 1e6
-"""Largest joint value of a solution, rad and m."""
-RANK_TOLERANCE = 1e-9
+_RANK_TOLERANCE = 1e-9
 """Largest singular value of a Jacobian, m, that counts as zero."""
-UNIT_POSES = 3
+_UNIT_POSES = 3
 """Number of poses that a program is given in other units of length."""
-OUT_OF_REACH_SHARE = 0.1
+_OUT_OF_REACH_SHARE = 0.1
 """Number of poses out of reach over that of regular poses."""
 SOLUTION_ORDERS = {
     "elbow_wrist": (0, 2, 1),
@@ -46,13 +45,13 @@ def score_inverse(
     """Score solutions of random poses: regular and singular ones, and some out of reach."""
     points = rubric.points("ik")
     has_closed_form = classify(arm.description).fit is not None
-    singular = singular_states(arm, rng, max(min(samples, MIN_SINGULAR_POSES), samples // 10))
+    singular = singular_states(arm, rng, max(min(samples, _MIN_SINGULAR_POSES), samples // 10))
     # Points of parts that this arm does not have are added to those of "closes".
     spare = (0.0 if has_closed_form else points["branches"]) + (0.0 if len(singular) else points["singular"])
-    judge = PoseJudge(arm, call, has_closed_form)
+    judge = _PoseJudge(arm, call, has_closed_form)
     regular = [judge.solve(T) for T in arm.fk(regular_states(arm, rng, samples))]
     seconds = np.median(call.seconds) if call.seconds else np.inf
-    unreachable = poses_out_of_reach(arm, rng, max(1, round(OUT_OF_REACH_SHARE * samples)))
+    unreachable = poses_out_of_reach(arm, rng, max(1, round(_OUT_OF_REACH_SHARE * samples)))
     empty = [judge.returns_nothing(T) for T in unreachable]  # none where an unlimited slide reaches everything
     right = [pose.is_right for pose in regular]
     # A program that returns nothing for any pose has not recognised those out of reach.
@@ -61,7 +60,7 @@ def score_inverse(
     text += f"{sum(empty)} of {len(empty)} out of reach are empty" if len(empty) else "none is out of reach"
     worth = points["closes"] + spare
     if not any(right):
-        judge.try_units(arm.fk(regular_states(arm, rng, UNIT_POSES)))
+        judge.try_units(arm.fk(regular_states(arm, rng, _UNIT_POSES)))
     yield Part("closes", worth * share, worth, text, judge.details())
     if has_closed_form:
         yield _branches_part(regular, points["branches"])
@@ -77,7 +76,7 @@ def score_inverse(
 
 
 @dataclass(frozen=True)
-class SolvedPose:
+class _SolvedPose:
     """The judgement of a program's solutions of one pose.
 
     Attributes
@@ -93,7 +92,7 @@ class SolvedPose:
     missing: tuple[str, ...] = ()
 
 
-class PoseJudge:
+class _PoseJudge:
     """Judges a program's solutions pose by pose, and counts its errors.
 
     Parameters
@@ -112,7 +111,7 @@ class PoseJudge:
         self._prismatic = arm.description.numbers.prismatic
         fit = self._classification.fit
         q = random_states(arm, np.random.default_rng(0), 1)[0]
-        position_decides = np.linalg.matrix_rank(arm.jacobian(q)[:3], RANK_TOLERANCE) == arm.n
+        position_decides = np.linalg.matrix_rank(arm.jacobian(q)[:3], _RANK_TOLERANCE) == arm.n
         self._position_only = fit is not None and set(fit.coordinates) <= {"x", "y", "z"} and bool(position_decides)
         """Whether solutions must meet the position alone, which decides all joints; otherwise the whole pose."""
         self._errors: Counter[str] = Counter()
@@ -121,7 +120,7 @@ class PoseJudge:
         self._unsolved = 0
         """Poses in reach without a solution."""
 
-    def solve(self, T: Array) -> SolvedPose:
+    def solve(self, T: Array) -> _SolvedPose:
         """Judge the program's solutions of a pose in reach, shape (4, 4), m, world."""
         solutions, is_complete = self._solutions(T)
         truth = self.arm.ik(T) if self.has_closed_form else None
@@ -129,16 +128,16 @@ class PoseJudge:
         names = [] if truth is None else [name for name, v in zip(truth.branches, truth.valid, strict=True) if v]
         if solutions is None or not len(solutions):
             self._unsolved += solutions is not None
-            return SolvedPose(False, missing=tuple(names))
+            return _SolvedPose(False, missing=tuple(names))
         errors = [self._pose_error(q, T) for q in solutions]
-        found = [any(self._difference(q, row).max() < SAME_SOLUTION for q in solutions) for row in true_q]
+        found = [any(self._difference(q, row).max() < _SAME_SOLUTION for q in solutions) for row in true_q]
         if max(errors) >= POSE_TOLERANCE:
             worst = solutions[int(np.argmax(errors))]
             self._errors[self._diagnosis(worst, T, true_q)] += 1
             if not self._example:
                 pose = f"; fk of {listed(true_q[0])} is the pose" if len(true_q) else ""
                 self._example = f"for example {listed(worst)} was returned{pose}"
-        return SolvedPose(
+        return _SolvedPose(
             max(errors) < POSE_TOLERANCE and is_complete,
             tuple(name for name, is_found in zip(names, found, strict=True) if is_found),
             tuple(name for name, is_found in zip(names, found, strict=True) if not is_found),
@@ -169,7 +168,7 @@ class PoseJudge:
 
     def details(self) -> tuple[str, ...]:
         """Return the program's errors, the most frequent first, and an example."""
-        errors = [f"{text} ({count} poses)" for text, count in self._errors.most_common(MAX_DETAILS)]
+        errors = [f"{text} ({count} poses)" for text, count in self._errors.most_common(BOUNDS.listed_failures)]
         unsolved = [f"no solution for {self._unsolved} poses that are in reach"] if self._unsolved else []
         return (*self.call.failure_texts(), *errors, *unsolved, *([self._example] if self._example else []))
 
@@ -179,9 +178,9 @@ class PoseJudge:
             rows = self.call(T, self.arm.n)
         except ProgramError:
             return None, True
-        finite = np.isfinite(rows).all(axis=1) & (np.abs(rows) < MAX_JOINT_VALUE).all(axis=1)
+        finite = np.isfinite(rows).all(axis=1) & (np.abs(rows) < BOUNDS.joint_value).all(axis=1)
         if not finite.all():
-            found = f"NaN, infinity or a value above {MAX_JOINT_VALUE:.0e} was returned"
+            found = f"NaN, infinity or a value above {BOUNDS.joint_value:.0e} was returned"
             self._errors[f"{found}; expected no row where there is no solution"] += 1
         return rows[finite], bool(finite.all())
 
@@ -204,14 +203,14 @@ class PoseJudge:
         family_order = SOLUTION_ORDERS.get(self._classification.name, ())
         order = [*family_order, *(i for i in range(self.arm.n) if i not in family_order)]
         differences = np.array([self._difference(q, row) for row in true_q])[:, order]
-        first = [int(np.argmax(row > SAME_SOLUTION)) for row in differences]
+        first = [int(np.argmax(row > _SAME_SOLUTION)) for row in differences]
         # The branch that the solution agrees with for the most joints, and of those the nearest.
         best = max(range(len(differences)), key=lambda k: (first[k], -float(differences[k].sum())))
         joint = order[first[best]]
         return f"joint {joint + 1} ({self.arm.description.joints[joint].name}) is wrong first"
 
 
-def _branches_part(regular: Sequence[SolvedPose], most: float) -> Part:
+def _branches_part(regular: Sequence[_SolvedPose], most: float) -> Part:
     """Return the part for the share of branches that are found, with the branches that never are."""
     found = Counter(name for pose in regular for name in pose.branches)
     missing = Counter(name for pose in regular for name in pose.missing)

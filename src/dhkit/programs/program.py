@@ -15,14 +15,13 @@ from dhkit.display import repr_line
 from dhkit.execution.child import FUNCTION_RUNNERS, Child
 from dhkit.execution.isolation import Isolation, find_isolation
 from dhkit.execution.process import Failure, Limits, ProgramError
+from dhkit.programs.bounds import BOUNDS
 
 if TYPE_CHECKING:
     from dhkit.control import Setpoint
 
 FUNCTIONS = ("fk", "ik", "controller")
 """Functions that a program may define."""
-MAX_SOLUTIONS = 64
-"""Most solutions of a pose: no arm of six joints has more than 16."""
 
 
 class Program:
@@ -120,9 +119,9 @@ class Program:
         rows = _numbers("ik", self.call("ik", T=T.tolist()))
         if rows.size and (rows.ndim > 2 or rows.shape[-1] != n):
             raise ProgramError(f"ik returned shape {rows.shape}; expected ({n},), or (B, {n})", Failure.RAISED)
-        if rows.size > MAX_SOLUTIONS * n:
+        if rows.size > BOUNDS.solutions * n:
             raise ProgramError(
-                f"ik returned {rows.size // n} solutions; expected at most {MAX_SOLUTIONS}", Failure.RAISED
+                f"ik returned {rows.size // n} solutions; expected at most {BOUNDS.solutions}", Failure.RAISED
             )
         return rows.reshape(-1, n)
 

@@ -10,11 +10,11 @@ from dhkit.arm import Arm
 from dhkit.description import Array
 from dhkit.kinematics import singular_values
 
-MIN_REGULAR_RATIO = 1e-2
+_MIN_REGULAR_RATIO = 1e-2
 """Smallest over largest singular value of the Jacobian, above which a state is regular."""
-MAX_SINGULAR_RATIO = 1e-9
+_MAX_SINGULAR_RATIO = 1e-9
 """The same ratio, below which a state is singular."""
-TRIES = 50
+_TRIES = 50
 """Random states that are tried for each regular one."""
 
 
@@ -35,8 +35,8 @@ def _singular_value_ratio(arm: Arm, q: Array) -> float:
 
 def regular_states(arm: Arm, rng: np.random.Generator, count: int) -> Array:
     """Return random joint values inside the limits, away from singular ones, shape (count, n), rad and m."""
-    states = random_states(arm, rng, TRIES * count)
-    regular = list(islice((q for q in states if _singular_value_ratio(arm, q) > MIN_REGULAR_RATIO), count))
+    states = random_states(arm, rng, _TRIES * count)
+    regular = list(islice((q for q in states if _singular_value_ratio(arm, q) > _MIN_REGULAR_RATIO), count))
     return np.array(regular) if regular else random_states(arm, rng, count)
 
 
@@ -70,7 +70,7 @@ def singular_states(arm: Arm, rng: np.random.Generator, count: int) -> Array:
         if roots:
             k = roots[int(rng.integers(len(roots)))]
             q[i] = brentq(determinant, grid[k], grid[k + 1], xtol=1e-15)
-            if _singular_value_ratio(arm, q) < MAX_SINGULAR_RATIO:
+            if _singular_value_ratio(arm, q) < _MAX_SINGULAR_RATIO:
                 found.append(q)
     return np.array(found).reshape(-1, arm.n)
 

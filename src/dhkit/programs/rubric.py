@@ -12,14 +12,14 @@ from dhkit.description.files import read_bounded
 from dhkit.description.toml_text import plain_numbers, toml_document
 from dhkit.display import repr_line, value_line
 from dhkit.errors import AnswerError, DescriptionError
+from dhkit.programs.bounds import BOUNDS
 
-MAX_BYTES = 100_000
-STRICT = ConfigDict(extra="forbid")
+_STRICT = ConfigDict(extra="forbid")
 Points = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, le=1e6, allow_inf_nan=False)]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=_STRICT)
 class ForwardPoints:
     """Points of ``fk``: those of poses that agree."""
 
@@ -28,7 +28,7 @@ class ForwardPoints:
     __repr__ = value_line
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=_STRICT)
 class InversePoints:
     """Points of ``ik``.
 
@@ -55,7 +55,7 @@ class InversePoints:
     __repr__ = value_line
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=_STRICT)
 class ControllerTask:
     """The task of ``controller``: a quintic motion between two configurations of the arm.
 
@@ -86,7 +86,7 @@ class ControllerTask:
     __repr__ = value_line
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=_STRICT)
 class CheckRubric:
     """The points of a program: those of the functions that a file names, or of those that the program has."""
 
@@ -106,7 +106,7 @@ class CheckRubric:
             The file cannot be read, or is no rubric.
         """
         try:
-            data = plain_numbers(toml_document(read_bounded(path, MAX_BYTES, "a rubric").decode()))
+            data = plain_numbers(toml_document(read_bounded(path, BOUNDS.rubric_bytes, "a rubric").decode()))
         except (DescriptionError, UnicodeDecodeError) as error:
             raise AnswerError(f"{path}: {error}" if isinstance(error, UnicodeDecodeError) else str(error)) from None
         return cls.from_dict(data, f"{path}: ")

@@ -22,7 +22,7 @@ from dhkit.symbolic.textbook_kinematics import TextbookKinematics, derive_kinema
 if TYPE_CHECKING:
     from dhkit.symbolic.inverse import InverseDerivation
 
-LANGUAGES = ("python", "c", "matlab")
+_LANGUAGES = ("python", "c", "matlab")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -187,8 +187,8 @@ class SymbolicKinematics:
         ValueError
             Another language, or no such quantity.
         """
-        if language not in LANGUAGES:
-            raise ValueError(f"language is {language!r}; expected one of {', '.join(LANGUAGES)}")
+        if language not in _LANGUAGES:
+            raise ValueError(f"language is {language!r}; expected one of {', '.join(_LANGUAGES)}")
         return str(format_function(f"equations_{language}")(self, format_function("kinematic_quantities")(self, what)))
 
     def __str__(self) -> str:

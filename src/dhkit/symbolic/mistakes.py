@@ -13,7 +13,7 @@ from fractions import Fraction
 
 from dhkit.display import repr_line, value_line
 
-HALF = Fraction(1, 2)
+_HALF = Fraction(1, 2)
 
 
 class Subject(Enum):
@@ -112,14 +112,14 @@ def catalogue(*groups: Iterable[Mistake]) -> dict[str, Mistake]:
     return found
 
 
-POTENTIAL = "Look again at the potential energy: which way does it grow, and of which point is the height?"
-COM_VELOCITY = "Look again at the velocity of the centre of mass: differentiate its position."
-ANGULAR_VELOCITY = "Look again at the angular velocity: which joints turn this link?"
-INERTIA = "Look again at the inertia: of which body, about which point, and about which axes?"
-KINETIC_FACTORS = "Look again at the factors in the kinetic energy."
-DRIVES = "Look again at the drives: how fast does the rotor turn when the joint does?"
-RATE_TERMS = "Look again at the terms with rates: d/dt of dK/dqd, less dK/dq."
-MASSES = "Look again at the masses: which body moves with which joint?"
+_POTENTIAL = "Look again at the potential energy: which way does it grow, and of which point is the height?"
+_COM_VELOCITY = "Look again at the velocity of the centre of mass: differentiate its position."
+_ANGULAR_VELOCITY = "Look again at the angular velocity: which joints turn this link?"
+_INERTIA = "Look again at the inertia: of which body, about which point, and about which axes?"
+_KINETIC_FACTORS = "Look again at the factors in the kinetic energy."
+_DRIVES = "Look again at the drives: how fast does the rotor turn when the joint does?"
+_RATE_TERMS = "Look again at the terms with rates: d/dt of dK/dqd, less dK/dq."
+_MASSES = "Look again at the masses: which body moves with which joint?"
 
 
 def _energy(hint: str, **sentences: str) -> list[Mistake]:
@@ -132,21 +132,21 @@ def _equation(hint: str, **sentences: str) -> list[Mistake]:
 
 MISTAKES: Mapping[str, Mistake] = catalogue(
     _energy(
-        POTENTIAL,
+        _POTENTIAL,
         gravity_sign="gravity has the wrong sign: V falls where it should rise",
         gravity_forgotten="gravity is missing: V is zero",
     ),
-    _energy(MASSES, mass_forgotten="the link's mass is missing"),
-    _energy(INERTIA, inertia_forgotten="the link's inertia about its centre of mass is missing"),
+    _energy(_MASSES, mass_forgotten="the link's mass is missing"),
+    _energy(_INERTIA, inertia_forgotten="the link's inertia about its centre of mass is missing"),
     _energy(
-        POTENTIAL,
+        _POTENTIAL,
         height_at_joint="the height is that of the joint in place of the centre of mass",
         height_at_end="the height is that of the link's end in place of the centre of mass",
         height_relative_angle="the height uses the joint's own angle in place of the sum of the angles up to it",
         height_forgotten="the link's potential energy is missing",
     ),
     _energy(
-        COM_VELOCITY,
+        _COM_VELOCITY,
         com_at_end="the centre of mass is taken at the link's end, where its frame is",
         velocity_at_joint="the velocity is that of the joint in place of the centre of mass: no parallel-axis term",
         velocity_cross_term="the square of the velocity lacks the cross term 2 v.(omega x r)",
@@ -155,13 +155,13 @@ MISTAKES: Mapping[str, Mistake] = catalogue(
         com_rotation_transposed="the link's rotation is transposed where its centre of mass is placed",
     ),
     _energy(
-        ANGULAR_VELOCITY,
+        _ANGULAR_VELOCITY,
         omega_relative="the angular velocity is that of the joint alone, without the joints before it",
         omega_unturned="the angular velocity is not turned by the joints' angles into the link's axes, about which its "
         "inertia is given",
     ),
     _energy(
-        INERTIA,
+        _INERTIA,
         inertia_doubled="the link's inertia about its centre of mass counts twice",
         inertia_about_joint="the inertia about the joint is used as if it were about the centre of mass: Steiner twice",
         inertia_about_com_at_joint=(
@@ -170,20 +170,20 @@ MISTAKES: Mapping[str, Mistake] = catalogue(
         inertia_axes="the inertia's moments are exchanged in turn: taken about the wrong axes",
     ),
     _energy(
-        KINETIC_FACTORS,
+        _KINETIC_FACTORS,
         half_forgotten="the kinetic energy lacks its factor 1/2",
         half_squared="the kinetic energy has the factor 1/4 in place of 1/2",
         translation_half_forgotten="the energy of translation lacks its factor 1/2",
         rotation_half_forgotten="the energy of rotation lacks its factor 1/2",
     ),
     _energy(
-        DRIVES,
+        _DRIVES,
         rotor_forgotten="the rotor's inertia is missing",
         rotor_gear="the rotor's inertia is multiplied by the gear ratio in place of its square",
         rotor_without_gear="the rotor's inertia is taken without the gear: the rotor turns N times per joint turn",
     ),
     _energy(
-        POTENTIAL,
+        _POTENTIAL,
         gravity_axis="gravity acts along the wrong axis: that along x is taken along y, y along z, z along x",
         gravity_axis_back="gravity acts along the wrong axis: that along x is taken along z, z along y, y along x",
     ),
@@ -192,7 +192,7 @@ MISTAKES: Mapping[str, Mistake] = catalogue(
         potential_gradient_sign="dV/dq has the wrong sign in Euler and Lagrange's equation",
     ),
     _equation(
-        RATE_TERMS,
+        _RATE_TERMS,
         mass_rate_omitted="d/dt dK/dqd lacks dM/dt qd: M was taken for constant",
         mass_rate_halved="d/dt dK/dqd - dK/dq is replaced by half of dM/dt qd",
         kinetic_gradient_omitted="dK/dq is missing from Euler and Lagrange's equation",
@@ -216,24 +216,24 @@ MISTAKES: Mapping[str, Mistake] = catalogue(
 
 VELOCITY_FACTORS = {
     "coriolis_missing": (False, Fraction(0)),
-    "coriolis_halved": (False, HALF),
+    "coriolis_halved": (False, _HALF),
     "coriolis_doubled": (False, Fraction(2)),
     "coriolis_sign": (False, Fraction(-1)),
     "centrifugal_missing": (True, Fraction(0)),
     "centrifugal_sign": (True, Fraction(-1)),
-    "centrifugal_halved": (True, HALF),
+    "centrifugal_halved": (True, _HALF),
     "centrifugal_doubled": (True, Fraction(2)),
 }
 """Whether the mistake changes squares of rates (else products of two rates), and the factor that it applies."""
 
 STEP_FACTORS = {
     "mass_rate_omitted": (Fraction(0), Fraction(1)),
-    "mass_rate_halved": (HALF, Fraction(0)),
+    "mass_rate_halved": (_HALF, Fraction(0)),
     "kinetic_gradient_omitted": (Fraction(1), Fraction(0)),
     "kinetic_gradient_sign": (Fraction(1), Fraction(-1)),
     "christoffel_indices": (Fraction(0), Fraction(-1)),
     "velocity_torques_doubled": (Fraction(2), Fraction(2)),
-    "velocity_torques_halved": (HALF, HALF),
+    "velocity_torques_halved": (_HALF, _HALF),
 }
 """Factors of dM/dt qd and of dK/dq in the Euler-Lagrange equation."""
 

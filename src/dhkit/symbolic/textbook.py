@@ -25,7 +25,7 @@ from dhkit.symbolic.mistakes import LINK_MISTAKES, STEP_FACTORS, VELOCITY_FACTOR
 from dhkit.symbolic.ring import Element, Elements, Ring, translated
 from dhkit.symbolic.ring.elements import PolynomialRing
 
-HALF = Fraction(1, 2)
+_HALF = Fraction(1, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ class TextbookDerivation:
                 ratio = gear if self._has("rotor_gear", i) else gear * gear
                 if self._has("rotor_without_gear", i):
                     ratio = arm.ring.one
-                energies.append(rotor * ratio * arm.ring.rate(i) * arm.ring.rate(i) * HALF)
+                energies.append(rotor * ratio * arm.ring.rate(i) * arm.ring.rate(i) * _HALF)
         energies += [inertia * arm.ring.rate(i) * arm.ring.rate(j) for i, j, inertia in arm.couplings]
         return arm.ring.sum(energies)
 
@@ -397,7 +397,7 @@ class _MovingBody:
 
     def kinetic(self, velocity: Elements, omega: Elements) -> Element:
         """Return m v^2 / 2 + omega^T I omega / 2."""
-        factor = Fraction(1) if self.has("half_forgotten") else HALF * HALF if self.has("half_squared") else HALF
+        factor = Fraction(1) if self.has("half_forgotten") else _HALF * _HALF if self.has("half_squared") else _HALF
         square = velocity @ velocity
         if self.has("velocity_cross_term") or self.has("inertia_about_com_at_joint"):
             own = self.at.R.T @ np.array([x.by_time() for x in self.joint], dtype=object)

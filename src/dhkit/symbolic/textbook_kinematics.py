@@ -23,11 +23,13 @@ from dhkit.symbolic.mistakes import MadeAt, Mistake, Subject, catalogue, check_m
 from dhkit.symbolic.ring import Direction, Elements, RingError
 
 ROW = "Look again at this row: which axis does it turn about, and which lengths lie along which axis?"
-ZERO_POSE = "Look again at where each joint's angle is zero: draw the arm with all joint values zero."
+_ZERO_POSE = "Look again at where each joint's angle is zero: draw the arm with all joint values zero."
 ORDER = "Look again at the order of rotations and translations inside A_i."
-ENDS = "Look again at the product of the transforms: where does it begin, where does it end, and which way does it run?"
+_ENDS = (
+    "Look again at the product of the transforms: where does it begin, where does it end, and which way does it run?"
+)
 COLUMNS = "Look again at the Jacobian's columns: the joint's axis, and the lever from the joint to the tool."
-AXES = "Look again at which axes and which point the Jacobian is for."
+_AXES = "Look again at which axes and which point the Jacobian is for."
 
 
 def _mistakes(subject: Subject, hint: str, **sentences: str) -> list[Mistake]:
@@ -48,7 +50,7 @@ LINK_MISTAKES: Mapping[str, Mistake] = catalogue(
     ),
     _mistakes(
         Subject.TABLE,
-        ZERO_POSE,
+        _ZERO_POSE,
         theta_offset_forgotten="theta lacks its constant offset: at joint value 0 the x axes are not aligned",
         theta_offset_sign="theta's constant offset has the wrong sign",
         theta_sign="theta has the wrong sign: the joint turns the wrong way round",
@@ -71,7 +73,7 @@ LINK_MISTAKES: Mapping[str, Mistake] = catalogue(
 POSE_MISTAKES: Mapping[str, Mistake] = catalogue(
     _mistakes(
         Subject.TRANSFORM,
-        ENDS,
+        _ENDS,
         convention_exchanged="the table's numbers are put into the A_i of the other convention (standard, modified)",
         product_reversed="the product runs the wrong way: A_n ... A_1 in place of A_1 ... A_n",
         tool_forgotten="the tool's transform is missing: the product ends at frame n",
@@ -86,7 +88,7 @@ POSE_MISTAKES: Mapping[str, Mistake] = catalogue(
 JACOBIAN_MISTAKES: Mapping[str, Mistake] = catalogue(
     _mistakes(
         Subject.JACOBIAN,
-        AXES,
+        _AXES,
         jacobian_x_y_exchanged="the rows of the velocities along x and y are exchanged",
         jacobian_halves_exchanged="angular rows stand above linear ones: here the linear velocity comes first",
         point_frame_n="the linear velocity is that of frame n's origin in place of the tool's",

@@ -13,12 +13,11 @@ from numpy.lib import format as npy
 
 from dhkit.description import mat_files
 from dhkit.errors import DescriptionError
+from dhkit.trajectories.bounds import BOUNDS
 from dhkit.trajectories.labels import TEXTS, FileKind
 
 ARCHIVES = (".npz", ".mat")
-MAX_FORMAT_BYTES = 1_000
-"""Largest size of the text ``format``, bytes."""
-SAVED = "expected one that dhkit saved"
+_SAVED = "expected one that dhkit saved"
 
 
 def archive_bytes(suffix: str, values: Mapping[str, Any]) -> bytes:
@@ -36,7 +35,7 @@ def read_archive(suffix: str, content: bytes, kind: FileKind) -> dict[str, Any]:
     DescriptionError
         Not such an archive; says what was found.
     """
-    return _read_npz(content, kind) if suffix == ".npz" else read_mat(content, kind)
+    return _read_npz(content, kind) if suffix == ".npz" else _read_mat(content, kind)
 
 
 def archive_format(suffix: str, content: bytes, most: int) -> str:
@@ -55,13 +54,13 @@ def archive_format(suffix: str, content: bytes, most: int) -> str:
         A damaged ``.mat`` file.
     """
     if suffix == ".mat":
-        variable = mat_files.read_mat(content, most, advice=SAVED).get("format")
+        variable = mat_files.read_mat(content, most, advice=_SAVED).get("format")
         value = variable.value if variable is not None else None
         return value if isinstance(value, str) else ""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             info = archive.getinfo("format.npy")
-            return str(_npy(archive.read(info), "format")) if info.file_size <= MAX_FORMAT_BYTES else ""
+            return str(_npy(archive.read(info), "format")) if info.file_size <= BOUNDS.format_bytes else ""
     except (KeyError, zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError, ValueError, DescriptionError):
         return ""
 
@@ -118,9 +117,9 @@ def _npy(data: bytes, key: str) -> Any:
     return np.frombuffer(rest, dtype).reshape(shape, order="F" if fortran else "C").astype(float)
 
 
-def read_mat(content: bytes, kind: FileKind) -> dict[str, Any]:
+def _read_mat(content: bytes, kind: FileKind) -> dict[str, Any]:
     """Return texts and arrays by name, as :func:`_read_npz`."""
-    variables = mat_files.read_mat(content, kind.most, advice=SAVED)
+    variables = mat_files.read_mat(content, kind.most, advice=_SAVED)
     _require_keys(variables, kind)
     keys = (*TEXTS, *kind.arrays, *(key for key in kind.optional if key in variables))
     found = {key: variables[key].value for key in keys}

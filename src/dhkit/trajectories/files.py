@@ -17,6 +17,7 @@ from dhkit.description.joint_text import degrees_hint, joint_text
 from dhkit.errors import DescriptionError
 from dhkit.symbolic import Friction
 from dhkit.trajectories.archives import ARCHIVES, archive_bytes, archive_format, read_archive
+from dhkit.trajectories.bounds import BOUNDS
 from dhkit.trajectories.labels import FileKind, checked_suffix, decoded
 from dhkit.trajectories.matlab_samples import MATRICES, matlab_table
 from dhkit.trajectories.ros_yaml import MESSAGE, POINT, ROWS, TIMES, parse_message, trajectory_text
@@ -26,7 +27,7 @@ from dhkit.trajectories.trajectory import Trajectory
 log = logging.getLogger(__name__)
 
 TABLES = (".csv", ".yaml", ".yml")
-SAMPLES = (*TABLES, ".mat")
+_SAMPLES = (*TABLES, ".mat")
 """Suffixes of files with samples from other programs."""
 TRAJECTORY = FileKind(
     "trajectory",
@@ -35,25 +36,21 @@ TRAJECTORY = FileKind(
     optional=("payload", "friction"),
     otherwise="; Trajectory.read takes samples from elsewhere, the command files without dhkit's first line",
 )
-COMMENTS_LENGTH = 2_000
+_COMMENTS_LENGTH = 2_000
 """Number of characters that hold a table's comments: label, and payload and friction as 11 numbers of 25 characters."""
-BESIDE = re.compile(r"^\s*#\s*(payload|friction)\s*:(.*)$", re.MULTILINE)
-FIRST_LINE = 200
+_BESIDE = re.compile(r"^\s*#\s*(payload|friction)\s*:(.*)$", re.MULTILINE)
+_FIRST_LINE = 200
 """Number of bytes that hold the first line of a table."""
-MAX_COEFFICIENTS = 65
-"""Largest number of coefficients of a polynomial; evaluating a motion takes time in proportion."""
-DEFAULT_RATE = 1000.0
+_DEFAULT_RATE = 1000.0
 """Samples per second if no rate is given."""
-TURNS = 3
+_TURNS = 3
 """Whole turns of a joint without limits beyond which degrees may be meant."""
-MAX_JUMP = 1e-6
+_MAX_JUMP = 1e-6
 """Largest jump of joint values, rad or m, and speeds between pieces of a motion, absolute and relative."""
-NANOSECONDS = 1_000_000_000
+_NANOSECONDS = 1_000_000_000
 """Nanoseconds per second."""
 LEFT_OUT: tuple[object, ...] = (None, "", [])
 """Values of a row that a message's point leaves out."""
-MAX_DIGITS = 20
-"""Largest number of digits of seconds or nanoseconds."""
 
 
 def save_trajectory(trajectory: Trajectory, path: str | Path, rate: float | None = None) -> Path:
@@ -88,7 +85,7 @@ def save_trajectory(trajectory: Trajectory, path: str | Path, rate: float | None
         f"{name}: {' '.join(f'{x:.17g}' for x in numbers.tolist())}"
         for name, numbers in _load_numbers(trajectory).items()
     )
-    times = trajectory.sample_times(DEFAULT_RATE if rate is None else rate)
+    times = trajectory.sample_times(_DEFAULT_RATE if rate is None else rate)
     text = (_csv if suffix == ".csv" else _yaml)(trajectory, times, comments)
     write_atomically(path, TRAJECTORY.labelled(trajectory.description, text))
     return path
@@ -142,7 +139,7 @@ def written_by_dhkit(path: str | Path) -> str:
             return archive_format(suffix, content, TRAJECTORY.most).rpartition(" ")[0]
         except DescriptionError as error:
             raise DescriptionError(f"{path}: {error}") from None
-    first = content[:FIRST_LINE].partition(b"\n")[0].decode("utf-8-sig", errors="replace").strip()
+    first = content[:_FIRST_LINE].partition(b"\n")[0].decode("utf-8-sig", errors="replace").strip()
     return first.removeprefix("# ") if first.startswith("# dhkit ") else ""
 
 
@@ -217,7 +214,7 @@ def read_samples(
     >>> read_samples("log.csv", library_robot("planar2r"), degrees=True, columns=names)  # doctest: +SKIP
     """
     path = Path(path)
-    suffix, content = TRAJECTORY.read(path, SAMPLES)
+    suffix, content = TRAJECTORY.read(path, _SAMPLES)
     names = check_columns(description, columns, MATRICES if suffix == ".mat" else ())
     if names and suffix not in (".csv", ".mat"):
         raise ValueError(f"columns is given; expected none for {suffix}, whose joint_names say which joint is which")
@@ -250,7 +247,7 @@ class _FileSamples:
         q = np.abs(self.arrays[0])
         numbers = description.numbers
         allowed = np.maximum(np.maximum(np.abs(numbers.lower), np.abs(numbers.upper)), math.tau)
-        allowed = np.where(np.isfinite(allowed), allowed, TURNS * math.tau)
+        allowed = np.where(np.isfinite(allowed), allowed, _TURNS * math.tau)
         beyond = (q > allowed) & ~numbers.prismatic
         if not beyond.any():
             return ""
@@ -266,9 +263,9 @@ class _FileSamples:
 def _from_archive(values: dict[str, Any], description: Description | None) -> Trajectory:
     robot = TRAJECTORY.robot_of_archive(values, description)
     breaks, coefficients = values["breaks"], values["coefficients"]
-    if coefficients.ndim > 1 and coefficients.shape[1] > MAX_COEFFICIENTS:
+    if coefficients.ndim > 1 and coefficients.shape[1] > BOUNDS.coefficients:
         found = f"polynomials of degree {coefficients.shape[1] - 1}"
-        raise ValueError(f"{found}; expected at most {MAX_COEFFICIENTS - 1}")
+        raise ValueError(f"{found}; expected at most {BOUNDS.coefficients - 1}")
     if robot.n == 1 and coefficients.ndim == 2:
         coefficients = coefficients[..., None]  # MATLAB drops a last axis of length 1
     if breaks.ndim == 2:
@@ -311,7 +308,7 @@ def _load(values: Mapping[str, Any]) -> dict[str, Any]:
 def _commented(text: str) -> dict[str, Array]:
     """Return the numbers of :func:`_load_numbers` that a table's comments name."""
     found: dict[str, Array] = {}
-    for name, numbers in BESIDE.findall(text[:COMMENTS_LENGTH]):
+    for name, numbers in _BESIDE.findall(text[:_COMMENTS_LENGTH]):
         if name in found:
             raise DescriptionError(f"{name} is there twice")
         try:
@@ -336,7 +333,7 @@ def _require_continuous(motion: Trajectory) -> None:
             return
         jumps = np.abs(after - before) / (1 + np.abs(before))
         k, i = np.unravel_index(int(np.argmax(jumps)), jumps.shape)
-        if jumps[k, i] > MAX_JUMP:
+        if jumps[k, i] > _MAX_JUMP:
             jump = f"jumps from {before[k, i]:.6g} to {after[k, i]:.6g} at {inner[k]:.6g} s"
             raise DescriptionError(f"joint {i + 1}: its {what} {jump}; the file is damaged")
 
@@ -349,10 +346,10 @@ def _csv(trajectory: Trajectory, times: Array, comments: tuple[str, ...]) -> str
 
 
 def _yaml(trajectory: Trajectory, times: Array, comments: tuple[str, ...]) -> str:
-    nanoseconds = [round(time * NANOSECONDS) for time in times.tolist()]
+    nanoseconds = [round(time * _NANOSECONDS) for time in times.tolist()]
     kept = [k for k, time in enumerate(nanoseconds) if not k or time > nanoseconds[k - 1]]
     nanoseconds = [nanoseconds[k] for k in kept]
-    t = np.minimum(np.array(nanoseconds) / NANOSECONDS, trajectory.duration)
+    t = np.minimum(np.array(nanoseconds) / _NANOSECONDS, trajectory.duration)
     names = tuple(joint.name for joint in trajectory.description.joints)
     return trajectory_text(names, nanoseconds, trajectory.q(t), trajectory.qd(t), trajectory.qdd(t), comments)
 
@@ -407,12 +404,12 @@ def _seconds(value: Any, k: int) -> float:
         for whole, part in TIMES:
             if whole in value and part in value:
                 # Added as integers and rounded once, so that whole nanoseconds come back unchanged.
-                return (_whole(value[whole], k) * NANOSECONDS + _whole(value[part], k)) / NANOSECONDS
+                return (_whole(value[whole], k) * _NANOSECONDS + _whole(value[part], k)) / _NANOSECONDS
     raise DescriptionError(f"points[{k}].time_from_start: expected sec and nanosec")
 
 
 def _whole(text: Any, k: int) -> int:
-    if not isinstance(text, str) or len(text) > MAX_DIGITS or not text.isascii() or not text.isdigit():
+    if not isinstance(text, str) or len(text) > BOUNDS.digits or not text.isascii() or not text.isdigit():
         raise DescriptionError(f"points[{k}].time_from_start: found {str(text)[:40]!r}; expected a whole number")
     return int(text)
 

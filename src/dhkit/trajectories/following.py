@@ -20,29 +20,29 @@ from dhkit.trajectories.pieces import Pieces
 from dhkit.trajectories.timing import configuration
 from dhkit.trajectories.tool_paths import ToolPath
 
-MAX_DEVIATION = 5e-8
+_MAX_DEVIATION = 5e-8
 """Largest deviation of the tool from its path between knots, m and rad: half of what :func:`joint_path` promises."""
-CHECKED_POINTS = 9
+_CHECKED_POINTS = 9
 """Number of points between two knots at which the deviation is checked."""
-KNOT_ERROR = 1e-12
+_KNOT_ERROR = 1e-12
 """Largest error at a knot, rad and shares of the reach; rounding leaves 1e-15."""
-NEWTON_STEPS, DAMPING = 8, 1e-13
-FIRST_STEP, MIN_STEP = 1 / 16, 1e-9
+_NEWTON_STEPS, _DAMPING = 8, 1e-13
+_FIRST_STEP, _MIN_STEP = 1 / 16, 1e-9
 """First and smallest step of s along the path."""
-MAX_SECOND_ORDER = 0.25
+_MAX_SECOND_ORDER = 0.25
 """Largest share of a step's second-order part, or of its error, in the step: near a singularity, where another branch
 is close, this share grows, and steps become short enough to stay on the branch."""
-MAX_CORRECTION = 0.02
+_MAX_CORRECTION = 0.02
 """Largest distance of a knot from its prediction, rad and shares of the reach."""
-SINGULAR = 1e-6
+_SINGULAR = 1e-6
 """A direction counts as lost where its singular value of the Jacobian, lengths over the reach, is below this."""
-NEAR_SINGULAR = 0.05
+_NEAR_SINGULAR = 0.05
 """A path that cannot be followed further has met a singularity if a singular value is below this."""
-LOOK_AHEAD = np.array([0.0, 0.01, 0.03])
+_LOOK_AHEAD = np.array([0.0, 0.01, 0.03])
 """Distances of s ahead of a point that cannot be passed at which reachability is tested, to name the cause."""
-POSE_COORDINATES = 6
-MOST_KNOTS = 4097
-LIMIT_SLACK = 1e-9
+_POSE_COORDINATES = 6
+_MOST_KNOTS = 4097
+_LIMIT_SLACK = 1e-9
 """Distance by which rounding may exceed joint limits, rad and m."""
 
 
@@ -112,10 +112,10 @@ class _Follower:
         while True:
             qs, qss = self.derivatives(s, q)
             pieces = Pieces(s, quintic_hermite(s, q, qs, qss))
-            wrong = np.flatnonzero(self._deviations(pieces) > MAX_DEVIATION)
+            wrong = np.flatnonzero(self._deviations(pieces) > _MAX_DEVIATION)
             if not len(wrong):
                 return JointPath(self.newton.description, s, pieces.coefficients)
-            if len(s) + len(wrong) > MOST_KNOTS:
+            if len(s) + len(wrong) > _MOST_KNOTS:
                 raise PlanningError(f"the joints turn ever faster {self._where(float(s[wrong[0]]), q[wrong[0]])}")
             middles = (s[wrong] + s[wrong + 1]) / 2
             found, closed = self.closed(middles, pieces(middles))
@@ -133,8 +133,8 @@ class _Follower:
         rows, units = self._rows, newton.units
         v, v_rate = (rows[:, 0] * array[:, : newton.size] for array in (self.tool.twists(s), self.tool.twist_rates(s)))
         U, sigma, Vt = np.linalg.svd(J, full_matrices=False)
-        if (sigma[:, self.rank - 1] < SINGULAR).any():
-            k = int(np.argmax(sigma[:, self.rank - 1] < SINGULAR))
+        if (sigma[:, self.rank - 1] < _SINGULAR).any():
+            k = int(np.argmax(sigma[:, self.rank - 1] < _SINGULAR))
             raise PlanningError(f"the path meets a singularity {self._where(float(s[k]), q[k])}")
         U, sigma, Vt = U[:, :, : self.rank], sigma[:, : self.rank], Vt[:, : self.rank]
         inverse = np.swapaxes(Vt, 1, 2) / sigma[:, None] @ np.swapaxes(U, 1, 2)
@@ -158,9 +158,9 @@ class _Follower:
     def closed(self, s: Array, q: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Return joint values on the path, (N, n), from nearby ones q, and whether each was reached without a jump."""
         goals = self.tool.poses(s).reshape(-1, 16)
-        found, damping = np.ascontiguousarray(q), np.full(len(s), DAMPING)
+        found, damping = np.ascontiguousarray(q), np.full(len(s), _DAMPING)
         error = self.newton.error(found, goals)
-        for _ in range(NEWTON_STEPS):
+        for _ in range(_NEWTON_STEPS):
             step = self.newton.step(found, error, damping)
             step_error = self.newton.error(step, goals)
             # Stop when rounding prevents a further improvement.
@@ -169,28 +169,28 @@ class _Follower:
                 break
             found, error = np.where(better[:, None], step, found), np.where(better[:, None], step_error, error)
         moved = np.abs((found - q) / self.newton.units).max(axis=1)
-        return found, (np.abs(error).max(axis=1) < KNOT_ERROR) & (moved < MAX_CORRECTION)
+        return found, (np.abs(error).max(axis=1) < _KNOT_ERROR) & (moved < _MAX_CORRECTION)
 
     def _follow(self, start: Array) -> tuple[Array, Array]:
         """Return knots (K,) and joint values (K, n), followed from the beginning to the end."""
-        s, q, step = [0.0], [start], FIRST_STEP
+        s, q, step = [0.0], [start], _FIRST_STEP
         while s[-1] < 1.0:
             here, at = np.array(s[-1:]), q[-1][None]
             qs, qss = self.derivatives(here, at)
             there = min(s[-1] + step, 1.0)
             h = there - s[-1]
             first, second = (h * qs)[0], (h**2 / 2 * qss)[0]
-            if self._largest(second) <= MAX_SECOND_ORDER * self._largest(first):
+            if self._largest(second) <= _MAX_SECOND_ORDER * self._largest(first):
                 expected = at + first + second
                 found, closed = self.closed(np.array([there]), expected)
                 if (
                     closed[0]
-                    and self._largest(found - expected) <= MAX_SECOND_ORDER * self._largest(first) + KNOT_ERROR
+                    and self._largest(found - expected) <= _MAX_SECOND_ORDER * self._largest(first) + _KNOT_ERROR
                 ):
-                    s, q, step = [*s, there], [*q, found[0]], min(2 * step, FIRST_STEP)
+                    s, q, step = [*s, there], [*q, found[0]], min(2 * step, _FIRST_STEP)
                     continue
             step = h / 2
-            if step < MIN_STEP:
+            if step < _MIN_STEP:
                 raise self._lost(there, q[-1])
         return np.array(s), np.array(q)
 
@@ -200,7 +200,7 @@ class _Follower:
 
     def _deviations(self, pieces: Pieces) -> Array:
         """Return the largest deviation of the tool from its path in each interval, m or rad, shape (K,)."""
-        shares = np.arange(1, CHECKED_POINTS + 1) / (CHECKED_POINTS + 1)
+        shares = np.arange(1, _CHECKED_POINTS + 1) / (_CHECKED_POINTS + 1)
         s = pieces.breaks[:-1, None] + np.diff(pieces.breaks)[:, None] * shares
         q = pieces.at(s - pieces.breaks[:-1, None]).reshape(-1, self.newton.description.n)
         error = self.newton.error(q, self.tool.poses(s.ravel()).reshape(-1, 16))
@@ -212,10 +212,10 @@ class _Follower:
         """Return the error that explains why the path ends at joint values near s."""
         position_only = self.newton.size == 3
         if self._reached(s, q, position_only=position_only):
-            near = np.linalg.svd(self._jacobian(q[None]), compute_uv=False)[0, self.rank - 1] < NEAR_SINGULAR
+            near = np.linalg.svd(self._jacobian(q[None]), compute_uv=False)[0, self.rank - 1] < _NEAR_SINGULAR
             met = "the path meets a singularity" if near else "the branch of joint values ends"
             why = f"{met}, and only a jump leads on,"
-        elif not position_only and self.rank < POSE_COORDINATES and self._reached(s, q, position_only=True):
+        elif not position_only and self.rank < _POSE_COORDINATES and self._reached(s, q, position_only=True):
             why = "the arm cannot turn its tool as the path asks"
         else:
             why = "the path leaves the workspace"
@@ -223,7 +223,7 @@ class _Follower:
 
     def _reached(self, s: float, q: Array, *, position_only: bool) -> bool:
         """Return whether a few poses ahead of s are within reach."""
-        T = self.tool.poses(np.minimum(s + LOOK_AHEAD, 1.0))
+        T = self.tool.poses(np.minimum(s + _LOOK_AHEAD, 1.0))
         found = solve_numerically(self.newton.description, T, q, position_only=position_only, limits=False)
         return bool(found.valid.all())
 
@@ -266,7 +266,7 @@ def _aims_position(description: Description) -> bool:
 
 def _require_inside(path: JointPath, limits: Limits) -> None:
     farthest = farthest_outside(limits, path.pieces)
-    if farthest.excess <= LIMIT_SLACK:
+    if farthest.excess <= _LIMIT_SLACK:
         return
     i, q = farthest.joint, farthest.value
     limit = limits.lower[i] if farthest.is_below else limits.upper[i]

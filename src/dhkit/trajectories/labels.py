@@ -16,11 +16,11 @@ from dhkit.errors import DescriptionError
 
 TEXTS = ("format", "robot", "digest", "toml", "content")
 """Names of an archive's texts: its kind and version, the robot's name, digest and whole file, the arrays' digest."""
-DIGEST_DIGITS = 16
+_DIGEST_DIGITS = 16
 """Length of digests of content; they detect damage and changes by hand, not forgery."""
-CONTENT = "# content: "
+_CONTENT = "# content: "
 """Beginning of a table's third line."""
-LABEL_LENGTH = 1000
+_LABEL_LENGTH = 1000
 """Number of characters that hold a table's first two lines."""
 
 
@@ -92,7 +92,7 @@ class FileKind:
             if name in arrays:
                 numbers = np.ascontiguousarray(arrays[name], dtype="<f8")
                 found.update(f"{name} {numbers.size}\n".encode() + numbers.tobytes())
-        return found.hexdigest()[:DIGEST_DIGITS]
+        return found.hexdigest()[:_DIGEST_DIGITS]
 
     def robot_of_archive(self, values: Mapping[str, Any], description: Description | None) -> Description:
         """Return the robot of an archive: the one given, the library's if it is equal, or the archive's own.
@@ -115,7 +115,7 @@ class FileKind:
     def labelled(self, description: Description, text: str) -> str:
         """Return a table behind its label: comments with kind, robot, and digest of robot and lines."""
         robot = f"# robot: {description.name} {description.digest}"
-        return f"# {self.title}\n{robot}\n{CONTENT}{_digest_of_lines([robot, *text.splitlines()])}\n{text}"
+        return f"# {self.title}\n{robot}\n{_CONTENT}{_digest_of_lines([robot, *text.splitlines()])}\n{text}"
 
     def require_unchanged(self, text: str) -> None:
         """Check that a table's lines are unchanged since dhkit wrote them.
@@ -126,9 +126,9 @@ class FileKind:
             No digest in its third line, or another than that of the lines that follow.
         """
         lines = text.splitlines()
-        if len(lines) < 3 or not lines[2].startswith(CONTENT):
-            raise DescriptionError(f"no comment '{CONTENT}DIGEST' in its third line{self.otherwise}")
-        if lines[2].removeprefix(CONTENT).strip() != _digest_of_lines([lines[1], *lines[3:]]):
+        if len(lines) < 3 or not lines[2].startswith(_CONTENT):
+            raise DescriptionError(f"no comment '{_CONTENT}DIGEST' in its third line{self.otherwise}")
+        if lines[2].removeprefix(_CONTENT).strip() != _digest_of_lines([lines[1], *lines[3:]]):
             raise DescriptionError(f"changed since dhkit wrote it: its digest differs{self.otherwise}")
 
     def robot_of_table(self, text: str, description: Description | None) -> Description:
@@ -139,7 +139,7 @@ class FileKind:
         DescriptionError
             Other comments, another robot than the given, or none given and one that the library does not have.
         """
-        lines = text[:LABEL_LENGTH].splitlines()[:2]
+        lines = text[:_LABEL_LENGTH].splitlines()[:2]
         words = lines[1].removeprefix("# robot: ").split() if len(lines) == 2 else []
         if not lines or lines[0] != f"# {self.title}" or len(words) != 2 or not lines[1].startswith("# robot: "):
             raise DescriptionError(f"does not begin with '# {self.title}' and '# robot: NAME DIGEST'{self.otherwise}")
@@ -192,7 +192,7 @@ def decoded(content: bytes) -> str:
 
 def _digest_of_lines(lines: Sequence[str]) -> str:
     # Independent of line ends, which mail and version control change.
-    return hashlib.sha256("\n".join(lines).rstrip().encode()).hexdigest()[:DIGEST_DIGITS]
+    return hashlib.sha256("\n".join(lines).rstrip().encode()).hexdigest()[:_DIGEST_DIGITS]
 
 
 def _in_library(name: str, digest: str) -> bool:

@@ -14,7 +14,7 @@ from dhkit.description.frames import one_each
 from dhkit.display import counted, html_table, repr_line
 from dhkit.trajectories.pieces import Pieces
 
-POSITION_ROUNDING = 1e-10
+_POSITION_ROUNDING = 1e-10
 """Distance of a proved bound of joint values from values that are reached, rad and m."""
 
 
@@ -177,7 +177,7 @@ class Farthest(NamedTuple):
 
 def farthest_outside(limits: Limits, q: Pieces) -> Farthest:
     """Return the joint value that is farthest outside its limits, of joint values as polynomials of n columns."""
-    found = q.bounds(POSITION_ROUNDING)
+    found = q.bounds(_POSITION_ROUNDING)
     below = limits.lower - found.lowest
     above = found.highest - limits.upper
     i = int(np.argmax(np.maximum(below, above)))

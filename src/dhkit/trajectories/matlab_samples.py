@@ -11,7 +11,7 @@ from dhkit.description.mat_files import MatVariable, read_mat
 from dhkit.errors import DescriptionError
 from dhkit.trajectories.tables import PREFIXES, TIMES, Table, joint_columns, place_of_name
 
-ARRAY_EXPORT = "save arrays by save('log.mat', 't', 'q', '-v7'), a timeseries ts as [ts.Time, ts.Data]"
+_ARRAY_EXPORT = "save arrays by save('log.mat', 't', 'q', '-v7'), a timeseries ts as [ts.Time, ts.Data]"
 """Advice for variables that are not read."""
 MATRICES = tuple(prefixes[0] for prefixes in PREFIXES)
 """Our names of matrices with a column for each joint: values, rates, accelerations."""
@@ -38,7 +38,7 @@ def matlab_table(description: Description, content: bytes, most: int, columns: M
     DescriptionError
         No such file, a variable that is no array of real numbers, or arrays that do not fit together; names it.
     """
-    variables = read_mat(content, most, advice=ARRAY_EXPORT)
+    variables = read_mat(content, most, advice=_ARRAY_EXPORT)
     names = _chosen(description, variables, columns)
     n = description.n
     found: dict[str, Array] = {}
@@ -54,10 +54,10 @@ def matlab_table(description: Description, content: bytes, most: int, columns: M
             _add_times(found, variable.name, array[:, 0])
         found |= {f"{ours}{i + 1}": column for i, column in enumerate(array[:, -n:].T)}
     if "t" not in found:
-        raise DescriptionError(f"no times: found {_listed(variables)}; expected a vector t or time; {ARRAY_EXPORT}")
+        raise DescriptionError(f"no times: found {_listed(variables)}; expected a vector t or time; {_ARRAY_EXPORT}")
     if len(found) == 1:
         expected = "expected q or q1 ..., or columns={'q': ...} that says which they are"
-        raise DescriptionError(f"no joint values: found {_listed(variables)}; {expected}; {ARRAY_EXPORT}")
+        raise DescriptionError(f"no joint values: found {_listed(variables)}; {expected}; {_ARRAY_EXPORT}")
     for ours, column in found.items():
         if len(column) != len(found["t"]):
             raise DescriptionError(f"{ours} has {len(column)} values; expected {len(found['t'])}, one for each time")
@@ -91,7 +91,7 @@ def _numbers(variable: MatVariable) -> Array:
     if isinstance(value, str):
         raise DescriptionError(f"{variable.name}: found text; expected numbers")
     if not isinstance(value, np.ndarray):
-        raise DescriptionError(f"{variable.name}: found a {variable.kind}; {ARRAY_EXPORT}")
+        raise DescriptionError(f"{variable.name}: found a {variable.kind}; {_ARRAY_EXPORT}")
     return value
 
 

@@ -13,11 +13,11 @@ from dhkit.trajectories.pieces import Pieces, shift
 from dhkit.trajectories.timing import configuration
 from dhkit.trajectories.trajectory import Trajectory
 
-BISECTIONS = 60
+_BISECTIONS = 60
 """Number of bisections that reduce an interval to rounding."""
-SAME_BREAK = 1e-12
+_SAME_BREAK = 1e-12
 """Breaks closer to each other than this share of the duration are merged."""
-LAW_SLACK = 1e-9
+_LAW_SLACK = 1e-9
 """Distance by which rounding may take a time law out of [0, 1], or back."""
 
 
@@ -126,13 +126,13 @@ class JointPath:
     def _merged_breaks(self, law: Pieces) -> Array:
         """Return the law's breaks together with the times at which s passes breaks of the path."""
         low, high = np.zeros(len(self.breaks) - 2), np.full(len(self.breaks) - 2, law.end)
-        for _ in range(BISECTIONS):
+        for _ in range(_BISECTIONS):
             middle = (low + high) / 2
             below = law(middle)[..., 0] < self.breaks[1:-1]
             low, high = np.where(below, middle, low), np.where(below, high, middle)
         crossings = (low + high) / 2
         gaps = np.abs(crossings[:, None] - law.breaks).min(axis=1, initial=np.inf)
-        merged = np.sort(np.concatenate([law.breaks, crossings[gaps > SAME_BREAK * law.end]]))
+        merged = np.sort(np.concatenate([law.breaks, crossings[gaps > _SAME_BREAK * law.end]]))
         distinct: Array = merged[np.concatenate([[True], np.diff(merged) > 0])]
         return distinct
 
@@ -144,14 +144,14 @@ def quintic_law() -> tuple[Array, Array]:
 
 def _check_law(law: Pieces) -> None:
     start, end = float(law(0.0)[0]), float(law(law.end)[0])
-    if max(abs(start), abs(end - 1.0)) > LAW_SLACK:
+    if max(abs(start), abs(end - 1.0)) > _LAW_SLACK:
         raise ValueError(f"s goes from {start:.9g} to {end:.9g}; expected from 0 to 1")
     inside = law.breaks[1:-1]
     jump = np.abs(law(inside) - law(inside, "left")).max(initial=0.0)
-    if jump > LAW_SLACK:
+    if jump > _LAW_SLACK:
         raise ValueError(f"s jumps by {jump:.3g} at a break; expected a continuous s(t)")
-    rate = law.derivative.bounds(LAW_SLACK / law.end / 2)
-    if rate.lowest[0] * law.end < -LAW_SLACK:
+    rate = law.derivative.bounds(_LAW_SLACK / law.end / 2)
+    if rate.lowest[0] * law.end < -_LAW_SLACK:
         raise ValueError(f"s goes back at {rate.at_lowest[0]:.4g} s; expected an s(t) that never does")
 
 

@@ -16,7 +16,7 @@ from dhkit.display import counted, repr_line
 
 Side: TypeAlias = Literal["right", "left"]
 """The piece that is evaluated at a break: the one that begins there (right) or ends there (left)."""
-MAX_HALVINGS = 60
+_MAX_HALVINGS = 60
 """Number of times that a piece is halved for a bound: from 2^-26 of a piece on, hulls are exact to rounding."""
 
 
@@ -150,7 +150,7 @@ class Pieces:
         reached = np.full(b.shape[2], -np.inf)
         places = np.zeros(b.shape[2])
         bound = np.full(b.shape[2], -np.inf)
-        for _ in range(MAX_HALVINGS):
+        for _ in range(_MAX_HALVINGS):
             for values, at in ((b[:, 0], begin), (b[:, -1], begin + width)):
                 k = values.argmax(axis=0)
                 highest = np.take_along_axis(values, k[None], axis=0)[0]

@@ -12,9 +12,9 @@ from dhkit.trajectories.slowdown import Torques, least_slowdowns, require_inside
 from dhkit.trajectories.timing import check_duration, configuration, default_limits, timed
 from dhkit.trajectories.trajectory import Trajectory
 
-MIN_BLEND = 0.01
+_MIN_BLEND = 0.01
 """Smallest share of the duration for a blend: accelerations grow without bound as it goes to 0."""
-GRID, FINER_GRID, REFINEMENTS = 50, 15, 4
+_GRID, _FINER_GRID, _REFINEMENTS = 50, 15, 4
 """Number of blends tried first, then between the neighbours of the best one, and how often: to 2e-6 of the duration."""
 
 
@@ -175,10 +175,10 @@ def _blended(description: Description, q0: Array, q1: Array, blend: float) -> Tr
 
 def _best_blend(description: Description, q0: Array, q1: Array, limits: Limits, torques: Torques | None) -> float:
     # The duration may have several minima in the blend: a grid is searched before one is refined.
-    low, high, count = MIN_BLEND, 0.5, GRID
-    for _ in range(REFINEMENTS + 1):
+    low, high, count = _MIN_BLEND, 0.5, _GRID
+    for _ in range(_REFINEMENTS + 1):
         blends = np.linspace(low, high, count)
         motions = [_blended(description, q0, q1, float(blend)) for blend in blends]
         best = int(np.argmin(least_slowdowns(motions, limits, torques)))
-        low, high, count = blends[max(best - 1, 0)], blends[min(best + 1, count - 1)], FINER_GRID
+        low, high, count = blends[max(best - 1, 0)], blends[min(best + 1, count - 1)], _FINER_GRID
     return float(blends[best])

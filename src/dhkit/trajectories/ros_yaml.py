@@ -11,6 +11,7 @@ import yaml
 
 from dhkit.description import Array
 from dhkit.errors import DescriptionError
+from dhkit.trajectories.bounds import BOUNDS
 
 MESSAGE = ("header", "joint_names", "points")
 """Keys of a message."""
@@ -21,10 +22,8 @@ POINT = (*ROWS, "effort", "time_from_start")
 TIMES = (("sec", "nanosec"), ("secs", "nsecs"))
 """Keys of a duration, whole seconds and nanoseconds: of ROS 2, which is written, and of ROS 1."""
 
-MAX_DEPTH = 12
-"""Deepest nesting of lists and mappings."""
-PLAIN = re.compile(r"[A-Za-z][\w.-]*")
-NO_TEXT = {"true", "false", "yes", "no", "on", "off", "y", "n", "null", "nan", "inf"}
+_PLAIN = re.compile(r"[A-Za-z][\w.-]*")
+_NO_TEXT = {"true", "false", "yes", "no", "on", "off", "y", "n", "null", "nan", "inf"}
 """Plain scalars that YAML does not read as text."""
 
 
@@ -70,8 +69,8 @@ class _UnexpectedError(Exception):
 
 def _value(event: yaml.Event, events: Iterator[yaml.Event], depth: int) -> Any:
     """Return the text, list or mapping that begins with an event."""
-    if depth > MAX_DEPTH:
-        raise _UnexpectedError(event, f"at most {MAX_DEPTH} levels")
+    if depth > BOUNDS.yaml_nesting:
+        raise _UnexpectedError(event, f"at most {BOUNDS.yaml_nesting} levels")
     if getattr(event, "anchor", None) or getattr(event, "tag", None):
         raise _UnexpectedError(event, "a number or a name")
     if isinstance(event, yaml.ScalarEvent):
@@ -131,4 +130,4 @@ def _number(value: float) -> str:
 
 
 def _name(name: str) -> str:
-    return name if PLAIN.fullmatch(name) and name.lower() not in NO_TEXT else f"'{name}'"
+    return name if _PLAIN.fullmatch(name) and name.lower() not in _NO_TEXT else f"'{name}'"

@@ -9,7 +9,7 @@ from dhkit.description import Array, Description, Payload
 from dhkit.display import counted, html_table, repr_line
 from dhkit.symbolic import Friction
 
-SHOWN_TIMES = 5
+_SHOWN_TIMES = 5
 """Number of times that a notebook shows."""
 
 
@@ -54,7 +54,7 @@ class Samples:
         headings = ("t [s]", *(f"{joint.name} [{unit}]" for joint, unit in joints))
         rows = [
             (f"{t:.4g}", *(f"{x:.4f}" for x in q))
-            for t, q in zip(self.times[:SHOWN_TIMES], self.q[:SHOWN_TIMES], strict=True)
+            for t, q in zip(self.times[:_SHOWN_TIMES], self.q[:_SHOWN_TIMES], strict=True)
         ]
         caption = f"Samples of {self.description.name}: q, {self._summary}; qd, qdd and tau beside it"
         return html_table(headings, rows, caption, align="r", count=len(self.times))

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from dhkit.description.schema import titled_schema
-from dhkit.trajectories.files import LEFT_OUT, MAX_DIGITS
+from dhkit.trajectories.bounds import BOUNDS
+from dhkit.trajectories.files import LEFT_OUT
 from dhkit.trajectories.ros_yaml import ROWS, TIMES
 
-NUMBER = {
+_NUMBER = {
     "type": ["number", "string"],
     "pattern": r"^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?$",
 }
 """A number, or its text: YAML 1.1 reads 1e-05 as text."""
-WHOLE = {
+_WHOLE = {
     "type": ["integer", "string"],
     "minimum": 0,
-    "maximum": 10**MAX_DIGITS - 1,
-    "pattern": f"^[0-9]{{1,{MAX_DIGITS}}}$",
+    "maximum": 10**BOUNDS.digits - 1,
+    "pattern": f"^[0-9]{{1,{BOUNDS.digits}}}$",
 }
-ROW = {"type": "array", "items": NUMBER, "minItems": 1}
-ROW_OR_NONE = {"anyOf": [ROW, {"enum": [*LEFT_OUT]}]}
+_ROW = {"type": "array", "items": _NUMBER, "minItems": 1}
+_ROW_OR_NONE = {"anyOf": [_ROW, {"enum": [*LEFT_OUT]}]}
 
 
 def motion_schema() -> dict[str, object]:
@@ -48,15 +49,15 @@ def motion_schema() -> dict[str, object]:
 def _point() -> dict[str, object]:
     positions, velocities, accelerations = ROWS
     properties = {
-        positions: ROW | {"description": "Joint values, rad and m, one a joint."},
-        velocities: ROW_OR_NONE | {"description": "Joint rates, rad/s and m/s; in all points or in none."},
-        accelerations: ROW_OR_NONE | {"description": "Joint accelerations, rad/s^2 and m/s^2; only with velocities."},
+        positions: _ROW | {"description": "Joint values, rad and m, one a joint."},
+        velocities: _ROW_OR_NONE | {"description": "Joint rates, rad/s and m/s; in all points or in none."},
+        accelerations: _ROW_OR_NONE | {"description": "Joint accelerations, rad/s^2 and m/s^2; only with velocities."},
         "effort": {"description": "Joint torques, N m and N; not read."},
         "time_from_start": _duration(),
     }
     return _closed(properties, "A sample of the motion.", [positions, "time_from_start"]) | {
-        "if": {"properties": {accelerations: ROW}, "required": [accelerations]},
-        "then": {"properties": {velocities: ROW}, "required": [velocities]},
+        "if": {"properties": {accelerations: _ROW}, "required": [accelerations]},
+        "then": {"properties": {velocities: _ROW}, "required": [velocities]},
     }
 
 
@@ -64,7 +65,10 @@ def _duration() -> dict[str, object]:
     """Return the schema of a time: seconds and nanoseconds, under the keys of one version of ROS."""
     properties: dict[str, object] = {}
     for whole, part in TIMES:
-        properties |= {whole: WHOLE | {"description": "Whole seconds."}, part: WHOLE | {"description": "Nanoseconds."}}
+        properties |= {
+            whole: _WHOLE | {"description": "Whole seconds."},
+            part: _WHOLE | {"description": "Nanoseconds."},
+        }
     duration = _closed(properties, "Time of the sample, greater than that of the one before.")
     return duration | {"anyOf": [{"required": [*keys]} for keys in TIMES]}
 

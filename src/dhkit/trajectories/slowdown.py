@@ -21,21 +21,21 @@ from dhkit.trajectories.trajectory import Trajectory
 Torques: TypeAlias = Callable[[Array, Array, Array], Array]
 """Function from q, qd and qdd, shape (N, n) each, to joint torques, shape (N, n), N m and N."""
 
-TORQUE_NOISE = 1e-12
+_TORQUE_NOISE = 1e-12
 """Differences of torque below this share of the largest torque are rounding and limit nothing."""
-MIN_JUMP = 1e-6
+_MIN_JUMP = 1e-6
 """A velocity or acceleration jumps at a break if it changes by more than this share of its largest value."""
-PROVED = 1e-12
+_PROVED = 1e-12
 """Distance of a derivative's proved bound from values that are reached, as a share of its size."""
-LIMIT_SLACK = 1e-9
+_LIMIT_SLACK = 1e-9
 """Distance by which rounding may exceed joint limits, rad and m."""
-REFINEMENTS, TIGHTEST_SAMPLES = 2, 3
+_REFINEMENTS, _TIGHTEST_SAMPLES = 2, 3
 """How often the neighbourhoods of each joint's tightest samples are sampled more finely, and number of such samples."""
-ACCEPTED_TORQUE = 1e-7
+_ACCEPTED_TORQUE = 1e-7
 """Share by which a torque may exceed its limit."""
-MAX_ROUNDS = 20
+_MAX_ROUNDS = 20
 """Number of times that a motion is slowed down for a torque between samples."""
-ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
+_ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
 
 
 def least_slowdown(
@@ -105,12 +105,12 @@ def _with_torques_between(trajectory: Trajectory, limits: Limits, c: float) -> f
     is left.
     """
     description = trajectory.description
-    for _ in range(MAX_ROUNDS):
+    for _ in range(_MAX_ROUNDS):
         slower = trajectory.slowed(c)
         peaks = torque_peaks(description, slower, limits.torque)
         over = np.where(peaks.is_proved, peaks.largest, peaks.seen)
         i = int(over.argmax())
-        if over[i] <= 1 + ACCEPTED_TORQUE:
+        if over[i] <= 1 + _ACCEPTED_TORQUE:
             return c
         t = peaks.times[i]
         g = float(gravity_torque(description, slower.q(t))[i])
@@ -120,9 +120,9 @@ def _with_torques_between(trajectory: Trajectory, limits: Limits, c: float) -> f
         if side * g >= limit:
             _refuse_holding(description, i, g, limit, float(t))
         beyond = max(side * tau, over[i] * limit)
-        c *= float(np.sqrt((beyond - side * g) / (limit - side * g))) * (1 + ACCEPTED_TORQUE / 4)
+        c *= float(np.sqrt((beyond - side * g) / (limit - side * g))) * (1 + _ACCEPTED_TORQUE / 4)
     raise PlanningError(
-        f"torque of {description.joints[i].name} is above its limit at {t:.4g} s after {MAX_ROUNDS} slow-downs; give a"
+        f"torque of {description.joints[i].name} is above its limit at {t:.4g} s after {_MAX_ROUNDS} slow-downs; give a"
         " duration"
     )
 
@@ -163,7 +163,7 @@ def require_inside(trajectory: Trajectory, limits: Limits) -> None:
     """
     _check_joints(trajectory, limits)
     farthest = farthest_outside(limits, trajectory.pieces)
-    if farthest.excess <= LIMIT_SLACK:
+    if farthest.excess <= _LIMIT_SLACK:
         return
     i, q = farthest.joint, farthest.value
     side, limit = ("lower", limits.lower[i]) if farthest.is_below else ("upper", limits.upper[i])
@@ -182,13 +182,13 @@ def _check_joints(trajectory: Trajectory, limits: Limits) -> None:
 
 def _by_derivatives(trajectory: Trajectory, limits: Limits) -> float:
     slowest = 0.0
-    for name, order in ORDERS.items():
+    for name, order in _ORDERS.items():
         limit = getattr(limits, name)
         if np.isinf(limit).all():
             continue
         _refuse_jumps(trajectory, order - 1, name, limit)
         values = trajectory.pieces.differentiated(order)
-        found = values.bounds(PROVED * np.abs(values.bernstein).max(axis=(0, 1)))
+        found = values.bounds(_PROVED * np.abs(values.bernstein).max(axis=(0, 1)))
         largest = np.maximum(found.highest, -found.lowest)
         slowest = max(slowest, float((largest / limit).max() ** (1 / order)))
     return slowest
@@ -202,7 +202,7 @@ def _refuse_jumps(trajectory: Trajectory, order: int, limited: str, limit: Array
     inside = trajectory.breaks[1:-1]
     jumps = np.abs(values(inside) - values(inside, "left"))
     largest = np.abs(values.inside(2)[1]).max()
-    wrong = (jumps > MIN_JUMP * largest) & np.isfinite(limit)
+    wrong = (jumps > _MIN_JUMP * largest) & np.isfinite(limit)
     if wrong.any():
         row, i = np.argwhere(wrong)[0]
         what = {1: "velocity", 2: "acceleration"}[order]
@@ -263,13 +263,13 @@ def _by_torques(trajectories: Sequence[Trajectory], limits: Limits, torques: Tor
     """Return the least slowdown by torques, shape (m,)."""
     description = trajectories[0].description
     places, most = _SamplePoints.spread(trajectories, points), np.full(len(trajectories), np.inf)
-    for _ in range(REFINEMENTS + 1):
+    for _ in range(_REFINEMENTS + 1):
         q, qd, qdd = places.states(trajectories)
         if torques is None:
             tau, g = inverse_dynamics(description, q, qd, qdd), gravity_torque(description, q)
         else:
             tau, g = torques(q, qd, qdd), torques(q, 0 * q, 0 * q)
-        moves = np.abs(tau - g) > TORQUE_NOISE * np.abs(tau).max()
+        moves = np.abs(tau - g) > _TORQUE_NOISE * np.abs(tau).max()
         spare = limits.torque - np.where(moves, np.sign(tau - g), np.sign(g)) * g
         falls = (np.abs(g) > limits.torque) | (moves & (spare <= 0))
         if falls.any():
@@ -287,7 +287,7 @@ def _tightest(owner: NDArray[np.intp], room: Array, count: int) -> NDArray[np.in
     beside = np.pad(room, ((1, 1), (0, 0)), constant_values=np.inf)
     dips = np.where((room <= beside[:-2]) & (room <= beside[2:]), room, np.inf)
     bounds = np.searchsorted(owner, np.arange(count + 1))
-    rows = [a + np.argsort(dips[a:b], axis=0, kind="stable")[:TIGHTEST_SAMPLES].ravel() for a, b in pairwise(bounds)]
+    rows = [a + np.argsort(dips[a:b], axis=0, kind="stable")[:_TIGHTEST_SAMPLES].ravel() for a, b in pairwise(bounds)]
     return np.asarray(np.concatenate(rows), dtype=np.intp)
 
 

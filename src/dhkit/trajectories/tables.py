@@ -10,14 +10,14 @@ import numpy as np
 from dhkit.description import Array, Description
 from dhkit.description.quantities import is_plain_number
 from dhkit.errors import DescriptionError
+from dhkit.trajectories.bounds import BOUNDS
 
-MOST_COLUMNS = 1000
 TIMES = ("t", "time", "time_s", "time [s]", "t [s]", "timestamp", "tout")
 """Names of a column of times; the last is Simulink's."""
 PREFIXES = (("q", "pos", "position"), ("qd", "dq", "vel", "velocity"), ("qdd", "ddq", "acc", "acceleration"))
 """What columns of values, rates and accelerations begin with, before a joint's number, or end with, behind its name."""
 
-NO_HEADER = "no header: the first line has numbers; expected the names of the columns in it, such as t,q1,q2"
+_NO_HEADER = "no header: the first line has numbers; expected the names of the columns in it, such as t,q1,q2"
 Table = tuple[tuple[str, ...], Array]
 """Column names, and numbers, shape (N, columns)."""
 
@@ -43,12 +43,12 @@ def read_table(text: str) -> Table:
         line = raw.strip()
         if not line or line.startswith("#"):
             continue
-        cells = [cell.strip().strip('"') for cell in line.split(",", MOST_COLUMNS)]
+        cells = [cell.strip().strip('"') for cell in line.split(",", BOUNDS.columns)]
         if names is None:
-            if len(cells) > MOST_COLUMNS:
-                raise DescriptionError(f"line {number}: more than {MOST_COLUMNS} columns")
+            if len(cells) > BOUNDS.columns:
+                raise DescriptionError(f"line {number}: more than {BOUNDS.columns} columns")
             if all(map(_is_number, cells)):
-                raise DescriptionError(NO_HEADER)
+                raise DescriptionError(_NO_HEADER)
             if len(set(cells)) < len(cells):
                 raise DescriptionError(f"line {number}: a column's name stands there twice; expected different names")
             names = tuple(cells)
@@ -139,7 +139,7 @@ def select_columns(
     names |= {ours: table[0].index(place_of_name(theirs, table[0])) for ours, theirs in (columns or {}).items()}
     time = next((names[name] for name in TIMES if name in names), None)
     if time is None and all(is_plain_number(name) for name in table[0]):
-        raise DescriptionError(NO_HEADER)
+        raise DescriptionError(_NO_HEADER)
     if time is None:
         raise DescriptionError(f"no column of times: found {', '.join(table[0])[:80]}; expected t or time")
     chosen: list[Array] = []

@@ -14,9 +14,9 @@ from dhkit.trajectories.limits import Limits
 from dhkit.trajectories.slowdown import Torques, least_slowdown, require_inside
 from dhkit.trajectories.trajectory import Trajectory
 
-MIN_DURATION, MAX_DURATION = 1e-6, 1e6
+_MIN_DURATION, _MAX_DURATION = 1e-6, 1e6
 """Range of durations, s; others are typing errors, and their powers leave the range of doubles."""
-DURATION_SLACK = 1e-9
+_DURATION_SLACK = 1e-9
 """Share by which rounding may make a duration shorter than the limits allow."""
 
 
@@ -51,7 +51,7 @@ def timed(shape: Trajectory, duration: float | None, limits: Limits | None, torq
         if c == 0:
             raise ValueError("the motion ends where it begins; expected a duration")
         return shape.slowed(c)
-    if c * shape.duration > duration * (1 + DURATION_SLACK):
+    if c * shape.duration > duration * (1 + _DURATION_SLACK):
         raise PlanningError(
             f"{duration:.6g} s are too short: the limits allow the motion in {c * shape.duration:.6g} s"
         )
@@ -76,8 +76,8 @@ def check_duration(duration: float | None) -> None:
     """
     if duration is None:
         return
-    if not isinstance(duration, Real) or not MIN_DURATION <= duration <= MAX_DURATION:
-        raise ValueError(f"duration is {duration!r}; expected {MIN_DURATION:g} to {MAX_DURATION:g} s")
+    if not isinstance(duration, Real) or not _MIN_DURATION <= duration <= _MAX_DURATION:
+        raise ValueError(f"duration is {duration!r}; expected {_MIN_DURATION:g} to {_MAX_DURATION:g} s")
 
 
 def configuration(description: Description, value: ArrayLike | None, name: str) -> Array:

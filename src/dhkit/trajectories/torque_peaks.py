@@ -30,17 +30,17 @@ from dhkit.trajectories.trajectory import Trajectory
 
 ORDER = 4
 """Number of samples of an interpolant, and the order of the bounded derivative."""
-CELLS = 64
+_CELLS = 64
 """Least number of cells of a motion: derivatives are bounded over each, the more tightly the shorter it is."""
-FIRST_SAMPLES = 8
+_FIRST_SAMPLES = 8
 """Number of samples of a cell at first, both its ends included."""
-MOST_SAMPLES = 4096
+_MOST_SAMPLES = 4096
 """Largest number of samples of a cell."""
-TOLERANCE = 2e-8
+_TOLERANCE = 2e-8
 """Distance between bound and interpolant that is asked for, as a share of the limit."""
-RATE_ROUNDING = 1e-12
+_RATE_ROUNDING = 1e-12
 """Rate, as a share of a joint's largest, that is rounding: a joint with it has not turned back."""
-BATCH = 65_536
+_BATCH = 65_536
 """Number of states that are computed at a time."""
 
 
@@ -55,7 +55,7 @@ class TorquePeaks:
     seen: Array
     """Lower bounds, shape (n,): torques at samples."""
     is_proved: NDArray[np.bool_]
-    """Whether the bound is below the limit, or within ``TOLERANCE`` of the truth, shape (n,)."""
+    """Whether the bound is below the limit, or within ``_TOLERANCE`` of the truth, shape (n,)."""
 
 
 def torque_peaks(
@@ -76,7 +76,7 @@ def torque_peaks(
     """
     numbers = description.numbers
     intervals = len(trajectory.breaks) - 1
-    cells = trajectory.pieces.divided(-(-CELLS // intervals))
+    cells = trajectory.pieces.divided(-(-_CELLS // intervals))
     width = np.diff(cells.breaks)
     count = len(width)
     motion = np.stack([np.abs(cells.differentiated(m).bernstein).max(axis=1) for m in range(ORDER + 3)])
@@ -113,22 +113,22 @@ def torque_peaks(
         error = h**ORDER / factorial(ORDER) * fourth[rows]
         highest[rows] = np.maximum(above, below) + error
         times[rows] = cells.breaks[rows, None] + h * np.where(above >= below, at_above, at_below)
-        proved[rows] = (highest[rows] <= 1) | ((error <= TOLERANCE) & is_dry_constant[rows])
+        proved[rows] = (highest[rows] <= 1) | ((error <= _TOLERANCE) & is_dry_constant[rows])
 
-    measure(np.arange(count), FIRST_SAMPLES)
+    measure(np.arange(count), _FIRST_SAMPLES)
     # First with an error of half of what is left to the limit, which decides most cells, then with the tolerance.
     for is_last in (False, True):
-        wanted = np.full_like(seen, TOLERANCE) if is_last else np.maximum((1 - seen) / 2, TOLERANCE)
+        wanted = np.full_like(seen, _TOLERANCE) if is_last else np.maximum((1 - seen) / 2, _TOLERANCE)
         # Samples N of a cell of width w with which the error is the wanted one: (w / (N - 1))^4 / 4! D.
         steps = width[:, None] * (fourth / (factorial(ORDER) * wanted)) ** (1 / ORDER)
         steps = np.where(proved, 0.0, steps).max(axis=1)
         # Rounded up to powers of sqrt(2), so that cells are computed together.
-        samples = np.exp2(np.ceil(2 * np.log2(np.clip(steps, 1, MOST_SAMPLES))) / 2).astype(int) + 2
+        samples = np.exp2(np.ceil(2 * np.log2(np.clip(steps, 1, _MOST_SAMPLES))) / 2).astype(int) + 2
         # More samples do not help where dry friction alone leaves the bound wide.
-        coarse = np.flatnonzero(samples > FIRST_SAMPLES)
+        coarse = np.flatnonzero(samples > _FIRST_SAMPLES)
         for N in np.unique(samples[coarse]).tolist():
             rows = coarse[samples[coarse] == N]
-            for part in np.array_split(rows, -(-len(rows) * N // BATCH)):
+            for part in np.array_split(rows, -(-len(rows) * N // _BATCH)):
                 measure(part, N)
 
     cell = highest.argmax(axis=0)
@@ -157,7 +157,7 @@ def _dry_friction_steps(
     rates = cells.derivative.bernstein
     slowest = rates.min(axis=1)
     fastest = rates.max(axis=1)
-    rounding = RATE_ROUNDING * np.maximum(np.abs(slowest), np.abs(fastest)).max(axis=0)
+    rounding = _RATE_ROUNDING * np.maximum(np.abs(slowest), np.abs(fastest)).max(axis=0)
     rests = (slowest >= -rounding) & (fastest <= rounding)
     # A joint that goes one way may rest at single instants, where it has no dry friction: these are ends of intervals,
     # and states of every certificate.

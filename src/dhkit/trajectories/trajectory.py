@@ -23,12 +23,12 @@ from dhkit.trajectories.interpolation import interpolated
 from dhkit.trajectories.pieces import Pieces, Side, join
 from dhkit.trajectories.samples import Samples
 
-JOIN_TOLERANCE = 1e-9
+_JOIN_TOLERANCE = 1e-9
 """Largest distance of the ends of two motions that may follow one another, rad and m."""
-MAX_SLOWDOWN = 1e12
+_MAX_SLOWDOWN = 1e12
 """Largest factor by which a motion is slowed down or sped up: powers of larger ones leave the range of doubles."""
-MOST_SAMPLES = 1e8
-SAME_TIME = 1e-9
+_MOST_SAMPLES = 1e8
+_SAME_TIME = 1e-9
 """A last sample closer to the end than this share of the sampling interval is the end."""
 
 
@@ -200,9 +200,11 @@ class Trajectory:
             return np.linspace(0.0, self.duration, n)
         if rate is None or not 0 < rate < np.inf:
             raise ValueError(f"rate is {rate!r}; expected a positive number of samples a second")
-        if rate * self.duration > MOST_SAMPLES:
-            raise ValueError(f"rate is {rate:g}: {rate * self.duration:.3g} samples; expected {MOST_SAMPLES:g} at most")
-        return np.append(np.arange(max(int(np.ceil(self.duration * rate - SAME_TIME)), 1)) / rate, self.duration)
+        if rate * self.duration > _MOST_SAMPLES:
+            raise ValueError(
+                f"rate is {rate:g}: {rate * self.duration:.3g} samples; expected {_MOST_SAMPLES:g} at most"
+            )
+        return np.append(np.arange(max(int(np.ceil(self.duration * rate - _SAME_TIME)), 1)) / rate, self.duration)
 
     def slowed(self, c: float) -> Trajectory:
         """Return the same path c times as slow, q(t / c), without the report.
@@ -212,7 +214,7 @@ class Trajectory:
         ValueError
             c is not positive and finite.
         """
-        if not isinstance(c, Real) or not 1 / MAX_SLOWDOWN <= c <= MAX_SLOWDOWN:
+        if not isinstance(c, Real) or not 1 / _MAX_SLOWDOWN <= c <= _MAX_SLOWDOWN:
             raise ValueError(f"c is {c!r}; expected a positive number")
         powers = np.arange(self.coefficients.shape[1])[:, None]
         return self._moved(self.breaks * c, self.coefficients / float(c) ** powers)
@@ -245,7 +247,7 @@ class Trajectory:
             if own != theirs:
                 raise ValueError(f"{what} is {own} and then {theirs}; expected one: .carrying(...) sets it")
         end, start = self.q(self.duration), other.q(0.0)
-        apart = np.flatnonzero(np.abs(end - start) > JOIN_TOLERANCE)
+        apart = np.flatnonzero(np.abs(end - start) > _JOIN_TOLERANCE)
         if len(apart):
             i = int(apart[0])
             name, slides = self.description.joints[i].name, bool(self.description.numbers.prismatic[i])

@@ -16,11 +16,11 @@ from dhkit.verification.reference import PinocchioResults
 from dhkit.verification.report import Agreement, VerificationReport
 from dhkit.verification.states import JointStates, random_motions
 
-FRAME_TOLERANCE = 1e-13
+_FRAME_TOLERANCE = 1e-13
 """Tolerance for positions over the lengths of the table (at least 1 m) and rotation entries: some hundred roundings."""
-LOST_POWER = 1.5
+_LOST_POWER = 1.5
 """Power of the table's lengths, in lengths of the arm, with which rounding errors of dynamics grow: between 1 and 2."""
-JACOBIAN_TOLERANCE = 1e-12
+_JACOBIAN_TOLERANCE = 1e-12
 """Tolerance for Jacobian entries, linear ones over the lengths of the table (at least 1 m)."""
 
 
@@ -111,7 +111,7 @@ def _rounding_scale(description: Description) -> float:
     numbers = description.numbers
     if numbers.link_ends is None:
         return 1.0
-    return float((numbers.table_length / numbers.reach) ** LOST_POWER)
+    return float((numbers.table_length / numbers.reach) ** _LOST_POWER)
 
 
 def _kinematics(description: Description, reference: PinocchioResults) -> Iterator[Comparison]:
@@ -120,13 +120,13 @@ def _kinematics(description: Description, reference: PinocchioResults) -> Iterat
         [kinematics.frames(description, q), kinematics.forward_kinematics(description, q)[:, None]], axis=1
     )
     theirs = reference.frames([*(f"dh{i}" for i in range(description.n + 1)), "tool"])
-    yield Comparison("frame positions", largest(ours[..., :3, 3] - theirs[..., :3, 3]) / size, FRAME_TOLERANCE)
-    yield Comparison("frame rotations", largest(ours[..., :3, :3] - theirs[..., :3, :3]), FRAME_TOLERANCE)
+    yield Comparison("frame positions", largest(ours[..., :3, 3] - theirs[..., :3, 3]) / size, _FRAME_TOLERANCE)
+    yield Comparison("frame rotations", largest(ours[..., :3, :3] - theirs[..., :3, :3]), _FRAME_TOLERANCE)
     for frame in ("world", "tool"):
         J = kinematics.jacobian(description, q, frame)
         difference = J - reference.jacobian("tool", in_world=frame == "world")
         error = np.maximum(largest(difference[:, :3]) / size, largest(difference[:, 3:]))
-        yield Comparison(f"Jacobian ({frame})", error, JACOBIAN_TOLERANCE)
+        yield Comparison(f"Jacobian ({frame})", error, _JACOBIAN_TOLERANCE)
 
 
 def _dynamics(description: Description, reference: PinocchioResults, notes: list[str]) -> Iterator[Comparison]:

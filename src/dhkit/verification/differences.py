@@ -10,9 +10,9 @@ from dhkit.description import Array, Description
 from dhkit.description.frames import carrying, world_to_frames
 from dhkit.model import PinocchioModel, pinocchio_model
 
-STEPS = 360
+_STEPS = 360
 """Number of angles tried for a zero position before the best is refined."""
-DIGITS = 6
+_DIGITS = 6
 
 
 def differences(description: Description, model: PinocchioModel, tolerance: float) -> Iterator[str]:
@@ -78,14 +78,14 @@ def _axes(
         if offset is not None and offset[1] <= max(least, 1e-7):
             degrees = np.degrees(offset[0])
             other = f"joint {k + 1} ({description.joints[k].name})"
-            yield f"{other}: the URDF's zero is at {degrees:.{DIGITS}g} degrees of the table's"
+            yield f"{other}: the URDF's zero is at {degrees:.{_DIGITS}g} degrees of the table's"
             return
     if abs(cosine) < 1 - least:
         turn = np.degrees(np.arccos(cosine))
-        yield f"{name}: with all joints at zero its axis is turned by {turn:.{DIGITS}g} degrees"
+        yield f"{name}: with all joints at zero its axis is turned by {turn:.{_DIGITS}g} degrees"
     else:
         gap = np.linalg.norm(a[:3] - np.sign(cosine) * b[:3])
-        yield f"{name}: with all joints at zero its axis lies {gap:.{DIGITS}g} m beside the table's"
+        yield f"{name}: with all joints at zero its axis lies {gap:.{_DIGITS}g} m beside the table's"
 
 
 def _zero_offset(ours: Array, theirs: Array, k: int, reach: float) -> tuple[float, float] | None:
@@ -96,7 +96,7 @@ def _zero_offset(ours: Array, theirs: Array, k: int, reach: float) -> tuple[floa
         turned = _rotate_screws(ours[k], ours[k + 1 :], angle)
         return max(_distance(a, b, reach) for a, b in zip(turned, theirs[k + 1 :], strict=True))
 
-    grid = np.linspace(-np.pi, np.pi, STEPS)
+    grid = np.linspace(-np.pi, np.pi, _STEPS)
     best = min(grid, key=apart)
     step = grid[1] - grid[0]
     found = minimize_scalar(apart, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-12})
@@ -124,11 +124,11 @@ def _bodies(description: Description, table: PinocchioModel, urdf: PinocchioMode
     for i, ((mass, com, inertia), (other, other_com, other_inertia)) in enumerate(pairs):
         name = f"link {i + 1} ({description.joints[i].name})"
         if abs(mass - other) > least * heaviest:
-            yield f"{name}: mass is {other:.{DIGITS}g} kg in the URDF, {mass:.{DIGITS}g} kg in the table"
+            yield f"{name}: mass is {other:.{_DIGITS}g} kg in the URDF, {mass:.{_DIGITS}g} kg in the table"
         elif mass > 0 and (gap := np.linalg.norm(com - other_com)) > least * reach:
-            yield f"{name}: the centres of mass are {gap:.{DIGITS}g} m apart"
+            yield f"{name}: the centres of mass are {gap:.{_DIGITS}g} m apart"
         if (gap := np.abs(inertia - other_inertia).max()) > least * max(largest, 1e-6):
-            yield f"{name}: the inertias about the centre of mass differ by up to {gap:.{DIGITS}g} kg m^2"
+            yield f"{name}: the inertias about the centre of mass differ by up to {gap:.{_DIGITS}g} kg m^2"
 
 
 def _world_bodies(model: PinocchioModel) -> list[tuple[float, Array, Array]]:

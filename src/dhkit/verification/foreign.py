@@ -21,18 +21,18 @@ from dhkit.verification.report import VerificationReport, printable
 from dhkit.verification.second_opinion import second_opinion
 from dhkit.verification.states import random_motions
 
-SAME_POSE = 1e-12
+_SAME_POSE = 1e-12
 """Differences of positions, m, and rotation entries up to this are rounding."""
-ROUNDING_STATES = 100
+_ROUNDING_STATES = 100
 """Number of states at which a URDF is compared with itself, read as designed."""
-TOOL_SHARE, DYNAMICS_SHARE = 2.0, 10.0
+_TOOL_SHARE, _DYNAMICS_SHARE = 2.0, 10.0
 """How often the tool's difference from that reading is allowed, between tools and between M, g and tau: a table whose
 axes were made parallel is nearer to either reading than they are to each other."""
-CONSTANT = 1e-6
+_CONSTANT = 1e-6
 """Two tools differ by a constant transform if it varies by less than this between states, m and rotation entries."""
 
 
-class OffsetFrame(Enum):
+class _OffsetFrame(Enum):
     """The frame by which two arms differ, with the beginning of the sentence that says so."""
 
     TOOL = "tool: the URDF's stands in the table's"
@@ -40,10 +40,10 @@ class OffsetFrame(Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class ConstantOffset:
+class _ConstantOffset:
     """A transform by which the tools of two arms differ at all states."""
 
-    frame: OffsetFrame
+    frame: _OffsetFrame
     T: Array
     """Shape (4, 4): the URDF's frame in the table's."""
 
@@ -113,13 +113,13 @@ def verify_urdf(
             f"the file's angles are rounded: as designed the tool differs by up to {rounding:.1e}, as a share of the"
             " reach and in rad; differences of that size count as agreement"
         )
-    comparisons, offsets = _tool(description, reference, tolerance + TOOL_SHARE * rounding)
+    comparisons, offsets = _tool(description, reference, tolerance + _TOOL_SHARE * rounding)
     notes += [*map(str, offsets), *second_opinion(chain, motion.q, _tools(reference))]
-    if not any(offset.frame is OffsetFrame.BASE for offset in offsets):
-        notes += differences(description, model, tolerance + TOOL_SHARE * rounding)
+    if not any(offset.frame is _OffsetFrame.BASE for offset in offsets):
+        notes += differences(description, model, tolerance + _TOOL_SHARE * rounding)
     if all(joint.bodies for joint in description.joints):
         notes += reference.notes
-        comparisons += _dynamics(description, reference, tolerance + DYNAMICS_SHARE * rounding)
+        comparisons += _dynamics(description, reference, tolerance + _DYNAMICS_SHARE * rounding)
     else:
         notes.append("dynamics not compared: the table has links without a body")
     import pinocchio as pin
@@ -142,7 +142,7 @@ def _rounding_of_angles(chain: Chain, q: Array, reach: float) -> float:
     designed = read_chain(chain.path, chain.base, chain.tip, as_designed=True)
     if not designed.tree.changes:
         return 0.0
-    states = q[:ROUNDING_STATES]
+    states = q[:_ROUNDING_STATES]
     difference = np.array([tip_in_base(designed, state) - tip_in_base(chain, state) for state in states])
     difference[:, :3, 3] /= reach
     return float(np.abs(difference).max())
@@ -150,14 +150,14 @@ def _rounding_of_angles(chain: Chain, q: Array, reach: float) -> float:
 
 def _tool(
     description: Description, reference: PinocchioResults, tolerance: float
-) -> tuple[list[Comparison], list[ConstantOffset]]:
+) -> tuple[list[Comparison], list[_ConstantOffset]]:
     """Return the comparisons of the tool's pose, and the constant transforms that explain a difference."""
     ours = kinematics.forward_kinematics(description, reference.motion.q)
     theirs = _tools(reference)
     reach = max(1.0, description.reach)
     position = largest(ours[:, :3, 3] - theirs[:, :3, 3]) / reach
     rotation = largest(ours[:, :3, :3] - theirs[:, :3, :3])
-    differs = max(position.max(), rotation.max()) > max(tolerance, SAME_POSE)
+    differs = max(position.max(), rotation.max()) > max(tolerance, _SAME_POSE)
     comparisons = [Comparison("tool position", position, tolerance), Comparison("tool rotation", rotation, tolerance)]
     return comparisons, list(_constant_offsets(ours, theirs)) if differs else []
 
@@ -168,12 +168,12 @@ def _tools(reference: PinocchioResults) -> Array:
     return np.asarray(np.linalg.inv(frames[:, 0]) @ frames[:, 1])
 
 
-def _constant_offsets(ours: Array, theirs: Array) -> Iterator[ConstantOffset]:
+def _constant_offsets(ours: Array, theirs: Array) -> Iterator[_ConstantOffset]:
     """Yield the constant transforms at the tool and at the base between two tools, shape (N, 4, 4) each."""
     inverse = np.linalg.inv(ours)
-    for frame, offsets in ((OffsetFrame.TOOL, inverse @ theirs), (OffsetFrame.BASE, theirs @ inverse)):
-        if np.abs(offsets - offsets[0]).max() < CONSTANT:
-            yield ConstantOffset(frame, offsets[0])
+    for frame, offsets in ((_OffsetFrame.TOOL, inverse @ theirs), (_OffsetFrame.BASE, theirs @ inverse)):
+        if np.abs(offsets - offsets[0]).max() < _CONSTANT:
+            yield _ConstantOffset(frame, offsets[0])
 
 
 def _dynamics(description: Description, reference: PinocchioResults, tolerance: float) -> Iterator[Comparison]:

@@ -132,7 +132,7 @@ class PinocchioResults:
             turned = R @ h
             lever = 2 * (p @ turned) * np.eye(3) - np.outer(p, turned) - np.outer(turned, p)
             second = R @ second @ R.T + lever + m * (p @ p * np.eye(3) - np.outer(p, p))
-            matrix[:, k] = [m, *(turned + m * p), *(second[place] for place in PINOCCHIO_ORDER)]
+            matrix[:, k] = [m, *(turned + m * p), *(second[place] for place in _PINOCCHIO_ORDER)]
         return matrix
 
     @property
@@ -145,5 +145,5 @@ class PinocchioResults:
         return np.array([np.reshape(np.array(answer(*state)), shape) for state in zip(*self.motion, strict=True)])
 
 
-PINOCCHIO_ORDER = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
+_PINOCCHIO_ORDER = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 """Row and column of Pinocchio's inertia parameters, in its order: Ixx, Ixy, Iyy, Ixz, Iyz, Izz."""

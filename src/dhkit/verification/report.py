@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from dhkit.display import html_block, html_lines, html_table, repr_line
 
-MAX_SHOWN = 20
+_MAX_SHOWN = 20
 """Largest number of quantities that a notebook shows; an arm's own report has fewer."""
-MEASURE = (
+_MEASURE = (
     "Each error is the largest difference of an entry at one state. Positions and linear rows of Jacobians are divided "
     "by the lengths of the table (at least 1 m); rotations are not scaled. All other quantities are divided by the "
     "largest entry of the reference, or by a natural size where that is larger (for torques: weight of all links times "
@@ -115,7 +115,7 @@ class VerificationReport:
             )
             for one in worst
         ]
-        table = html_table(("quantity", "worst error", "at most", ""), rows, align="lrrl", most=MAX_SHOWN)
+        table = html_table(("quantity", "worst error", "at most", ""), rows, align="lrrl", most=_MAX_SHOWN)
         return html_block(self._title, table, html_lines(self.notes))
 
     @property
@@ -136,7 +136,7 @@ class VerificationReport:
         rows = [("quantity", "worst error", "at most", "", "worst state"), ("---",) * 5, *self._rows]
         table = ["| " + " | ".join(_plain(cell) for cell in row) + " |" for row in rows]
         notes = [f"- {_plain(note)}" for note in self.notes]
-        return "\n".join([f"# {_plain(self._title)}", "", *table, "", *notes, *([""] if notes else []), MEASURE, ""])
+        return "\n".join([f"# {_plain(self._title)}", "", *table, "", *notes, *([""] if notes else []), _MEASURE, ""])
 
     def latex(self) -> str:
         """Return a table for a paper's appendix: booktabs, with a caption that says what was measured."""
@@ -145,7 +145,7 @@ class VerificationReport:
             f"{'yes' if agreement.ok else 'no'} & \\scriptsize {_escaped(agreement.state)} \\\\"
             for agreement in self.agreements
         ]
-        caption = f"{_escaped(self._title)}. {_escaped(' '.join([*self.notes, MEASURE]))}"
+        caption = f"{_escaped(self._title)}. {_escaped(' '.join([*self.notes, _MEASURE]))}"
         return "\n".join(
             [
                 "% needs \\usepackage{booktabs}",
@@ -183,7 +183,7 @@ def printable(text: str) -> str:
     return "".join(character if character.isprintable() else "?" for character in text)
 
 
-SPECIAL = {character: f"\\{character}" for character in "&%$#_{}"} | {
+_SPECIAL = {character: f"\\{character}" for character in "&%$#_{}"} | {
     "\\": "\\textbackslash{}",
     "~": "\\textasciitilde{}",
     "^": "\\textasciicircum{}",
@@ -197,7 +197,7 @@ def _plain(text: str) -> str:
 
 def _escaped(text: str) -> str:
     """Return text escaped for LaTeX."""
-    return "".join(SPECIAL.get(character, character) for character in text)
+    return "".join(_SPECIAL.get(character, character) for character in text)
 
 
 def _power(number: float) -> str:

@@ -11,9 +11,9 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_text
 
-TOLERANCE = 1e-9
+_TOLERANCE = 1e-9
 """Largest difference of a frame's entries, and of masses, centres and moments of inertia, that counts as agreement."""
-STATES = 10
+_STATES = 10
 
 
 def second_opinion(chain: Chain, q: Array, tools: Array) -> Iterator[str]:
@@ -36,16 +36,16 @@ def second_opinion(chain: Chain, q: Array, tools: Array) -> Iterator[str]:
     logging.getLogger("yourdfpy").setLevel(logging.CRITICAL)
     try:
         robot = yourdfpy.URDF.load(io.BytesIO(chain_text(chain).encode()), load_meshes=False, build_scene_graph=True)
-        frames = max(_tool_difference(robot, chain, *state) for state in zip(q[:STATES], tools, strict=False))
+        frames = max(_tool_difference(robot, chain, *state) for state in zip(q[:_STATES], tools, strict=False))
     except Exception as error:  # a second reader that fails says nothing about the file
         yield f"yourdfpy does not read it: {' '.join(str(error).split())[:120] or type(error).__name__}"
         return
     links = [link for group in chain.groups for link in group]
     different = [name for name in links if not _same_inertial(robot, chain, name)]
     version = getattr(yourdfpy, "__version__", "")
-    if frames <= TOLERANCE and not different:
+    if frames <= _TOLERANCE and not different:
         yield f"yourdfpy {version} reads the same frames (within {frames:.1e}) and inertials"
-    if frames > TOLERANCE:
+    if frames > _TOLERANCE:
         yield f"yourdfpy {version} puts the tool {frames:.1e} away from where Pinocchio has it"
     if different:
         yield f"yourdfpy {version} reads other inertials of links {', '.join(different)[:200]}"
@@ -65,7 +65,7 @@ def _same_inertial(robot: object, chain: Chain, name: str) -> bool:
     inertia = T[:3, :3] @ np.asarray(theirs.inertia, dtype=float) @ T[:3, :3].T
     size = max(1.0, float(np.abs(ours.inertia).max()))
     return bool(
-        abs(theirs.mass - ours.mass) <= TOLERANCE * max(1.0, ours.mass)
-        and np.abs(T[:3, 3] - ours.com).max() <= TOLERANCE
-        and np.abs(inertia - ours.inertia).max() <= TOLERANCE * size
+        abs(theirs.mass - ours.mass) <= _TOLERANCE * max(1.0, ours.mass)
+        and np.abs(T[:3, 3] - ours.com).max() <= _TOLERANCE
+        and np.abs(inertia - ours.inertia).max() <= _TOLERANCE * size
     )

@@ -10,7 +10,7 @@ from dhkit.description import Array, Description, takes_robot
 from dhkit.display import counted, repr_line
 from dhkit.kernels import check_whole
 
-DEFAULT_SPEED, ACCELERATION = 3.0, 10.0
+_DEFAULT_SPEED, _ACCELERATION = 3.0, 10.0
 """Largest speed of a joint without speed limit, rad/s or m/s, and largest acceleration, rad/s^2 or m/s^2."""
 
 
@@ -60,9 +60,9 @@ def random_motions(description: Description, samples: int, seed: int = 0) -> Joi
     limited = np.isfinite(numbers.lower) & np.isfinite(numbers.upper)
     free = np.where(numbers.prismatic, 1.0, np.pi)
     lower, upper = np.where(limited, numbers.lower, -free), np.where(limited, numbers.upper, free)
-    rate = np.where(np.isfinite(numbers.velocity), numbers.velocity, DEFAULT_SPEED)
+    rate = np.where(np.isfinite(numbers.velocity), numbers.velocity, _DEFAULT_SPEED)
     return JointStates(
         rng.uniform(lower, upper, shape),
         rng.uniform(-rate, rate, shape),
-        rng.uniform(-ACCELERATION, ACCELERATION, shape),
+        rng.uniform(-_ACCELERATION, _ACCELERATION, shape),
     )

@@ -21,9 +21,9 @@ GRID_COLOR = "#d5d9e0"
 LIMIT_STYLE: dict[str, Any] = {"ls": (0, (5, 3)), "lw": 1.0, "alpha": 0.75}
 SHARED_COLOR = "#5b6472"
 """Colour of a limit that several joints have, and of remarks."""
-MARGIN = 0.12
+_MARGIN = 0.12
 """Room above and below the curves, as a share of their range."""
-MAX_LIMIT_DISTANCE = 0.35
+_MAX_LIMIT_DISTANCE = 0.35
 """Largest distance of a limit that is drawn from its joint's curve, as a share of the range of all curves: a limit
 farther away would flatten them."""
 LINE_STYLES = ("-", "-.", ":")
@@ -90,7 +90,7 @@ def draw_diagram(axes: Axes, diagram: Diagram, times: Array) -> None:
     low, high = float(diagram.values.min()), float(diagram.values.max())
     span = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-12)
     draw_curves(axes, diagram, times)
-    distance = MAX_LIMIT_DISTANCE * span
+    distance = _MAX_LIMIT_DISTANCE * span
     lowest, highest = diagram.values.min(axis=0) - distance, diagram.values.max(axis=0) + distance
     near = [
         (float(limits[k]), i)
@@ -102,7 +102,7 @@ def draw_diagram(axes: Axes, diagram: Diagram, times: Array) -> None:
     for limit, i in near:
         axes.axhline(limit, color=SHARED_COLOR if shared.count(limit) > 1 else joint_color(i), **LIMIT_STYLE)
     low, high = min([low, *(limit for limit, _ in near)]), max([high, *(limit for limit, _ in near)])
-    margin = MARGIN * max(high - low, span)
+    margin = _MARGIN * max(high - low, span)
     axes.set_ylim(low - margin, high + margin)
 
 

@@ -20,17 +20,17 @@ if TYPE_CHECKING:
 Lowered: TypeAlias = dict[str, Any]
 """A meshcat object or command as dictionaries, lists, numbers and bytes."""
 
-Y_TO_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=float)
+_Y_TO_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=float)
 """meshcat's cylinders stand along y, dhkit's along z: a quarter turn about x."""
 
-ROUND_SIDES = 48
+_ROUND_SIDES = 48
 """Sides of round solids; a multiple of 4, so that the silhouette has the true radius."""
 
-FRONT_SIDE, BOTH_SIDES = 0, 2
+_FRONT_SIDE, _BOTH_SIDES = 0, 2
 """three.js's sides of a surface: both are drawn, at twice the cost, where a file's triangles may be reversed."""
 
-ARROW_SIDES = 8
-HALF_LINE_PIECES = 3
+_ARROW_SIDES = 8
+_HALF_LINE_PIECES = 3
 """Pieces of half a grid line: opacity is linear along each, and each costs time without a graphics processor."""
 
 
@@ -50,7 +50,7 @@ def part_object(part: Part, name: str) -> Lowered:
         A mesh has no readable file.
     """
     meshcat = _meshcat()
-    side = BOTH_SIDES if isinstance(part.geometry, Mesh) else FRONT_SIDE
+    side = _BOTH_SIDES if isinstance(part.geometry, Mesh) else _FRONT_SIDE
     material = meshcat.MeshPhongMaterial(color=int(part.color[1:], 16), shininess=40, specular=0x222222, side=side)
     return _lowered("Mesh", _geometry(part), material, name)
 
@@ -64,7 +64,7 @@ def part_transform(part: Part) -> Array:
     if isinstance(part.geometry, Mesh):
         T[:3, :3] *= [float(factor) for factor in part.geometry.scale]  # may mirror: both sides are drawn
     if isinstance(part.geometry, Cylinder | Capsule):
-        T = np.matmul(T, Y_TO_Z)
+        T = np.matmul(T, _Y_TO_Z)
     return T
 
 
@@ -118,7 +118,7 @@ def grid_object(size: float, name: str) -> Lowered:
     lines = int(np.ceil(1.3 * size / step))
     half = lines * step
     across = step * np.arange(-lines, lines + 1)
-    along = np.linspace(-half, half, 2 * HALF_LINE_PIECES + 1)
+    along = np.linspace(-half, half, 2 * _HALF_LINE_PIECES + 1)
     x, y = np.meshgrid(along, across)
     line = np.stack([x, y, np.zeros_like(x)], axis=-1)
     segments = np.stack([line[:, :-1], line[:, 1:]], axis=2).reshape(-1, 2, 3)
@@ -159,7 +159,7 @@ def _geometry(part: Part) -> Any:
             return _lathe(_arc(float(shape.radius), 0.0, -90, 90))
         case Cylinder():
             cylinder = meshcat.Cylinder(float(shape.length), float(shape.radius))
-            cylinder.radialSegments = ROUND_SIDES
+            cylinder.radialSegments = _ROUND_SIDES
             return cylinder
         case Capsule():
             radius, half = float(shape.radius), float(shape.length) / 2
@@ -190,29 +190,30 @@ def _lathe(outline: Array) -> Any:
     class Lathe(_meshcat().Geometry):  # type: ignore[misc]  # meshcat-python has none
         def lower(self, object_data: Lowered) -> Lowered:
             points = [{"x": float(x), "y": float(y)} for x, y in outline]
-            return {"uuid": self.uuid, "type": "LatheGeometry", "points": points, "segments": ROUND_SIDES}
+            return {"uuid": self.uuid, "type": "LatheGeometry", "points": points, "segments": _ROUND_SIDES}
 
     return Lathe()
 
 
 def _arc(radius: float, height: float, start: float, stop: float) -> Array:
     """Return points of a circle between two latitudes, degrees, shape (k, 2), m: distance from the axis, and height."""
-    steps = round(abs(stop - start) / 360 * ROUND_SIDES)
+    steps = round(abs(stop - start) / 360 * _ROUND_SIDES)
     latitude = np.radians(np.linspace(start, stop, steps + 1))
     return np.stack([radius * np.maximum(np.cos(latitude), 0), height + radius * np.sin(latitude)], axis=1)
 
 
 def _arrow() -> tuple[Array, np.ndarray[Any, np.dtype[np.uint32]]]:
     """Return an arrow of length 1 along x, a rod with a cone: vertices, shape (k, 3), and triangles, shape (m, 3)."""
-    turn = math.tau * np.arange(ARROW_SIDES) / ARROW_SIDES
+    turn = math.tau * np.arange(_ARROW_SIDES) / _ARROW_SIDES
     rings = [(0.0, 0.02), (0.8, 0.02), (0.8, 0.055), (1.0, 0.0)]
     vertices = np.concatenate(
-        [np.stack([np.full(ARROW_SIDES, x), r * np.cos(turn), r * np.sin(turn)], axis=1) for x, r in rings]
+        [np.stack([np.full(_ARROW_SIDES, x), r * np.cos(turn), r * np.sin(turn)], axis=1) for x, r in rings]
     )
-    i = np.arange(ARROW_SIDES)
-    j = (i + 1) % ARROW_SIDES
+    i = np.arange(_ARROW_SIDES)
+    j = (i + 1) % _ARROW_SIDES
     bands = [
-        k * ARROW_SIDES + np.array([[i, j, j + ARROW_SIDES], [i, j + ARROW_SIDES, i + ARROW_SIDES]]) for k in range(3)
+        k * _ARROW_SIDES + np.array([[i, j, j + _ARROW_SIDES], [i, j + _ARROW_SIDES, i + _ARROW_SIDES]])
+        for k in range(3)
     ]
     faces = np.concatenate([band.transpose(0, 2, 1).reshape(-1, 3) for band in bands])
     return vertices, faces.astype(np.uint32)

@@ -21,13 +21,13 @@ from dhkit.viewer.session import Slot
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-OVERLAYS = (
+_OVERLAYS = (
     (Slot.POINTS, "points of the workspace", "#7f8794"),
     (Slot.ELLIPSOIDS, "ellipsoid: how fast the tool can move", "var(--accent)"),
     (Slot.OBSTACLES, "obstacles", "var(--obstacle)"),
 )
 """The name and the color, in the page's style, of each overlay that is drawn beside the arm."""
-EMPTY_LENGTH = 20
+_EMPTY_LENGTH = 20
 """Bytes of a message of an overlay without content: its header and a count."""
 
 
@@ -117,7 +117,7 @@ class Exportable(ABC):
             caption=caption,
             links={_text("links", text): _address(address) for text, address in (links or {}).items()},
             ghosts=[(_text("names", text), color) for text, color in shown.ghost_names],
-            overlays=[(text, color) for slot, text, color in OVERLAYS if len(messages.get(slot, b"")) > EMPTY_LENGTH],
+            overlays=[(text, color) for slot, text, color in _OVERLAYS if len(messages.get(slot, b"")) > _EMPTY_LENGTH],
         )
         messages.pop(Slot.MOTION, None)  # the page works out poses and motions itself
         return offline_page([*messages.values()], title, data)

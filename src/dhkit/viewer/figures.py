@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LINK_COLOR, PATH_COLOR = "#3a4252", "#d9480f"
-FLATNESS = 1e-9
+_FLATNESS = 1e-9
 """Largest extent across a plane, as a share of the arm's size, of an arm that is drawn in that plane."""
-MIN_EDGE_SHARE = 0.5
+_MIN_EDGE_SHARE = 0.5
 """Shortest edge of the box around an arm, as a share of the longest: slimmer boxes have no room for tick labels."""
-ZOOM = 0.86
+_ZOOM = 0.86
 """Zoom that leaves the labels of a box's axes inside the figure."""
 
 
@@ -204,12 +204,12 @@ def space_axes(figure: Figure, place: Any) -> Any:
 def set_space_limits(axes: Any, points: Array, margin: float) -> None:
     """Set limits around points, shape (k, 3), with a margin, m, and equal scales; a flat scene is seen from above."""
     low, high = points.min(axis=0), points.max(axis=0)
-    is_flat = high[2] - low[2] <= FLATNESS * max(float((high - low).max()), 1e-12)
-    half = np.maximum((high - low) / 2 + margin, MIN_EDGE_SHARE * float((high - low).max() / 2 + margin))
+    is_flat = high[2] - low[2] <= _FLATNESS * max(float((high - low).max()), 1e-12)
+    half = np.maximum((high - low) / 2 + margin, _MIN_EDGE_SHARE * float((high - low).max() / 2 + margin))
     centre = (low + high) / 2
     for set_limits, c, h in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), centre, half, strict=True):
         set_limits(c - h, c + h)
-    axes.set_box_aspect(half, zoom=ZOOM)
+    axes.set_box_aspect(half, zoom=_ZOOM)
     axes.view_init(elev=24, azim=-58)
     if is_flat:
         axes.view_init(elev=90, azim=-90)

@@ -17,15 +17,11 @@ from tornado.iostream import IOStream
 from tornado.web import HTTPError, RequestHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
+from dhkit.viewer.bounds import BOUNDS
 from dhkit.viewer.page import SECURITY_POLICY
 from dhkit.viewer.protocol import ProtocolError
 from dhkit.viewer.requests import Request, Shown, decode_message
 from dhkit.viewer.session import Session
-
-MAX_REQUESTS = 64
-"""Largest number of requests of one page that wait for an answer, or whose answer the page has not taken yet."""
-MAX_PAGES = 100
-"""Largest number of pages at a time: the samples of some minutes may wait for each."""
 
 
 class PageServer(Protocol):
@@ -117,11 +113,11 @@ class Page(Guarded, WebSocketHandler):
     """Requests that wait for an answer."""
 
     def prepare(self) -> None:
-        """Refuse foreign requests, those without an Origin, which browsers send, and pages beyond MAX_PAGES."""
+        """Refuse foreign requests, those without an Origin, which browsers send, and pages beyond BOUNDS.pages."""
         super().prepare()
         if "Origin" not in self.request.headers:
             raise HTTPError(403, reason="Missing Origin")
-        if len(self.server.pages) >= MAX_PAGES:
+        if len(self.server.pages) >= BOUNDS.pages:
             raise HTTPError(503, reason="Too many pages")
 
     def check_origin(self, origin: str) -> bool:
@@ -148,8 +144,8 @@ class Page(Guarded, WebSocketHandler):
         if isinstance(received, Shown):
             self.session.acknowledge(received.sequence)
             self.send()
-        elif self._unanswered >= MAX_REQUESTS:
-            text = f"{MAX_REQUESTS} requests wait for an answer; expected at most so many"
+        elif self._unanswered >= BOUNDS.requests:
+            text = f"{BOUNDS.requests} requests wait for an answer; expected at most so many"
             await self._send_and_wait({"type": "error", "id": received.id, "error": text})
         else:
             self._unanswered += 1

@@ -17,12 +17,12 @@ from dhkit.viewer.motion import Motion, check_motion, exceeded_limit, interpolat
 from dhkit.viewer.scene import frame_labels
 
 COLUMNS = ("theta", "d", "a", "alpha")
-SAMPLE_RATE = 30.0
+_SAMPLE_RATE = 30.0
 """Samples per second of a motion in a page, Hz; the page draws straight lines between them."""
-MIN_SAMPLES, MAX_SAMPLES = 121, 6001
-LIMIT_SAMPLES = 4_001
+_MIN_SAMPLES, _MAX_SAMPLES = 121, 6001
+_LIMIT_SAMPLES = 4_001
 """Samples of a trajectory at which its limits are checked."""
-DIGITS = 6
+_DIGITS = 6
 """Decimals of joint values in a page: 1e-6 rad are 6 um on an arm of 6 m."""
 
 
@@ -127,13 +127,13 @@ def interactive_data(
 def _motion_state(description: Description, name: str, motion: Motion) -> dict[str, Any]:
     """Return a motion at equal steps of time, with rates and torques where they are known."""
     times, q, reference_q = played_motion(description, motion)
-    count = int(np.clip(math.ceil(SAMPLE_RATE * times[-1]) + 1, MIN_SAMPLES, MAX_SAMPLES))
+    count = int(np.clip(math.ceil(_SAMPLE_RATE * times[-1]) + 1, _MIN_SAMPLES, _MAX_SAMPLES))
     grid = np.linspace(0.0, times[-1], count)
     sampled_q = interpolate(times, q, grid)
     tau: Array | None = None
     # Limits are checked at the motion's own samples, of which the page may have fewer.
     if isinstance(motion, Trajectory):
-        checked = np.linspace(0.0, motion.duration, LIMIT_SAMPLES)
+        checked = np.linspace(0.0, motion.duration, _LIMIT_SAMPLES)
         has_bodies = all(joint.bodies for joint in description.joints)
         qd, tau = motion.qd(grid), motion.tau(grid) if has_bodies else None
         checked_tau = motion.tau(checked) if has_bodies else None
@@ -156,10 +156,10 @@ def _motion_state(description: Description, name: str, motion: Motion) -> dict[s
         "limits": limits_state(description),
         "touching": None,
         "excess": excess,
-        "step": float(grid[1]) if len(grid) == MAX_SAMPLES else None,
+        "step": float(grid[1]) if len(grid) == _MAX_SAMPLES else None,
     }
 
 
 def _rounded(values: Array) -> list[list[float]]:
-    rounded: list[list[float]] = np.round(values, DIGITS).tolist()
+    rounded: list[list[float]] = np.round(values, _DIGITS).tolist()
     return rounded

@@ -16,7 +16,7 @@ from dhkit.trajectories import Trajectory
 Motion = Trajectory | SimulationResult | tuple[ArrayLike, ArrayLike]
 """A motion that can be played; the last kind is times, shape (N,), s, and joint values, shape (N, n), rad and m."""
 
-FRAME_RATE = 60.0
+_FRAME_RATE = 60.0
 """Frames per second of a page, Hz: the rate of most screens."""
 MIN_FRAMES, MAX_FRAMES = 121, 6001
 """Fewest frames of a motion, for slow motion; and most, 2.5 MB for a 6-axis arm and 2.3 MB more for its ghost."""
@@ -127,7 +127,7 @@ def interpolate(times: Array, rows: Array, at: Array) -> Array:
 
 def _frame_times(duration: float) -> Array:
     """Return the times of a page's frames, shape (N,), s, from 0 to a duration, s."""
-    return np.linspace(0.0, duration, int(np.clip(np.ceil(FRAME_RATE * duration) + 1, MIN_FRAMES, MAX_FRAMES)))
+    return np.linspace(0.0, duration, int(np.clip(np.ceil(_FRAME_RATE * duration) + 1, MIN_FRAMES, MAX_FRAMES)))
 
 
 def exceeded_limit(description: Description, q: Array, qd: Array, tau: Array | None) -> str | None:

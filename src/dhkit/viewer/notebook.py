@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-RESOLUTION = 100
+_RESOLUTION = 100
 """Resolution of a figure in a notebook, dots per inch."""
-STYLE = "width: 100%; height: 560px; border: 0; border-radius: 8px"
-NOTE = (
+_STYLE = "width: 100%; height: 560px; border: 0; border-radius: 8px"
+_NOTE = (
     "A copy of the state when this cell ran. With the package anywidget "
     "(<code>pip install anywidget</code>) <code>view.show(q)</code> moves it."
 )
@@ -28,8 +28,8 @@ NOTE = (
 def framed_page(page: str, title: str) -> str:
     """Return a page as an element of another page: a frame with scripts, without storage, address or network."""
     source, name = html.escape(page), html.escape(title)
-    frame = f'<iframe sandbox="allow-scripts" srcdoc="{source}" title="{name}" style="{STYLE}"></iframe>'
-    return f'{frame}<p style="margin: 2px 0; opacity: 0.7; font-size: 90%">{NOTE}</p>'
+    frame = f'<iframe sandbox="allow-scripts" srcdoc="{source}" title="{name}" style="{_STYLE}"></iframe>'
+    return f'{frame}<p style="margin: 2px 0; opacity: 0.7; font-size: 90%">{_NOTE}</p>'
 
 
 def notebook_widget(page: str, title: str) -> Any:
@@ -52,7 +52,7 @@ def _widget_class() -> Any:
         _esm = (resources.files("dhkit.viewer") / "static" / "notebook.js").read_text("utf-8")
         page = traitlets.Unicode().tag(sync=True)
         title = traitlets.Unicode().tag(sync=True)
-        style = traitlets.Unicode(STYLE).tag(sync=True)
+        style = traitlets.Unicode(_STYLE).tag(sync=True)
 
     return NotebookView
 
@@ -70,7 +70,7 @@ def _figure_class() -> type[Figure]:
     class NotebookFigure(Figure):
         def _repr_png_(self) -> bytes:
             picture = io.BytesIO()
-            self.savefig(picture, format="png", dpi=RESOLUTION)
+            self.savefig(picture, format="png", dpi=_RESOLUTION)
             return picture.getvalue()
 
     return NotebookFigure

@@ -9,7 +9,7 @@ import tempfile
 import webbrowser
 from pathlib import Path
 
-PAGE = """<!doctype html>
+_PAGE = """<!doctype html>
 <meta charset="utf-8">
 <meta http-equiv="refresh" content="0; url={url}">
 <title>dhkit</title>
@@ -27,5 +27,5 @@ def open_in_browser(url: str) -> None:
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     file = folder / "open.html"
     file.touch(mode=0o600)
-    file.write_text(PAGE.format(url=html.escape(url)), encoding="utf-8")
+    file.write_text(_PAGE.format(url=html.escape(url)), encoding="utf-8")
     webbrowser.open(file.as_uri())

@@ -14,17 +14,17 @@ if TYPE_CHECKING:
     from dhkit.kinematics.manipulability import Ellipsoid
     from dhkit.planning.obstacles import Scene
 
-GREY = (0.5, 0.55, 0.62)
+_GREY = (0.5, 0.55, 0.62)
 AXIS_COLORS = ("#e5484d", "#30a46c", "#3b82f6")
 """Colors of the x, y and z axes of frames, readable on white and on black; the page has them in ``colors.js``."""
 TINTS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#ee7733", "#009988")
 """Tol's bright and vibrant schemes (SRON/EPS/TN/09-002, 2021): the eight branches of a wrist-partitioned arm."""
-HEAT_COLORMAP, HEAT_END = "viridis", 0.87
+_HEAT_COLORMAP, _HEAT_END = "viridis", 0.87
 """matplotlib's colormap of even steps, which colour-blind people can tell apart too, and the share of it that is used:
 its lightest colors are lost on white."""
-FLOOR_SHARE = 1.2
+_FLOOR_SHARE = 1.2
 """Half an edge of the square that a floor without end is drawn as, as a share of the arm's size."""
-MIN_AXIS_SHARE = 0.01
+_MIN_AXIS_SHARE = 0.01
 """Smallest half axis that is drawn, as a share of the longest: a flat ball has no normals, and no light on it."""
 
 
@@ -45,7 +45,7 @@ def color_bytes(colors: ArrayLike | None, count: int, name: str = "colors") -> N
     ValueError
         The colors have another shape, or values that are not from 0 to 1.
     """
-    given = np.asarray(GREY if colors is None else colors, dtype=float)
+    given = np.asarray(_GREY if colors is None else colors, dtype=float)
     if given.shape not in ((3,), (count, 3)):
         raise ValueError(f"{name} has shape {given.shape}; expected (3,) or ({count}, 3)")
     if not np.all((given >= 0) & (given <= 1)):
@@ -74,8 +74,8 @@ def heat_colors(values: ArrayLike) -> Array:
     import matplotlib
 
     known = np.nan_to_num(np.asarray(values, dtype=float))
-    share = HEAT_END * known / (float(known.max(initial=0.0)) or 1.0)
-    return np.asarray(matplotlib.colormaps[HEAT_COLORMAP](share))[..., :3]
+    share = _HEAT_END * known / (float(known.max(initial=0.0)) or 1.0)
+    return np.asarray(matplotlib.colormaps[_HEAT_COLORMAP](share))[..., :3]
 
 
 def ghost_tints(count: int) -> NDArray[np.uint8]:
@@ -119,7 +119,7 @@ def ball_transforms(ellipsoid: Ellipsoid, scale: float | None, longest: float) -
     known = np.isfinite(lengths).all(axis=1)
     centers, axes, lengths = centers[known], axes[known], lengths[known]
     longest_axes = lengths.max(axis=1, keepdims=True)
-    drawn = np.maximum(lengths, MIN_AXIS_SHARE * longest_axes)
+    drawn = np.maximum(lengths, _MIN_AXIS_SHARE * longest_axes)
     if scale is None:
         scale = longest / (float(longest_axes.max(initial=0.0)) or 1.0)
     T: Array = np.zeros((len(centers), 4, 4))
@@ -158,7 +158,7 @@ def rounded_boxes(obstacles: Scene, size: float) -> tuple[Array, Array, Array]:
     for k, obstacle in enumerate(scene):
         if isinstance(obstacle, Floor):
             T[k, 2, 3] = obstacle.height
-            half_edges[k, :2] = FLOOR_SHARE * size
+            half_edges[k, :2] = _FLOOR_SHARE * size
         else:
             T[k], half_edges[k], radii[k] = obstacle.T_world_obstacle, obstacle.half_sizes, obstacle.radius
     return T, half_edges, radii

@@ -35,7 +35,7 @@ MODULES = (
 )
 """The page's ES modules; ``main.js`` imports the others."""
 
-LAB_FILES = (
+_LAB_FILES = (
     "lab.js",
     "lab.css",
     "panels.js",
@@ -62,7 +62,7 @@ LAB_FILES = (
 )
 """Files of the panels, in the folder ``lab``, for pages whose requests Python answers. uPlot is 1.6.32 from npm."""
 
-OFFLINE_MODULES = (
+_OFFLINE_MODULES = (
     "offline/panels.js",
     "offline/desk.js",
     "offline/kinematics.js",
@@ -81,19 +81,19 @@ OFFLINE_MODULES = (
 )
 """Modules of a page with panels and without Python."""
 
-IMPORT = re.compile(r'(\bfrom |\bimport\()"(\.\.?/[^"]+)"')
-UNQUOTED = string.punctuation.translate({ord(mark): None for mark in '%#"'}) + " "
+_IMPORT = re.compile(r'(\bfrom |\bimport\()"(\.\.?/[^"]+)"')
+_UNQUOTED = string.punctuation.translate({ord(mark): None for mark in '%#"'}) + " "
 """Characters that a ``data:`` address has unquoted: base64 would be a quarter longer."""
-REMOVED = re.compile(r"^[ \t]*(?://.*)?\n?", re.MULTILINE)
+_REMOVED = re.compile(r"^[ \t]*(?://.*)?\n?", re.MULTILINE)
 """Indentation, empty lines and whole-line comments, which offline modules lack; no string has several lines."""
-CONTENT_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
+_CONTENT_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript"}
 
 SECURITY_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src data: blob:; connect-src 'self'"
 )
 """Policy of the live page: it loads nothing from other hosts. meshcat's bundle writes style elements."""
 
-OFFLINE_POLICY = "default-src 'none'; script-src 'unsafe-inline' data:; style-src 'unsafe-inline'; img-src data: blob:"
+_OFFLINE_POLICY = "default-src 'none'; script-src 'unsafe-inline' data:; style-src 'unsafe-inline'; img-src data: blob:"
 
 
 def meshcat_bundle() -> bytes:
@@ -128,8 +128,8 @@ def page_files() -> dict[str, tuple[str, bytes]]:
     ModelError
         As :func:`meshcat_bundle`.
     """
-    names = ("index.html", "viewer.css", *MODULES, *(f"lab/{name}" for name in LAB_FILES), "offline/kinematics.js")
-    files = {name: (f"{CONTENT_TYPES[Path(name).suffix]}; charset=utf-8", _static(name).encode()) for name in names}
+    names = ("index.html", "viewer.css", *MODULES, *(f"lab/{name}" for name in _LAB_FILES), "offline/kinematics.js")
+    files = {name: (f"{_CONTENT_TYPES[Path(name).suffix]}; charset=utf-8", _static(name).encode()) for name in names}
     files[""] = files.pop("index.html")
     files["meshcat.js"] = ("text/javascript; charset=utf-8", meshcat_bundle())
     return files
@@ -156,11 +156,11 @@ def offline_page(messages: Sequence[bytes], title: str, interactive: Mapping[str
         if interactive["motions"]:  # the page draws their curves
             style += _static("lab/uplot.css")
             extra += _script(_static("lab/uplot.js"))
-        modules += OFFLINE_MODULES
+        modules += _OFFLINE_MODULES
     return _replace_marks(
         _static("index.html"),
         {
-            "<!-- policy -->": f'<meta http-equiv="Content-Security-Policy" content="{OFFLINE_POLICY}">',
+            "<!-- policy -->": f'<meta http-equiv="Content-Security-Policy" content="{_OFFLINE_POLICY}">',
             "<title>dhkit</title>": f"<title>{html.escape(title)}</title>",
             '<link rel="stylesheet" href="viewer.css">': f"<style>\n{style}</style>",
             '<script src="meshcat.js"></script>': _script(meshcat_bundle().decode()),
@@ -175,7 +175,7 @@ def _modules(names: Sequence[str]) -> str:
     sources = {name: _with_absolute_imports(name, _static(name)) for name in names}
     first = sources.pop("main.js")
     imports = {
-        f"dhkit/{name}": f"data:text/javascript,{quote(source, safe=UNQUOTED)}" for name, source in sources.items()
+        f"dhkit/{name}": f"data:text/javascript,{quote(source, safe=_UNQUOTED)}" for name, source in sources.items()
     }
     return _script(json.dumps({"imports": imports}), ' type="importmap"') + _script(first, ' type="module"')
 
@@ -187,7 +187,7 @@ def _with_absolute_imports(name: str, source: str) -> str:
     def absolute(match: re.Match[str]) -> str:
         return f'{match[1]}"dhkit/{posixpath.normpath(posixpath.join(folder, match[2]))}"'
 
-    return IMPORT.sub(absolute, REMOVED.sub("", source))
+    return _IMPORT.sub(absolute, _REMOVED.sub("", source))
 
 
 def _json(data: Any) -> str:

@@ -17,8 +17,8 @@ from dhkit.viewer.scene import node_transforms
 if TYPE_CHECKING:
     from PIL.Image import Image as Picture
 
-GIF_COLORS = 128
-MAX_PICTURES = 900
+_GIF_COLORS = 128
+_MAX_PICTURES = 900
 """Most pictures of one GIF, or of one series of files."""
 
 
@@ -36,8 +36,8 @@ def _write_gif(images: Iterable[Picture], path: str | Path, rate: float) -> Path
     from PIL import Image
 
     first, *others = images
-    palette = first.quantize(GIF_COLORS, dither=Image.Dither.NONE)
-    frames = [palette, *(image.quantize(GIF_COLORS, palette=palette, dither=Image.Dither.NONE) for image in others)]
+    palette = first.quantize(_GIF_COLORS, dither=Image.Dither.NONE)
+    frames = [palette, *(image.quantize(_GIF_COLORS, palette=palette, dither=Image.Dither.NONE) for image in others)]
     # Times of a GIF are whole hundredths of a second: rounded one by one, they would add up to another duration.
     durations = 10 * np.diff(np.rint(100 / rate * np.arange(len(frames) + 1))).astype(int)
     content = io.BytesIO()
@@ -91,9 +91,9 @@ def write_motion_gif(
         raise ValueError(f"rate is {rate:g}; expected 1 to 50 pictures a second")
     duration = float(played_motion(description, motion).times[-1])
     count = max(2, round(duration * rate) + 1)
-    if count > MAX_PICTURES:
+    if count > _MAX_PICTURES:
         raise ValueError(
-            f"{duration:g} s at {rate:g} pictures a second are {count} pictures; expected at most {MAX_PICTURES}: "
+            f"{duration:g} s at {rate:g} pictures a second are {count} pictures; expected at most {_MAX_PICTURES}: "
             "a lower rate, or a shorter motion"
         )
 
@@ -131,8 +131,8 @@ def _motion_pictures(
     frames: bool,
     ghosts: Sequence[Ghost],
 ) -> Iterable[Picture]:
-    if not 2 <= count <= MAX_PICTURES:
-        raise ValueError(f"{count} pictures; expected 2 to {MAX_PICTURES}")
+    if not 2 <= count <= _MAX_PICTURES:
+        raise ValueError(f"{count} pictures; expected 2 to {_MAX_PICTURES}")
     times, q, reference_q = played_motion(description, motion)
     path = node_transforms(description, q)[:, -1, :3, 3]
     grid = np.linspace(0.0, times[-1], count)

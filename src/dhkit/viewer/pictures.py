@@ -27,27 +27,27 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-SUPERSAMPLING = 2
+_SUPERSAMPLING = 2
 """Fine pixels that are drawn for one pixel of the picture, along each edge: their mean smooths the edges."""
-FIELD_OF_VIEW = np.radians(34.0)
+_FIELD_OF_VIEW = np.radians(34.0)
 """Angle of view across the shorter edge, rad, as in the page."""
-MARGIN = 1.12
+_MARGIN = 1.12
 """Size of the picture over that of what is drawn."""
-SPACE_DIRECTION = np.array([0.62, -0.78, 0.36])
+_SPACE_DIRECTION = np.array([0.62, -0.78, 0.36])
 """Direction from the arm to the camera, world, for an arm that moves in space."""
-FLAT_DIRECTION = np.array([0.35, -0.5, 1.6])
+_FLAT_DIRECTION = np.array([0.35, -0.5, 1.6])
 """The same for an arm whose motions stay near a horizontal plane."""
-LIGHTS = ((0.5, np.array([0.5, -0.55, 0.75])), (0.18, np.array([-0.8, 0.3, 0.35])))
+_LIGHTS = ((0.5, np.array([0.5, -0.55, 0.75])), (0.18, np.array([-0.8, 0.3, 0.35])))
 """Strengths of the lights, and directions to them, world."""
-AMBIENT_LIGHT = 0.42
-GROUND_COLOR, GRID_COLOR, PATH_COLOR = (244, 245, 247), (205, 210, 219), (217, 72, 15)
-REFERENCE_COLOR = (140, 153, 173)
-GHOST_OPACITY = 0.35
-ROUND_SIDES = 40
+_AMBIENT_LIGHT = 0.42
+GROUND_COLOR, _GRID_COLOR, _PATH_COLOR = (244, 245, 247), (205, 210, 219), (217, 72, 15)
+_REFERENCE_COLOR = (140, 153, 173)
+_GHOST_OPACITY = 0.35
+_ROUND_SIDES = 40
 """Sides of a round solid."""
-BLOCK_PIXELS = 4_000_000
+_BLOCK_PIXELS = 4_000_000
 """Pixels of triangles that are drawn at once."""
-MIN_EDGE, MAX_EDGE = 16, 4000
+_MIN_EDGE, _MAX_EDGE = 16, 4000
 """Smallest and largest width and height of a picture, px."""
 
 
@@ -144,8 +144,8 @@ def pictures(
         width, height = map(operator.index, size)
     except (TypeError, ValueError):
         raise ValueError(f"size is {size!r}; expected width and height in px, whole numbers") from None
-    if not (MIN_EDGE <= width <= MAX_EDGE and MIN_EDGE <= height <= MAX_EDGE):
-        raise ValueError(f"size is {width} x {height}; expected {MIN_EDGE} to {MAX_EDGE} px an edge")
+    if not (_MIN_EDGE <= width <= _MAX_EDGE and _MIN_EDGE <= height <= _MAX_EDGE):
+        raise ValueError(f"size is {width} x {height}; expected {_MIN_EDGE} to {_MAX_EDGE} px an edge")
     solids = _solids(description)
     transforms = node_transforms(description, joint_array(description, q))
     moving: Array = np.zeros((0, 4, 4))
@@ -156,9 +156,9 @@ def pictures(
     ground = _draw_ground(description, camera)
     for nodes, reference in zip_longest(transforms, moving):
         image = ground
-        for ghost in (*ghosts, *([] if reference is None else [Ghost(reference, REFERENCE_COLOR)])):
+        for ghost in (*ghosts, *([] if reference is None else [Ghost(reference, _REFERENCE_COLOR)])):
             with_ghost = _draw_arm(solids, ghost.transforms, camera, image, np.array(ghost.color))
-            image = np.rint((1 - GHOST_OPACITY) * image + GHOST_OPACITY * with_ghost).astype(np.uint8)
+            image = np.rint((1 - _GHOST_OPACITY) * image + _GHOST_OPACITY * with_ghost).astype(np.uint8)
         image = _draw_arm(solids, nodes, camera, image)
         yield _finish(image, camera, description, nodes if frames else None, points)
 
@@ -190,13 +190,13 @@ def _triangles(part: Part) -> Array:
             edges = np.array([float(edge) for edge in shape.size])
             mesh, scale = trimesh.creation.box(edges / edges.max()), float(edges.max())
         case Sphere():
-            mesh, scale = trimesh.creation.uv_sphere(1.0, count=[ROUND_SIDES // 2, ROUND_SIDES]), float(shape.radius)
+            mesh, scale = trimesh.creation.uv_sphere(1.0, count=[_ROUND_SIDES // 2, _ROUND_SIDES]), float(shape.radius)
         case Cylinder():
             scale = float(shape.radius)  # of unit size, since trimesh merges points nearer than 1e-8
-            mesh = trimesh.creation.cylinder(1.0, float(shape.length) / scale, sections=ROUND_SIDES)
+            mesh = trimesh.creation.cylinder(1.0, float(shape.length) / scale, sections=_ROUND_SIDES)
         case Capsule():
             scale = float(shape.radius)
-            mesh = trimesh.creation.capsule(float(shape.length) / scale, 1.0, count=[ROUND_SIDES, ROUND_SIDES // 2])
+            mesh = trimesh.creation.capsule(float(shape.length) / scale, 1.0, count=[_ROUND_SIDES, _ROUND_SIDES // 2])
             mesh.apply_translation([0, 0, -mesh.bounds.mean(axis=0)[2]])
     if not isinstance(shape, Mesh):
         corners = scale * np.asarray(mesh.triangles, dtype=float)
@@ -251,19 +251,19 @@ class _Camera:
         up = np.array([0.0, 0.0, 1.0]) if not up.any() else up / np.linalg.norm(up)
         low, high = points.min(axis=0), points.max(axis=0)
         span = high - low
-        towards = SPACE_DIRECTION if abs(up[2]) > 0.5 else np.array([0.18, 0.0, 1.0]) + 0.14 * up
+        towards = _SPACE_DIRECTION if abs(up[2]) > 0.5 else np.array([0.18, 0.0, 1.0]) + 0.14 * up
         if abs(up[2]) > 0.5 and span[2] < 0.25 * max(span[0], span[1]):
-            towards = FLAT_DIRECTION
+            towards = _FLAT_DIRECTION
         ahead = -towards / np.linalg.norm(towards)
         right = np.cross(ahead, up)
         right /= np.linalg.norm(right)
         R = np.stack([right, np.cross(ahead, right), ahead])
-        fine = (SUPERSAMPLING * size[0], SUPERSAMPLING * size[1])
-        focal_length = 0.5 * min(fine) / np.tan(FIELD_OF_VIEW / 2)
+        fine = (_SUPERSAMPLING * size[0], _SUPERSAMPLING * size[1])
+        focal_length = 0.5 * min(fine) / np.tan(_FIELD_OF_VIEW / 2)
         centre = (low + high) / 2
         across = np.abs((points - centre) @ R[:2].T) * 2 * focal_length / np.array(fine)
         depth = (points - centre) @ ahead
-        distance = float(np.max(MARGIN * across.max(axis=1) - depth))
+        distance = float(np.max(_MARGIN * across.max(axis=1) - depth))
         distance = max(distance, 0.3 * float(np.linalg.norm(span)) or scene_size(description))
         return cls(centre - distance * ahead, R, float(focal_length), fine, 1e-3 * distance)
 
@@ -295,9 +295,9 @@ def _draw_arm(
         # Files may have triangles the wrong way round: the side that is seen is lit.
         towards = np.einsum("ij,ij->i", normals, camera.eye - world[:, 0])
         normals *= np.where(towards < 0, -1.0, 1.0)[:, None]
-        light = AMBIENT_LIGHT + sum(
+        light = _AMBIENT_LIGHT + sum(
             strength * np.clip(normals @ (direction / np.linalg.norm(direction)), 0, None)
-            for strength, direction in LIGHTS
+            for strength, direction in _LIGHTS
         )
         corners.append(world)
         colors.append(np.clip(light[:, None] * (solid.color if tint is None else tint), 0, 255))
@@ -322,7 +322,7 @@ def _rasterize(corners: Array, colors: Array, image: NDArray[np.uint8]) -> NDArr
     drawn, nearest = image.reshape(-1, 3).copy(), np.zeros(height * width)
     # Blocks of triangles cover a few million pixels each: the memory for all at once would have no bound.
     boxes = np.ptp(np.clip(corners[..., :2], 0, [width, height]), axis=1) + 1
-    block = np.cumsum(boxes.prod(axis=1)) // BLOCK_PIXELS
+    block = np.cumsum(boxes.prod(axis=1)) // _BLOCK_PIXELS
     for number in np.unique(block):
         chosen = block == number
         _draw_block(corners[chosen], colors[chosen], drawn, nearest, (height, width))
@@ -398,8 +398,8 @@ def _draw_ground(description: Description, camera: _Camera) -> NDArray[np.uint8]
             for k in range(len(pixels) - 1):
                 fade = np.clip(1 - np.hypot(*points[k : k + 2, :2].mean(axis=0)) / half, 0, 1)
                 if fade > 0 and ahead[k] and ahead[k + 1]:
-                    color = tuple(int(g + fade * (line - g)) for g, line in zip(GROUND_COLOR, GRID_COLOR, strict=True))
-                    draw.line([tuple(pixels[k]), tuple(pixels[k + 1])], fill=color, width=SUPERSAMPLING)
+                    color = tuple(int(g + fade * (line - g)) for g, line in zip(GROUND_COLOR, _GRID_COLOR, strict=True))
+                    draw.line([tuple(pixels[k]), tuple(pixels[k + 1])], fill=color, width=_SUPERSAMPLING)
     return np.asarray(image)
 
 
@@ -413,7 +413,7 @@ def _finish(
     draw = ImageDraw.Draw(drawn)
     if len(points) > 1:
         line = [tuple(point) for point in camera.project(points)[:, :2]]
-        draw.line(line, fill=PATH_COLOR, width=2 * SUPERSAMPLING, joint="curve")
+        draw.line(line, fill=_PATH_COLOR, width=2 * _SUPERSAMPLING, joint="curve")
     names = []
     if nodes is not None:
         length = PICTURE_TRIAD_SHARE * scene_size(description)
@@ -421,12 +421,12 @@ def _finish(
             origin = camera.project(T[:3, 3])[:2]
             for axis, color in enumerate(AXIS_COLORS):
                 end = camera.project(T[:3, 3] + length * T[:3, axis])[:2]
-                draw.line([tuple(origin), tuple(end)], fill=color, width=2 * SUPERSAMPLING)
+                draw.line([tuple(origin), tuple(end)], fill=color, width=2 * _SUPERSAMPLING)
         names = [
-            (label.text, camera.project(nodes[label.frame][:3, 3])[:2] / SUPERSAMPLING)
+            (label.text, camera.project(nodes[label.frame][:3, 3])[:2] / _SUPERSAMPLING)
             for label in frame_labels(description)
         ]
-    small = drawn.resize((camera.size[0] // SUPERSAMPLING, camera.size[1] // SUPERSAMPLING), Image.Resampling.LANCZOS)
+    small = drawn.resize((camera.size[0] // _SUPERSAMPLING, camera.size[1] // _SUPERSAMPLING), Image.Resampling.LANCZOS)
     draw, font = ImageDraw.Draw(small), ImageFont.load_default(max(12, small.height // 36))
     for text, (x, y) in names:
         width = draw.textlength(text, font=font)

@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dhkit.description import Array
+from dhkit.viewer.bounds import BOUNDS
 
 if TYPE_CHECKING:
     from dhkit.viewer.scene import Scene
@@ -43,10 +44,7 @@ LENGTH = struct.Struct("<I")
 MAX_SEQUENCE = 2**32
 VISIBLE_FLAG, GHOST_FLAG = 1, 2
 """Flags of a message: the frames or the tool's path are drawn; a ghost moves along."""
-MAX_SAMPLE_NUMBERS = 100_000
-"""Largest number of floats in samples that wait for a slow page, and that a new page gets: half an hour of a robot's
-errors are 60 kB."""
-WORD = 4
+_WORD = 4
 """Bytes of a float: samples begin at a multiple of them."""
 
 
@@ -205,16 +203,16 @@ class Samples:
     restart: bool = False
 
     def followed_by(self, later: Samples) -> Samples:
-        """Return the rows of both; of more than :data:`MAX_SAMPLE_NUMBERS` numbers the oldest rows are dropped."""
+        """Return the rows of both; of more than ``BOUNDS.sample_numbers`` numbers the oldest rows are dropped."""
         if later.restart or later.columns != self.columns:
             return replace(later, restart=True)
         rows = np.concatenate([self.rows, later.rows])
-        return replace(self, rows=rows[-max(1, MAX_SAMPLE_NUMBERS // max(1, len(self.columns))) :])
+        return replace(self, rows=rows[-max(1, BOUNDS.sample_numbers // max(1, len(self.columns))) :])
 
     def encoded(self) -> bytes:
         """Return the samples as a message."""
         text = _json({"name": self.name, "columns": self.columns, "restart": self.restart})
-        text += b" " * (-len(text) % WORD)
+        text += b" " * (-len(text) % _WORD)
         return _message(MessageType.SAMPLES, LENGTH.pack(len(text)), text, self.rows)
 
 

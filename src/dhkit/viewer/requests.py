@@ -6,12 +6,8 @@ import json
 from dataclasses import dataclass
 from typing import NoReturn
 
+from dhkit.viewer.bounds import BOUNDS
 from dhkit.viewer.protocol import MAX_SEQUENCE, ProtocolError
-
-MAX_NAME_LENGTH = 40
-"""Longest name of a request, characters."""
-MAX_DEPTH = 6
-"""Most levels of lists and objects in a request."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +47,12 @@ def decode_message(text: str | bytes) -> Shown | Request:
         raise ProtocolError(f"message type is {str(kind)[:40]!r}; expected 'shown' or 'request'")
     number = _integer(message, "id", 1)
     name, data = message.get("name"), message.get("data", {})
-    if not isinstance(name, str) or not 0 < len(name) <= MAX_NAME_LENGTH:
+    if not isinstance(name, str) or not 0 < len(name) <= BOUNDS.name_characters:
         raise ProtocolError(f"name is {str(name)[:40]!r}; expected the name of a request")
-    if not isinstance(data, dict) or _is_deeper(data, MAX_DEPTH):
-        raise ProtocolError(f"data is {type(data).__name__}; expected an object, nested {MAX_DEPTH} levels at most")
+    if not isinstance(data, dict) or _is_deeper(data, BOUNDS.nesting):
+        raise ProtocolError(
+            f"data is {type(data).__name__}; expected an object, nested {BOUNDS.nesting} levels at most"
+        )
     return Request(number, name, data)
 
 

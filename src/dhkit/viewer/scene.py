@@ -25,17 +25,17 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-ROOT = "/dhkit"
-COINCIDENCE = 1e-9
+_ROOT = "/dhkit"
+_COINCIDENCE = 1e-9
 """Largest distance of origins, as a share of the arm's size, and largest difference of rotation entries, of frames that
 coincide: far above the rounding of a chain, far below what is seen."""
-TRIAD_SHARE, PICTURE_TRIAD_SHARE = 0.13, 0.11
+_TRIAD_SHARE, PICTURE_TRIAD_SHARE = 0.13, 0.11
 """Length of a triad in the browser, and in figures and pictures, as a share of the arm's size."""
-NESTED_RATIO = 0.72
+_NESTED_RATIO = 0.72
 """Length of a triad over that of the one before it at the same origin, so that both are seen."""
-SIZES_PER_OCTAVE = 8
+_SIZES_PER_OCTAVE = 8
 """Sizes of grid and triads within a factor of 2: an edit that changes the reach a little does not change them."""
-MIN_SIZE = 0.1
+_MIN_SIZE = 0.1
 """Smallest size of an arm, m, for one without lengths."""
 
 
@@ -81,12 +81,12 @@ def build_scene(description: Description, parts: Sequence[Part]) -> Scene:
         A mesh cannot be read.
     """
     # The next of the sizes that grow in equal ratios.
-    steps = math.ceil(SIZES_PER_OCTAVE * math.log2(scene_size(description)))
-    size, places = float(2.0 ** (steps / SIZES_PER_OCTAVE)), _shared_origins(description)
-    commands = [_set_object(f"{ROOT}/grid", grid_object(size, "grid"))]
+    steps = math.ceil(_SIZES_PER_OCTAVE * math.log2(scene_size(description)))
+    size, places = float(2.0 ** (steps / _SIZES_PER_OCTAVE)), _shared_origins(description)
+    commands = [_set_object(f"{_ROOT}/grid", grid_object(size, "grid"))]
     commands += _part_commands(parts)
     commands += _triad_commands(description, places, size)
-    nodes = [f"{ROOT}/link{i}" for i in range(description.n + 1)] + [f"{ROOT}/tool"]
+    nodes = [f"{_ROOT}/link{i}" for i in range(description.n + 1)] + [f"{_ROOT}/tool"]
     transforms = node_transforms(description, first_configuration(description))
     commands += [_set_transform(path, T) for path, T in zip(nodes, transforms, strict=True)]
     about = {
@@ -95,7 +95,7 @@ def build_scene(description: Description, parts: Sequence[Part]) -> Scene:
         "labels": [{"frame": label.frame, "text": label.text} for label in _labels(description, places)],
         "size": size,
         "up": _upward(description),
-        "nodes": [c["path"].removeprefix(f"{ROOT}/") if c["type"] == "set_object" else "" for c in commands],
+        "nodes": [c["path"].removeprefix(f"{_ROOT}/") if c["type"] == "set_object" else "" for c in commands],
     }
     return Scene(about, tuple(commands))
 
@@ -128,7 +128,7 @@ def scene_size(description: Description) -> float:
     """Return a bound of the tool's distance from the world's origin, m."""
     numbers = description.numbers
     offsets = np.linalg.norm([numbers.T_world_base[:3, 3], numbers.T_last_tool[:3, 3]], axis=1)
-    return max(float(numbers.reach + offsets.sum()), MIN_SIZE)
+    return max(float(numbers.reach + offsets.sum()), _MIN_SIZE)
 
 
 def frame_labels(description: Description) -> tuple[Label, ...]:
@@ -154,14 +154,14 @@ def _shared_origins(description: Description) -> list[list[list[int]]]:
     """
     q = np.random.default_rng(0).uniform(0.3, 1.2, (2, description.n))
     T = node_transforms(description, q)
-    near = COINCIDENCE * scene_size(description)
+    near = _COINCIDENCE * scene_size(description)
     places: list[list[list[int]]] = []
     for i in range(description.n + 2):
         place = next((p for p in places if np.abs(T[:, p[0][0], :3, 3] - T[:, i, :3, 3]).max() < near), None)
         if place is None:
             places.append([[i]])
             continue
-        same = next((s for s in place if np.abs(T[:, s[0], :3, :3] - T[:, i, :3, :3]).max() < COINCIDENCE), None)
+        same = next((s for s in place if np.abs(T[:, s[0], :3, :3] - T[:, i, :3, :3]).max() < _COINCIDENCE), None)
         if same is None:
             place.append([i])
         else:
@@ -177,7 +177,7 @@ def _part_commands(parts: Sequence[Part]) -> Iterator[Lowered]:
     count: dict[int, int] = {}
     for part in parts:
         k = count[part.link] = count.get(part.link, -1) + 1
-        path = f"{ROOT}/link{part.link}/part{k}"
+        path = f"{_ROOT}/link{part.link}/part{k}"
         try:
             drawn = part_object(part, f"link{part.link}/part{k}")
         except ModelError as error:  # the mesh has a valid header, and content that is not valid
@@ -192,9 +192,9 @@ def _triad_commands(description: Description, places: list[list[list[int]]], siz
         for k, same in enumerate(place):
             name = _frame_name(description, same[0])
             node = "tool" if name == "tool" else f"link{name}"
-            triad = triad_object(TRIAD_SHARE * size * NESTED_RATIO**k, f"{node}/frame")
-            yield _set_object(f"{ROOT}/{node}/frame", triad)
-            yield {"type": "set_property", "path": f"{ROOT}/{node}/frame", "property": "visible", "value": False}
+            triad = triad_object(_TRIAD_SHARE * size * _NESTED_RATIO**k, f"{node}/frame")
+            yield _set_object(f"{_ROOT}/{node}/frame", triad)
+            yield {"type": "set_property", "path": f"{_ROOT}/{node}/frame", "property": "visible", "value": False}
 
 
 def _upward(description: Description) -> list[float]:

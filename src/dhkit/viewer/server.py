@@ -24,6 +24,7 @@ from tornado.netutil import bind_sockets
 from tornado.web import Application
 
 from dhkit.errors import DhkitError, ModelError
+from dhkit.viewer.bounds import BOUNDS
 from dhkit.viewer.handlers import File, Page, Refused
 from dhkit.viewer.page import page_files
 from dhkit.viewer.protocol import Samples, encode_state, stamped
@@ -33,32 +34,24 @@ from dhkit.viewer.session import OF_ONE_ARM, Session, Slot
 Answer: TypeAlias = Callable[[str, Mapping[str, object]], object]
 """Answers a request, given its name and data, with what JSON can hold."""
 
-LOG = logging.getLogger(__name__)
-ADDRESS = "127.0.0.1"
-START_TIMEOUT, CLOSE_TIMEOUT = 10.0, 5.0
+_LOG = logging.getLogger(__name__)
+_ADDRESS = "127.0.0.1"
+_START_TIMEOUT, _CLOSE_TIMEOUT = 10.0, 5.0
 """Longest times that the server's thread may take to start and to stop, s."""
 BEAT_PERIOD = 2.0
 """Time between two signs of life to a page, s; the page gives the server up when three are missing."""
-PING_PERIOD = 15.0
+_PING_PERIOD = 15.0
 """Time between two pings, s: a browser that vanished without closing its connection is dropped."""
-MAX_MESSAGE = 1_000_000
-"""Largest message from a page, bytes."""
-MAX_BODY = 1_000
-"""Largest body of an HTTP request, bytes: requests of our pages have none."""
-MAX_BUFFER = 2 * MAX_MESSAGE
-"""Largest number of bytes that are read ahead of a connection."""
-IDLE_TIMEOUT = 60.0
+_IDLE_TIMEOUT = 60.0
 """Longest time that a connection may take to send a further request, s."""
 FIRST_REQUEST_TIMEOUT = 10.0
 """Longest time that a connection may take until it has shown the token, s."""
-MAX_CONNECTIONS = 150
-"""Largest number of connections at a time, those of pages included."""
-POLL_PERIOD = 0.005
+_POLL_PERIOD = 0.005
 """Time between two looks at whether pages have drawn everything, s."""
 
 
-class BoundedServer(HTTPServer):
-    """A server of at most MAX_CONNECTIONS connections: each needs a descriptor, of which a process has few.
+class _BoundedServer(HTTPServer):
+    """A server of at most BOUNDS.connections connections: each needs a descriptor, of which a process has few.
 
     Everybody on the machine can connect. Of connections that have not shown the token, the oldest makes room for a new
     one, and each is closed after a short time: so strangers do not keep the owner out.
@@ -72,7 +65,7 @@ class BoundedServer(HTTPServer):
 
     def handle_stream(self, stream: IOStream, address: tuple[str, int]) -> None:
         """Serve a connection; of too many, close the oldest that has not shown the token, or else this one."""
-        if self._open >= MAX_CONNECTIONS:
+        if self._open >= BOUNDS.connections:
             oldest = next(iter(self._strangers), stream)
             self._close_stranger(oldest)
             if oldest is stream:
@@ -145,12 +138,12 @@ class ViewerServer:
     @property
     def url(self) -> str:
         """Address of the page; the token in it is the permission to see the page."""
-        return f"http://{ADDRESS}:{self.port}/{self.token}/"
+        return f"http://{_ADDRESS}:{self.port}/{self.token}/"
 
     @property
     def hosts(self) -> tuple[str, str]:
         """Values of the Host header that are the server's own: address and port."""
-        return f"{ADDRESS}:{self.port}", f"localhost:{self.port}"
+        return f"{_ADDRESS}:{self.port}", f"localhost:{self.port}"
 
     def publish_state(self, name: str, data: object) -> None:
         """Make a panel's state, of what JSON can hold, the latest of its name; see :meth:`publish`."""
@@ -217,7 +210,7 @@ class ViewerServer:
                 raise TimeoutError(f"{problem} after {timeout:g} s; it is at {self.url}")
             if not self._thread.is_alive():
                 raise ModelError("the viewer's server has ended")
-            time.sleep(POLL_PERIOD)
+            time.sleep(_POLL_PERIOD)
 
     def close(self) -> None:
         """Close the pages' connections and stop the thread; a second call does nothing."""
@@ -230,9 +223,9 @@ class ViewerServer:
             self._loop.call_soon_threadsafe(self._stop.set)
         except RuntimeError:
             return
-        self._thread.join(CLOSE_TIMEOUT)
+        self._thread.join(_CLOSE_TIMEOUT)
         if self._thread.is_alive():
-            LOG.warning("the viewer's server did not stop within %g s", CLOSE_TIMEOUT)
+            _LOG.warning("the viewer's server did not stop within %g s", _CLOSE_TIMEOUT)
 
     def replay(self) -> Session:
         """Return a session that has the whole state still to send."""
@@ -293,9 +286,9 @@ class ViewerServer:
         self._thread = threading.Thread(target=self._run, args=(started,), name="dhkit-viewer", daemon=True)
         self._thread.start()
         try:
-            return started.result(START_TIMEOUT)
+            return started.result(_START_TIMEOUT)
         except (OSError, FutureTimeout) as error:
-            raise ModelError(f"the viewer's server did not start on {ADDRESS}: {str(error) or 'no answer'}") from None
+            raise ModelError(f"the viewer's server did not start on {_ADDRESS}: {str(error) or 'no answer'}") from None
 
     def _run(self, started: Future[int]) -> None:
         try:
@@ -304,7 +297,7 @@ class ViewerServer:
             if not started.done():
                 started.set_exception(error)
             else:
-                LOG.exception("the viewer's server failed")
+                _LOG.exception("the viewer's server failed")
 
     async def _serve(self, started: Future[int]) -> None:
         self._loop = asyncio.get_running_loop()
@@ -314,13 +307,16 @@ class ViewerServer:
             routes,
             default_handler_class=Refused,
             default_handler_args={"server": self},
-            log_function=lambda handler: LOG.debug("%s %s", handler.get_status(), handler.request.method),
-            websocket_ping_interval=PING_PERIOD,
-            websocket_max_message_size=MAX_MESSAGE,
+            log_function=lambda handler: _LOG.debug("%s %s", handler.get_status(), handler.request.method),
+            websocket_ping_interval=_PING_PERIOD,
+            websocket_max_message_size=BOUNDS.message_bytes,
         )
-        self.sockets = bind_sockets(self._requested_port, ADDRESS)
-        self._http = http = BoundedServer(
-            application, max_body_size=MAX_BODY, max_buffer_size=MAX_BUFFER, idle_connection_timeout=IDLE_TIMEOUT
+        self.sockets = bind_sockets(self._requested_port, _ADDRESS)
+        self._http = http = _BoundedServer(
+            application,
+            max_body_size=BOUNDS.body_bytes,
+            max_buffer_size=BOUNDS.buffer_bytes,
+            idle_connection_timeout=_IDLE_TIMEOUT,
         )
         http.add_sockets(self.sockets)
         self.port = self.sockets[0].getsockname()[1]
@@ -348,7 +344,7 @@ def _answer_text(answer: Answer, request: Request) -> str:
     except (DhkitError, ValueError, TypeError) as error:
         text = " ".join(str(error).split()) or type(error).__name__
     except Exception as error:
-        LOG.exception("request %s failed", request.name)
+        _LOG.exception("request %s failed", request.name)
         text = f"{type(error).__name__} in {request.name}; Python's log says more"
     return json.dumps(reply | {"type": "error", "error": text})
 

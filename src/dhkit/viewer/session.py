@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import IntEnum
 
+from dhkit.viewer.bounds import BOUNDS
 from dhkit.viewer.protocol import Samples, stamped
 
-MAX_PANEL_MESSAGES = 16
-"""Largest number of panel messages under way: an edit of the table changes the state of most panels."""
-MAX_SLOT = 1_000
+_MAX_SLOT = 1_000
 """A bound above all slots, so that messages are sent by their age after the scene."""
 
 
@@ -39,7 +38,7 @@ OF_ONE_ARM = (Slot.TRACE, Slot.POINTS, Slot.ELLIPSOIDS, Slot.GHOSTS, Slot.MOTION
 class Session:
     """Messages on their way to one page, in two lanes: pictures, and the states and samples of panels.
 
-    At most one picture is under way, since drawing takes time, and at most :data:`MAX_PANEL_MESSAGES` messages of
+    At most one picture is under way, since drawing takes time, and at most ``BOUNDS.panel_messages`` messages of
     panels, which a page takes at once; neither lane waits for the other. In each slot only the latest message waits.
 
     Examples
@@ -77,7 +76,7 @@ class Session:
         if slot == Slot.SCENE:
             for other in OF_ONE_ARM:
                 self._waiting.pop(other, None)
-        new_turn = slot if slot == Slot.SCENE else MAX_SLOT + sequence
+        new_turn = slot if slot == Slot.SCENE else _MAX_SLOT + sequence
         turn, _, waiting = self._waiting.get(slot, (new_turn, 0, None))
         if isinstance(message, Samples) and isinstance(waiting, Samples):
             message = waiting.followed_by(message)
@@ -85,7 +84,7 @@ class Session:
 
     def next(self) -> bytes | None:
         """Return a message to send now; None if enough are under way, or nothing waits."""
-        capacity = {False: 1, True: MAX_PANEL_MESSAGES}
+        capacity = {False: 1, True: BOUNDS.panel_messages}
         free_lanes = {lane for lane, unshown in self._unshown.items() if len(unshown) < capacity[lane]}
         sendable = [slot for slot in self._waiting if (slot >= Slot.PANELS) in free_lanes]
         if not sendable:

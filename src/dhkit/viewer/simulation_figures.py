@@ -45,20 +45,20 @@ CONTROLLER_COLORS = (
     "#777777",
 )
 """Tol's muted scheme (SRON/EPS/TN/09-002, 2021), its yellow darkened: as many as there are controllers."""
-INTERVALS = 800
+_INTERVALS = 800
 """Time intervals of which a curve's smallest and largest value are drawn: about as many as a diagram has pixels."""
-PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
-REFERENCE_STYLE: dict[str, Any] = {"ls": (0, (4, 2.5)), "lw": 1.1}
-REFERENCE_BRIGHTNESS = 0.45
+_PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
+_REFERENCE_STYLE: dict[str, Any] = {"ls": (0, (4, 2.5)), "lw": 1.1}
+_REFERENCE_BRIGHTNESS = 0.45
 """Brightness of a reference's colour, as a share of its joint's, so that it is seen on the joint's curve."""
-SATURATED_STYLE: dict[str, Any] = {"lw": 3.0, "capstyle": "projecting"}
-SATURATED_STEP = 0.06
+_SATURATED_STYLE: dict[str, Any] = {"lw": 3.0, "capstyle": "projecting"}
+_SATURATED_STEP = 0.06
 """Distance between the bars of saturated joints, and from the limit to the first bar, as a share of the limit."""
-MIN_ERROR = 1e-17
+_MIN_ERROR = 1e-17
 """Error that smaller ones are drawn as on a logarithmic scale, rad and m."""
-SMALL_TEXT = 9
+_SMALL_TEXT = 9
 """Size of small text, points."""
-DIAGRAM_MARGIN = 0.12
+_DIAGRAM_MARGIN = 0.12
 """Room beside the diagrams of a comparison, inches: the controllers' names stand between them."""
 
 
@@ -115,7 +115,7 @@ def plot_comparison(results: Mapping[str, SimulationResult], title: str | None =
     for name, result in results.items():
         if result.description.kinds != first.kinds:
             raise ValueError(f"{name} has joints {result.description.kinds}; expected {first.kinds}")
-    layout = ConstrainedLayoutEngine(w_pad=DIAGRAM_MARGIN)
+    layout = ConstrainedLayoutEngine(w_pad=_DIAGRAM_MARGIN)
     figure = new_figure(figsize=(11.5, max(3.8, 1.6 + 0.42 * len(results))), layout=layout)
     figure.suptitle(title or f"{first.name}: errors of {len(results)} controllers", fontsize=13, fontweight="bold")
     curves, bars = figure.subplots(1, 2, width_ratios=(1.5, 1))
@@ -151,7 +151,7 @@ def _draw_values(axes: Axes, result: SimulationResult, joints: NDArray[np.intp],
     low, high = axes.get_ylim()
     for k, i in enumerate(joints):
         values = both[rows, len(joints) + k]
-        axes.plot(result.t[rows], values, color=_darken(joint_color(i)), **REFERENCE_STYLE)
+        axes.plot(result.t[rows], values, color=_darken(joint_color(i)), **_REFERENCE_STYLE)
         low, high = min(low, float(values.min())), max(high, float(values.max()))
     axes.set_ylim(low, high)
 
@@ -177,10 +177,10 @@ def _draw_torques(axes: Axes, result: SimulationResult) -> bool:
     shown = torque_diagram(description, result.tau).values
     low, high = axes.get_ylim()
     for rank, i in enumerate(joints.tolist(), start=1):
-        bars = _bars(result.t, shown[:, i] * (1 + SATURATED_STEP * rank), limited[:, i])
-        axes.hlines(*bars, color=joint_color(i), ls=joint_style(i), **SATURATED_STYLE)
+        bars = _bars(result.t, shown[:, i] * (1 + _SATURATED_STEP * rank), limited[:, i])
+        axes.hlines(*bars, color=joint_color(i), ls=joint_style(i), **_SATURATED_STYLE)
         low, high = min(low, float(bars[0].min())), max(high, float(bars[0].max()))
-    margin = SATURATED_STEP / 2 * (high - low) if len(joints) else 0.0
+    margin = _SATURATED_STEP / 2 * (high - low) if len(joints) else 0.0
     axes.set_ylim(low - margin, high + margin)
     if len(joints):
         i = int(joints[np.argmax(limited[:, joints].mean(axis=0))])
@@ -210,9 +210,9 @@ def _draw_tool_errors(axes: Axes, result: SimulationResult) -> None:
 
 
 def _draw_largest_errors(axes: Axes, results: Mapping[str, SimulationResult]) -> None:
-    least, largest = np.inf, MIN_ERROR
+    least, largest = np.inf, _MIN_ERROR
     for k, (name, result) in enumerate(results.items()):
-        error = np.maximum(np.abs(result.error).max(axis=1), MIN_ERROR)
+        error = np.maximum(np.abs(result.error).max(axis=1), _MIN_ERROR)
         rows = _extreme_rows(error[:, None])
         style = LINE_STYLES[k // len(CONTROLLER_COLORS) % len(LINE_STYLES)]
         axes.plot(
@@ -227,12 +227,12 @@ def _draw_largest_errors(axes: Axes, results: Mapping[str, SimulationResult]) ->
 
 def _draw_bars(axes: Axes, results: Mapping[str, SimulationResult]) -> None:
     rms = np.array([float(result.rms_error.max()) for result in results.values()])
-    drawn = np.maximum(rms, MIN_ERROR)
+    drawn = np.maximum(rms, _MIN_ERROR)
     places, least = list(range(len(rms))), float(drawn.min()) / 3
     colors = [CONTROLLER_COLORS[k % len(CONTROLLER_COLORS)] for k in places]
     axes.barh(places, drawn - least, left=least, color=colors, height=0.6)
     for place, value in zip(places, rms, strict=True):
-        axes.text(max(value, MIN_ERROR) * 1.15, place, f"{value:.1e}", va="center", fontsize=SMALL_TEXT)
+        axes.text(max(value, _MIN_ERROR) * 1.15, place, f"{value:.1e}", va="center", fontsize=_SMALL_TEXT)
     axes.set_xscale("log")
     axes.set_xlim(least, float(drawn.max()) * (drawn.max() / least) ** 0.25)
     axes.set_yticks(places, list(results))
@@ -245,9 +245,9 @@ def _draw_bars(axes: Axes, results: Mapping[str, SimulationResult]) -> None:
 def _extreme_rows(values: Array) -> NDArray[np.intp]:
     """Return the rows of m curves, shape (N, m), that a diagram needs: the extremes of each curve in each interval."""
     count = len(values)
-    if count <= 2 * INTERVALS:
+    if count <= 2 * _INTERVALS:
         return np.arange(count)
-    edges = np.linspace(0, count, INTERVALS + 1).astype(int)
+    edges = np.linspace(0, count, _INTERVALS + 1).astype(int)
     extremes = [
         [begin + part.argmin(axis=0), begin + part.argmax(axis=0)]
         for begin, part in ((begin, values[begin:end]) for begin, end in pairwise(edges))
@@ -268,20 +268,20 @@ def _bars(times: Array, levels: Array, chosen: NDArray[np.bool_]) -> tuple[Array
 def _legend_handles(saturated: bool) -> tuple[Any, ...]:
     from matplotlib.lines import Line2D
 
-    reference = Line2D([], [], color="#000000", label="reference", **REFERENCE_STYLE)
+    reference = Line2D([], [], color="#000000", label="reference", **_REFERENCE_STYLE)
     limit = limit_handle()
     if not saturated:
         return (reference, limit)
-    return (reference, limit, Line2D([], [], color=SHARED_COLOR, lw=SATURATED_STYLE["lw"], label="saturated"))
+    return (reference, limit, Line2D([], [], color=SHARED_COLOR, lw=_SATURATED_STYLE["lw"], label="saturated"))
 
 
 def _remark(axes: Axes, text: str) -> None:
-    axes.set_title(text, fontsize=SMALL_TEXT, color=SHARED_COLOR, loc="right")
+    axes.set_title(text, fontsize=_SMALL_TEXT, color=SHARED_COLOR, loc="right")
 
 
 def _prefix(largest: float) -> tuple[float, str]:
     """Return the factor and the letter of the largest unit in which a number is at least 1, or of the smallest unit."""
-    return next((prefix for prefix in PREFIXES if largest >= prefix[0]), PREFIXES[-1 if largest > 0 else 0])
+    return next((prefix for prefix in _PREFIXES if largest >= prefix[0]), _PREFIXES[-1 if largest > 0 else 0])
 
 
 def _unit(description: Description, joints: NDArray[np.intp]) -> str:
@@ -292,4 +292,4 @@ def _unit(description: Description, joints: NDArray[np.intp]) -> str:
 def _darken(color: str) -> tuple[float, ...]:
     from matplotlib.colors import to_rgb
 
-    return tuple(REFERENCE_BRIGHTNESS * part for part in to_rgb(color))
+    return tuple(_REFERENCE_BRIGHTNESS * part for part in to_rgb(color))

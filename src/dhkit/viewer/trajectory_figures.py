@@ -26,12 +26,12 @@ from dhkit.viewer.notebook import new_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-EVEN_SAMPLES = 401
+_EVEN_SAMPLES = 401
 """Number of samples of a motion at equal steps, and largest number of breaks (jumps of acceleration) that are sampled
 on both sides as well."""
-TICK_MARGIN = 0.06
+_TICK_MARGIN = 0.06
 """Room beside the tool's path for its tick labels, as a share of its width."""
-MAX_PERCENT = 112.0
+_MAX_PERCENT = 112.0
 """Largest share that a diagram of shares of limits shows, %."""
 
 
@@ -53,7 +53,7 @@ def plot_trajectory(trajectory: Trajectory) -> Figure:
     diagrams = _diagrams(trajectory, samples)
     figure = new_figure(figsize=(11.5, 1.6 + 1.75 * len(diagrams)), layout="constrained")
     figure.suptitle(f"{description.name}: {trajectory.duration:.3g} s", fontsize=13, fontweight="bold")
-    grid = figure.add_gridspec(len(diagrams), 3, width_ratios=(1.3, 1, TICK_MARGIN))
+    grid = figure.add_gridspec(len(diagrams), 3, width_ratios=(1.3, 1, _TICK_MARGIN))
     first = None
     for row, diagram in enumerate(diagrams):
         axes = figure.add_subplot(grid[row, 0], sharex=first)
@@ -111,7 +111,7 @@ def plot_uses(motions: Mapping[str, Trajectory]) -> Figure:
             for limit in (-100, 100):
                 axes.axhline(limit, color=SHARED_COLOR, **LIMIT_STYLE)
     grid[0, 0].set_xlim(0.0, end)
-    grid[0, 0].set_ylim(-MAX_PERCENT, MAX_PERCENT)
+    grid[0, 0].set_ylim(-_MAX_PERCENT, _MAX_PERCENT)
     for axes in grid[-1]:
         axes.set_xlabel("time [s]")
     draw_legend(figure, description, (limit_handle(),))
@@ -119,9 +119,9 @@ def plot_uses(motions: Mapping[str, Trajectory]) -> Figure:
 
 
 def _samples(trajectory: Trajectory) -> Samples:
-    """Return samples of a motion; up to EVEN_SAMPLES breaks are sampled on both sides, so that jumps are vertical."""
-    inside = trajectory.breaks[1:-1] if len(trajectory.breaks) <= EVEN_SAMPLES else np.zeros(0)
-    even = np.setdiff1d(np.linspace(0.0, trajectory.duration, EVEN_SAMPLES), inside)
+    """Return samples of a motion; up to _EVEN_SAMPLES breaks are sampled on both sides, so that jumps are vertical."""
+    inside = trajectory.breaks[1:-1] if len(trajectory.breaks) <= _EVEN_SAMPLES else np.zeros(0)
+    even = np.setdiff1d(np.linspace(0.0, trajectory.duration, _EVEN_SAMPLES), inside)
     times = np.concatenate([even, inside, inside])
     left = np.repeat([False, True, False], [len(even), len(inside), len(inside)])
     order = np.lexsort((~left, times))

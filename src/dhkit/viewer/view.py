@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from dhkit.viewer.protocol import Samples
     from dhkit.viewer.server import Answer, ViewerServer
 
-ELLIPSOID_SHARE = 0.25
+_ELLIPSOID_SHARE = 0.25
 """Length that the longest half axis of ellipsoids is drawn with, as a share of the arm's size."""
 
 
@@ -251,7 +251,7 @@ class View(Exportable):
         ValueError
             An infinite half axis, or a scale that is not positive.
         """
-        longest = ELLIPSOID_SHARE * scene_size(self._description)
+        longest = _ELLIPSOID_SHARE * scene_size(self._description)
         transforms = np.zeros((0, 4, 4)) if ellipsoid is None else ball_transforms(ellipsoid, scale, longest)
         self._publish(Slot.ELLIPSOIDS, protocol.encode_ellipsoids(transforms))
 

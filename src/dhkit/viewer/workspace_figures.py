@@ -23,29 +23,29 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLORMAP = "viridis"
-BEST_COLOR, ELLIPSOID_COLOR, BOUNDARY_COLOR = "#e5484d", "#d9480f", "#d9480f"
-BOUNDARY_STYLES = {"outer": "--", "inner": ":", "shoulder": "-."}
+_COLORMAP = "viridis"
+_BEST_COLOR, _ELLIPSOID_COLOR, _BOUNDARY_COLOR = "#e5484d", "#d9480f", "#d9480f"
+_BOUNDARY_STYLES = {"outer": "--", "inner": ":", "shoulder": "-."}
 """Line styles of boundaries, by name."""
-MAX_PIXELS = 160
+_MAX_PIXELS = 160
 """Most pixels along the longer side of a view."""
-SAMPLES_PER_PIXEL = 12
+_SAMPLES_PER_PIXEL = 12
 """Samples for each pixel of the box around them: with fewer, the largest value in a pixel is noise."""
-PIXEL_MARGIN = 2
+_PIXEL_MARGIN = 2
 """Pixels that are left free at the edges of a view; pixels are smoothed over one fewer to each side."""
-TICK_MARGIN = 0.8
+_TICK_MARGIN = 0.8
 """Width of a view's tick labels and axis label, inches."""
-LEGEND_ROW_HEIGHT = 0.25
+_LEGEND_ROW_HEIGHT = 0.25
 """Height of a row of the legend, two names, inches."""
-MAX_SIZE = (9.5, 5.0)
+_MAX_SIZE = (9.5, 5.0)
 """Largest width and height of a figure's views together, inches."""
-LINK_PIECES = 24
+_LINK_PIECES = 24
 """Pieces of a link: straight in space, it is curved in a section about an axis."""
-SPACE_MARGIN = 0.04
+_SPACE_MARGIN = 0.04
 """Room around what is drawn, as a share of its size."""
-ELLIPSOID_SHARE = 0.3
+_ELLIPSOID_SHARE = 0.3
 """Length that the longest half axis of an ellipsoid is drawn with, as a share of the arm's size."""
-MESH_LINES = 33
+_MESH_LINES = 33
 """Lines of an ellipsoid's mesh in each direction."""
 
 
@@ -87,7 +87,7 @@ class _Pixels:
         """Draw the pixels and the border of what is reached; return the image."""
         x, y = (self.corner[k] + self.edge * np.arange(self.best.shape[k] + 1) for k in range(2))
         pixels = np.ma.masked_invalid(self.best).T
-        image = axes.pcolormesh(x, y, pixels, cmap=COLORMAP, vmin=0, vmax=most or 1.0, rasterized=True)
+        image = axes.pcolormesh(x, y, pixels, cmap=_COLORMAP, vmin=0, vmax=most or 1.0, rasterized=True)
         centres = x[:-1] + self.edge / 2, y[:-1] + self.edge / 2
         reached = np.isfinite(self.best).astype(float).T
         axes.contour(*centres, reached, levels=[0.5], colors=LINK_COLOR, linewidths=1.2)
@@ -114,18 +114,18 @@ def plot_workspace(workspace: Workspace) -> Figure:
     borders = boundaries(description)
     drawn = [np.vstack([reach.plane.flatten(line), *map(reach.plane.border, borders)]) for reach in reaches]
     widths, heights = np.transpose([reach.shape(points) for reach, points in zip(reaches, drawn, strict=True)])
-    scale = min(MAX_SIZE[0] / widths.sum(), MAX_SIZE[1] / heights.max())
-    columns = scale * widths + TICK_MARGIN
+    scale = min(_MAX_SIZE[0] / widths.sum(), _MAX_SIZE[1] / heights.max())
+    columns = scale * widths + _TICK_MARGIN
     rows = (len(borders) + 1) // 2
-    size = max(columns.sum() + 1.0, 6.4), max(scale * heights.max(), 1.5) + 1.6 + LEGEND_ROW_HEIGHT * rows
+    size = max(columns.sum() + 1.0, 6.4), max(scale * heights.max(), 1.5) + 1.6 + _LEGEND_ROW_HEIGHT * rows
     figure = new_figure(figsize=size, layout="constrained")
     axes = figure.subplots(1, len(reaches), width_ratios=columns, squeeze=False)[0]
     for ax, reach in zip(axes, reaches, strict=True):
         image = reach.draw(ax, float(workspace.manipulability.max()))
         _draw_arm(ax, reach.plane.flatten(line), reach.plane.flatten(best))
         for boundary in borders:
-            border, dashes = reach.plane.border(boundary), BOUNDARY_STYLES[boundary.name]
-            ax.plot(*border.T, dashes, color=BOUNDARY_COLOR, lw=1.3, zorder=1.9)  # below the arm
+            border, dashes = reach.plane.border(boundary), _BOUNDARY_STYLES[boundary.name]
+            ax.plot(*border.T, dashes, color=_BOUNDARY_COLOR, lw=1.3, zorder=1.9)  # below the arm
     bar = figure.colorbar(image, ax=axes, shrink=0.9, pad=0.02, aspect=30)
     bar.set_label("best translational manipulability (SI)", fontsize=9)
     bar.outline.set_visible(False)
@@ -160,10 +160,10 @@ def plot_ellipsoid(description: Description, q: ArrayLike) -> Figure:
     axes = space_axes(figure, 111)
     line = skeleton(description, world_to_frames(description, q), world_to_tool(description, q))
     axes.plot(*line.T, color=LINK_COLOR, lw=5, solid_capstyle="round", solid_joinstyle="round", alpha=0.85)
-    surface = _surface(ellipsoid, ELLIPSOID_SHARE * scene_size(description) / longest if longest else 1.0)
+    surface = _surface(ellipsoid, _ELLIPSOID_SHARE * scene_size(description) / longest if longest else 1.0)
     _draw_surface(axes, surface)
     set_space_limits(
-        axes, np.concatenate([line, surface.reshape(-1, 3)]), margin=SPACE_MARGIN * scene_size(description)
+        axes, np.concatenate([line, surface.reshape(-1, 3)]), margin=_SPACE_MARGIN * scene_size(description)
     )
     axes.set_title(f"{description.name}: velocity ellipsoid, longest half axis {longest:.3g} m/s", fontsize=12)
     return figure
@@ -181,7 +181,7 @@ def _(value: Ellipsoid) -> Figure:
     for surface in surfaces:
         _draw_surface(axes_3d, surface)
     points = np.concatenate(surfaces).reshape(-1, 3)
-    set_space_limits(axes_3d, points, margin=SPACE_MARGIN * float(np.ptp(points, axis=0).max()))
+    set_space_limits(axes_3d, points, margin=_SPACE_MARGIN * float(np.ptp(points, axis=0).max()))
     return figure
 
 
@@ -223,21 +223,21 @@ def _reach(plane: _Plane, workspace: Workspace) -> _Pixels:
     places = plane.flatten(workspace.positions)
     low, high = places.min(axis=0), places.max(axis=0)
     span = float((high - low).max()) or scene_size(workspace.description)
-    edge = span / float(np.clip(np.sqrt(len(places) / SAMPLES_PER_PIXEL), 8, MAX_PIXELS))
-    counts = np.ceil((high - low) / edge).astype(int) + 2 * PIXEL_MARGIN
+    edge = span / float(np.clip(np.sqrt(len(places) / _SAMPLES_PER_PIXEL), 8, _MAX_PIXELS))
+    counts = np.ceil((high - low) / edge).astype(int) + 2 * _PIXEL_MARGIN
     corner = (low + high - edge * counts) / 2
     best = np.full(tuple(counts), -np.inf)
     np.maximum.at(best, tuple(((places - corner) / edge).astype(int).T), workspace.manipulability)
     # A single pixel has too few samples for the best of them to be smooth, and some have none.
-    reached = binary_closing(best >= 0, np.ones((3, 3)), iterations=PIXEL_MARGIN - 1)
-    return _Pixels(plane, corner, edge, np.where(reached, maximum_filter(best, 2 * PIXEL_MARGIN - 1), np.nan))
+    reached = binary_closing(best >= 0, np.ones((3, 3)), iterations=_PIXEL_MARGIN - 1)
+    return _Pixels(plane, corner, edge, np.where(reached, maximum_filter(best, 2 * _PIXEL_MARGIN - 1), np.nan))
 
 
 def _draw_arm(axes: Axes, line: Array, best: Array) -> None:
     """Draw an arm's line, shape (k, 2), with a white edge, and the best place, shape (2,)."""
     for color, width in (("white", 6.5), (LINK_COLOR, 3.5)):
         axes.plot(*line.T, color=color, lw=width, solid_capstyle="round", solid_joinstyle="round")
-    axes.plot(*best, "*", color=BEST_COLOR, mec="white", ms=15, zorder=5)
+    axes.plot(*best, "*", color=_BEST_COLOR, mec="white", ms=15, zorder=5)
 
 
 def _boundary_label(boundary: Boundary) -> str:
@@ -249,7 +249,7 @@ def _boundary_label(boundary: Boundary) -> str:
 def _arm_in_pieces(description: Description, q: Array) -> Array:
     """Return the line from the base to the tool at joint values (n,) as short pieces, shape (k, 3), m, world."""
     line = skeleton(description, world_to_frames(description, q), world_to_tool(description, q))
-    share = np.linspace(0, 1, LINK_PIECES, endpoint=False)[:, None]
+    share = np.linspace(0, 1, _LINK_PIECES, endpoint=False)[:, None]
     pieces = line[:-1, None] + share * (line[1:, None] - line[:-1, None])
     return np.concatenate([pieces.reshape(-1, 3), line[-1:]])
 
@@ -262,13 +262,13 @@ def _title(workspace: Workspace) -> str:
 
 
 def _surface(ellipsoid: Ellipsoid, scale: float) -> Array:
-    """Return an ellipsoid's mesh, shape (MESH_LINES, MESH_LINES, 3), m."""
-    turn, height = np.meshgrid(np.linspace(0, math.tau, MESH_LINES), np.linspace(0, np.pi, MESH_LINES))
+    """Return an ellipsoid's mesh, shape (_MESH_LINES, _MESH_LINES, 3), m."""
+    turn, height = np.meshgrid(np.linspace(0, math.tau, _MESH_LINES), np.linspace(0, np.pi, _MESH_LINES))
     sphere = np.stack([np.cos(turn) * np.sin(height), np.sin(turn) * np.sin(height), np.cos(height)], axis=-1)
     return np.asarray(ellipsoid.center + scale * (sphere * ellipsoid.lengths) @ ellipsoid.axes.T)
 
 
 def _draw_surface(axes: Any, surface: Array) -> None:
     x, y, z = np.moveaxis(surface, -1, 0)
-    axes.plot_surface(x, y, z, color=ELLIPSOID_COLOR, alpha=0.25, linewidth=0, rstride=1, cstride=1, shade=False)
-    axes.plot_wireframe(x, y, z, color=ELLIPSOID_COLOR, linewidth=0.5, rstride=4, cstride=4)
+    axes.plot_surface(x, y, z, color=_ELLIPSOID_COLOR, alpha=0.25, linewidth=0, rstride=1, cstride=1, shade=False)
+    axes.plot_wireframe(x, y, z, color=_ELLIPSOID_COLOR, linewidth=0.5, rstride=4, cstride=4)

@@ -12,9 +12,9 @@ from dhkit.description import library_robot
 from dhkit.expressions import parse
 from dhkit.symbolic.equations import displays, equation_mathml, equations_latex, latex_document, latex_text, quantities
 from dhkit.symbolic.equations.latex_names import latex_names
-from dhkit.symbolic.equations.latex_width import latex_width
 from dhkit.symbolic.exact.lagrangian import lagrangian
 from dhkit.symbolic.ring import Constant, Ring
+from symbolic.equations.latex_width import latex_width
 
 LINES_OF_A_PAGE = 46
 """Of article in 11 points, less what displays stand apart."""

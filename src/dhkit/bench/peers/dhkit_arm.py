@@ -13,7 +13,7 @@ from dhkit.description import Array
 from dhkit.errors import DhkitError
 
 BATCH = "dhkit, out="
-NEW_ARRAYS = "dhkit"
+_NEW_ARRAYS = "dhkit"
 SINGLE = "dhkit, one call"
 
 
@@ -21,7 +21,7 @@ def contenders() -> tuple[Contender, ...]:
     """Return dhkit's contenders for each quantity."""
     setups = (
         (BATCH, Mode.BATCH, _into_out),
-        (NEW_ARRAYS, Mode.BATCH, _into_new_arrays),
+        (_NEW_ARRAYS, Mode.BATCH, _into_new_arrays),
         (SINGLE, Mode.SINGLE, _single),
     )
     return tuple(

@@ -10,7 +10,7 @@ from dhkit.bench.contenders import Call, Contender, Mode, Task, Workload, import
 from dhkit.bench.geometry import OrthoParallel
 from dhkit.description import Array
 
-UNMET_LIMITS = [(10.0, 11.0)] * 6
+_UNMET_LIMITS = [(10.0, 11.0)] * 6
 """Joint limits, rad, that no branch is inside: `reach` returns every branch all the same, and computes no singular
 values of branches outside the limits."""
 
@@ -55,10 +55,10 @@ def _reach(workload: Workload) -> Task:
 
     def prepare(items: int) -> Call:
         chosen = transform(poses[:items])
-        return lambda: robot.reach(chosen, joint_limits=UNMET_LIMITS, threads=workload.threads)
+        return lambda: robot.reach(chosen, joint_limits=_UNMET_LIMITS, threads=workload.threads)
 
     def answers(k: int) -> list[Array]:
-        branches = family.ours(robot.reach(transform(poses[:k]), joint_limits=UNMET_LIMITS).joints)
+        branches = family.ours(robot.reach(transform(poses[:k]), joint_limits=_UNMET_LIMITS).joints)
         return [solutions[~np.isnan(solutions).any(axis=1)] for solutions in branches]
 
     return Task(prepare, answers)

@@ -12,17 +12,17 @@ from dhkit.bench.contenders import Call, Contender, Mode, Task, UnavailableError
 from dhkit.bench.geometry import has_spherical_wrist, joint_axes
 from dhkit.description import Array, Convention, Description
 
-IK_OPTIONS = {"joint_limits": False, "tol": 1e-20}
+_IK_OPTIONS = {"joint_limits": False, "tol": 1e-20}
 """Half the squared error at which ik_LM stops: its default of 1e-6 leaves the tool a millimetre off."""
-SAME_ARM = 1e-12
+_SAME_ARM = 1e-12
 """Largest difference of poses, m, of the toolbox's own PUMA and ours if they are the same arm."""
 
-Setup = Callable[[Workload], Task]
+_Setup = Callable[[Workload], Task]
 
 
 def contenders() -> tuple[Contender, ...]:
     """Return the toolbox's contenders."""
-    setups: tuple[tuple[str, str, Mode, Setup], ...] = (
+    setups: tuple[tuple[str, str, Mode, _Setup], ...] = (
         ("fkine", "fk", Mode.SINGLE, _single("fk", lambda robot: robot.fkine, lambda T: T.A)),
         ("fkine (batch)", "fk", Mode.BATCH, _batch(lambda robot: robot.fkine, lambda poses: [T.A for T in poses])),
         ("ets.eval", "fk", Mode.SINGLE, _single("fk", lambda robot: robot.ets().eval)),
@@ -35,7 +35,7 @@ def contenders() -> tuple[Contender, ...]:
             "ik_LM",
             "ik",
             Mode.SINGLE,
-            _single("ik", lambda robot: partial(robot.ets().ik_LM, **IK_OPTIONS), _successful),
+            _single("ik", lambda robot: partial(robot.ets().ik_LM, **_IK_OPTIONS), _successful),
         ),
         ("rne", "inverse_dynamics", Mode.SINGLE, _single("inverse_dynamics", lambda robot: robot.rne, np.ravel)),
         ("inertia", "mass_matrix", Mode.SINGLE, _single("mass_matrix", lambda robot: robot.inertia)),
@@ -46,7 +46,7 @@ def contenders() -> tuple[Contender, ...]:
 
 def _single(
     quantity: str, function_of: Callable[[Any], Callable[..., Any]], answer: Callable[[Any], Array] = lambda x: x
-) -> Setup:
+) -> _Setup:
     """Return the setup of a function of the toolbox's robot that is called state by state."""
 
     def setup(workload: Workload) -> Task:
@@ -56,7 +56,7 @@ def _single(
     return setup
 
 
-def _batch(function_of: Callable[[Any], Callable[..., Any]], answers: Callable[[Any], list[Array]]) -> Setup:
+def _batch(function_of: Callable[[Any], Callable[..., Any]], answers: Callable[[Any], list[Array]]) -> _Setup:
     """Return the setup of a function of the toolbox's robot that is called once for all states."""
 
     def setup(workload: Workload) -> Task:
@@ -75,7 +75,7 @@ def _ikine_a(workload: Workload) -> Task:
     import_peer("roboticstoolbox")
     puma = import_peer("roboticstoolbox.models.DH").Puma560()
     states = workload.q[:3]
-    if workload.arm.n != 6 or any(np.abs(puma.fkine(q).A - workload.arm.fk(q)).max() > SAME_ARM for q in states):
+    if workload.arm.n != 6 or any(np.abs(puma.fkine(q).A - workload.arm.fk(q)).max() > _SAME_ARM for q in states):
         raise UnavailableError("written for the toolbox's own PUMA 560 only; this arm is another one")
     return single_task(puma.ikine_a, workload.T, _successful)
 

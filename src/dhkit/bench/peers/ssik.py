@@ -16,7 +16,7 @@ from dhkit.arm import Arm
 from dhkit.bench.contenders import Contender, Mode, Task, UnavailableError, Workload, import_peer, single_task
 from dhkit.bench.geometry import JointAxes, bare, joint_axes
 
-MAX_BUILD_TIME = 120.0
+_MAX_BUILD_TIME = 120.0
 """Longest time of `ssik build`, s: for an arm without a closed form it takes up to a minute."""
 
 
@@ -56,9 +56,9 @@ def _build_module(workload: Workload) -> Any:
         ends = ("--base", "world", "--ee", "tool")
         command = [sys.executable, "-m", "ssik.cli", "build", str(urdf), *ends, "--out", str(module), "--no-validate"]
         try:
-            process = subprocess.run(command, capture_output=True, text=True, timeout=MAX_BUILD_TIME, check=False)  # noqa: S603
+            process = subprocess.run(command, capture_output=True, text=True, timeout=_MAX_BUILD_TIME, check=False)  # noqa: S603
         except subprocess.TimeoutExpired:
-            raise UnavailableError(f"`ssik build` took more than {MAX_BUILD_TIME:.0f} s") from None
+            raise UnavailableError(f"`ssik build` took more than {_MAX_BUILD_TIME:.0f} s") from None
         if process.returncode or not module.exists():
             lines = (process.stderr or process.stdout).strip().splitlines()
             raise UnavailableError(f"`ssik build` failed: {lines[-1] if lines else 'no output'}")

@@ -14,18 +14,18 @@ from itertools import accumulate
 from dhkit.expressions.syntax import Token
 from dhkit.grading.answers.tokens import begins_with, derivative_by_time, fail, replace_runs, sign
 
-MATHEMATICA = re.compile(
+_MATHEMATICA = re.compile(
     r"\*\^|\b(?:Sin|Cos|Tan|Sec|Csc|Cot|Sqrt|ArcTan|ArcSin|ArcCos|Derivative|Subscript|Abs|Sign|D|Dt)\[|[A-Za-z0-9\]]'*\[t\]"
     r"|\\\[[A-Z][A-Za-z]*\]|^\s*\{[^\\]*\}\s*$",
     re.DOTALL,
 )
-OPENING, CLOSING = {"(": ")", "[": "]", "{": "}"}, frozenset(")]}")
+_OPENING, _CLOSING = {"(": ")", "[": "]", "{": "}"}, frozenset(")]}")
 
 
 def is_mathematica(text: str) -> bool:
     r"""Whether a text is Mathematica's: a function with square brackets, a list in braces, \[Theta]."""
     without_names = re.sub(r"\\\[[A-Z][A-Za-z]*\]", "", text)
-    return "\\" not in without_names and "_{" not in text and "^{" not in text and bool(MATHEMATICA.search(text))
+    return "\\" not in without_names and "_{" not in text and "^{" not in text and bool(_MATHEMATICA.search(text))
 
 
 def from_mathematica(tokens: Sequence[Token], text: str) -> list[Token]:
@@ -95,10 +95,10 @@ def _closing_places(tokens: Sequence[Token], text: str) -> dict[int, int]:
     places: dict[int, int] = {}
     opened: list[int] = []
     for k, token in enumerate(tokens):
-        if token.kind == "sign" and token.text in OPENING:
+        if token.kind == "sign" and token.text in _OPENING:
             opened.append(k)
-        elif token.kind == "sign" and token.text in CLOSING:
-            if not opened or OPENING[tokens[opened[-1]].text] != token.text:
+        elif token.kind == "sign" and token.text in _CLOSING:
+            if not opened or _OPENING[tokens[opened[-1]].text] != token.text:
                 fail(text, token.at, f"{token.text!r} without its opening bracket")
             places[opened.pop()] = k
     if opened:
@@ -108,7 +108,7 @@ def _closing_places(tokens: Sequence[Token], text: str) -> dict[int, int]:
 
 def _only_comma(tokens: Sequence[Token], start: int, end: int) -> int:
     """Return where the one comma of a bracket's own level is; 0 where there is none, or more than one."""
-    depths = accumulate((token.text in OPENING) - (token.text in CLOSING) for token in tokens[start + 1 : end])
+    depths = accumulate((token.text in _OPENING) - (token.text in _CLOSING) for token in tokens[start + 1 : end])
     commas = [k for k, depth in enumerate(depths, start + 1) if depth == 0 and tokens[k].text == ","]
     return commas[0] if len(commas) == 1 else 0
 

@@ -8,11 +8,9 @@ from fractions import Fraction
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 from dhkit.expressions.trees import node_count
+from dhkit.grading.answers.bounds import BOUNDS
 
-VARIABLE = re.compile(r"(q|qd|qdd)(\d+)")
-
-MAX_NODES = 2_000
-"""Largest number of nodes of a derivative: a product of k factors becomes up to k products of k factors."""
+_VARIABLE = re.compile(r"(q|qd|qdd)(\d+)")
 
 
 def number(value: int, at: int) -> Number:
@@ -36,13 +34,14 @@ def time_derivative(tree: Tree) -> Tree:
     Raises
     ------
     AnswerError
-        An acceleration, a changing exponent, a function without a rule here, or more than :data:`MAX_NODES` nodes.
+        An acceleration, a changing exponent, a function without a rule here, or more nodes than
+        ``BOUNDS.derivative_nodes``.
     """
     derivative = _derivative(tree)
     if derivative is None:
         return number(0, 0)
-    if node_count(derivative, MAX_NODES) > MAX_NODES:
-        raise AnswerError(f"a time derivative of more than {MAX_NODES} terms and factors")
+    if node_count(derivative, BOUNDS.derivative_nodes) > BOUNDS.derivative_nodes:
+        raise AnswerError(f"a time derivative of more than {BOUNDS.derivative_nodes} terms and factors")
     return derivative
 
 
@@ -52,7 +51,7 @@ def _derivative(tree: Tree) -> Tree | None:
         case Number():
             return None
         case Name(text, at):
-            match = VARIABLE.fullmatch(text)
+            match = _VARIABLE.fullmatch(text)
             if match and match[1] == "qdd":
                 raise AnswerError(f"a time derivative of an acceleration, {text}")
             return Name(f"{match[1]}d{match[2]}", at) if match else None

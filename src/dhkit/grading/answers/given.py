@@ -12,6 +12,7 @@ import numpy as np
 from dhkit.description import Description
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Tree
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.documents.entry_statements import statements_of
 from dhkit.grading.answers.documents.latex_statements import has_relation
 from dhkit.grading.answers.documents.statements import Statement
@@ -31,16 +32,14 @@ from dhkit.symbolic import table_lengths
 LEFT_EMPTY = "left empty"
 """Error of an entry that was not handed in."""
 
-MAX_SHOWN = 1_000
-"""Largest length of an entry's text that is kept where it cannot be read, in characters."""
 
-KINETIC = frozenset(("T", "Ek", "Ec", "Ekin"))
+_KINETIC = frozenset(("T", "Ek", "Ec", "Ekin"))
 """Other names of the kinetic energy; T is a quantity of its own too."""
 
-BRACKETED = re.compile(r"\s*(?:\w+\s*(?:\([^()]*\))?\s*=)?\s*(?:\[|⎡|\{\s*\{|\w*[Mm]atrix|\w+\.|\\begin|sym\()")
+_BRACKETED = re.compile(r"\s*(?:\w+\s*(?:\([^()]*\))?\s*=)?\s*(?:\[|⎡|\{\s*\{|\w*[Mm]atrix|\w+\.|\\begin|sym\()")
 """How the one entry of a matrix begins that stands in brackets."""
 
-SYSTEM = re.compile(
+_SYSTEM = re.compile(
     r"\\begin\s*\{(?:cases|align|aligned|alignat|split|gather|gathered|eqnarray|IEEEeqnarray|multline)\*?\}"
 )
 """Environments whose rows are statements."""
@@ -192,7 +191,7 @@ def given_quantity(
                 size = " x ".join(map(str, shape))
                 raise AnswerError(f"{name}: found {Target(name, index)}; expected {size} entries, counted from 1")
         entries = [(index, value.texts.get(index, "")) for index in places]
-    elif isinstance(value, str) and shape and (len(places) != 1 or BRACKETED.match(value)):
+    elif isinstance(value, str) and shape and (len(places) != 1 or _BRACKETED.match(value)):
         given = _from_one_text(name, _without_head(name, value), shape, vocabulary, matrix_of)
         return _mirrored(given) if name == "M" else given
     elif isinstance(value, str) and is_algebra(_without_head(name, value), vocabulary, matrix_of):
@@ -240,7 +239,7 @@ def _refused(refusal: Refusal) -> str:
 
 def _system(name: str, text: str, names: QuantityNames) -> str | Chain | Entries:
     """Return the entries that a system of equations in one text states; the text itself where it is none."""
-    if not SYSTEM.search(text):
+    if not _SYSTEM.search(text):
         return text
     entries: dict[tuple[int, ...], str | Chain | Refusal] = {}
     for statement in statements_of(text):
@@ -268,7 +267,7 @@ def _without_name(target: Target, text: str, names: QuantityNames) -> str | Chai
     AnswerError
         Several statements, or one about something else.
     """
-    if not (SYSTEM.search(text) or has_relation(text)):
+    if not (_SYSTEM.search(text) or has_relation(text)):
         return text
     statements = statements_of(text, "")
     if len(statements) != 1 or statements[0].problem:
@@ -287,7 +286,7 @@ def _without_name(target: Target, text: str, names: QuantityNames) -> str | Chai
 
 def _may_stand_for(name: str, target: Target, names: QuantityNames) -> bool:
     """Whether a name may stand in front of an entry: its own, its quantity's, or one that means nothing else."""
-    if name in KINETIC:
+    if name in _KINETIC:
         return target.quantity == "K"
     entries = names.entries(name)
     if target in entries or names.quantity(name) == target.quantity:
@@ -315,7 +314,7 @@ def _entry(target: Target, value: Answer, vocabulary: Vocabulary, names: Quantit
         try:
             value = _without_name(target, value, names)
         except AnswerError as error:
-            return Given(index, str(value)[:MAX_SHOWN], error=str(error))
+            return Given(index, str(value)[: BOUNDS.unread_characters], error=str(error))
     if isinstance(value, Chain):
         (given,) = _chained([(_read(index, formula, vocabulary),) for formula in value.formulas])
         return given
@@ -384,7 +383,7 @@ def _read(index: tuple[int, ...], value: Answer, vocabulary: Vocabulary) -> Give
         return Given(index, *entry_tree(value, vocabulary))
     except AnswerError as error:
         text = value if isinstance(value, str) else f"{type(value).__name__} object"
-        return Given(index, text[:MAX_SHOWN], error=str(error))
+        return Given(index, text[: BOUNDS.unread_characters], error=str(error))
 
 
 def _flat(
@@ -413,7 +412,7 @@ def _from_one_text(
     """Return the entries of a matrix, a vector or a number that stands in one text, of one matrix or of several."""
     try:
         if is_algebra(text, vocabulary, matrix_of):
-            shown = text.strip()[:MAX_SHOWN]
+            shown = text.strip()[: BOUNDS.unread_characters]
             rows = [[(shown, tree) for tree in row] for row in read_algebra(text, vocabulary, matrix_of)]
         else:
             rows = read_matrix(text, vocabulary)

@@ -9,9 +9,9 @@ from dhkit.expressions.syntax import Token
 from dhkit.grading.answers.tokens import fail, replace_runs
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Vocabulary, plain_name
 
-SQUARE = re.compile(r"(?<!\w)([A-Za-z_]\w*)\s*\[\s*(\d{1,4})\s*\](\s*\(\s*t\s*\))?", re.ASCII)
+_SQUARE = re.compile(r"(?<!\w)([A-Za-z_]\w*)\s*\[\s*(\d{1,4})\s*\](\s*\(\s*t\s*\))?", re.ASCII)
 
-FROM_ZERO = re.compile(r"\*\*|\b(?:np|numpy|math)\s*\.\s*[a-z]|\bpow\s*\(", re.ASCII)
+_FROM_ZERO = re.compile(r"\*\*|\b(?:np|numpy|math)\s*\.\s*[a-z]|\bpow\s*\(", re.ASCII)
 """Notation of languages that count from 0: Python's and C's."""
 
 
@@ -23,12 +23,12 @@ def first_index(texts: Iterable[str], vocabulary: Vocabulary) -> int | None:
     """
     is_one, is_python = False, False
     for text in texts:
-        for name, index, of_time in SQUARE.findall(text):
+        for name, index, of_time in _SQUARE.findall(text):
             from_zero, from_one = _readings(name, int(index), vocabulary)
             if index == "0" and from_zero:
                 return 0
             is_one = is_one or bool(from_one and (of_time or not from_zero))
-        is_python = is_python or FROM_ZERO.search(text) is not None
+        is_python = is_python or _FROM_ZERO.search(text) is not None
     return 1 if is_one else 0 if is_python else None
 
 

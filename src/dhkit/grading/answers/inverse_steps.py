@@ -18,32 +18,32 @@ from dhkit.grading.answers.tokens import nesting, quote
 from dhkit.grading.answers.typeset import typeset_equations
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Meaning, Vocabulary, plain_name
 
-EQUALS = re.compile(r"&?\s*(?<![<>!=:])==?(?!=)\s*&?")
+_EQUALS = re.compile(r"&?\s*(?<![<>!=:])==?(?!=)\s*&?")
 """What stands between the two sides of an equation."""
-EITHER_SIGN = re.compile(r"±|∓|\\pm\b|\\mp\b|\+/-|-/\+")
+_EITHER_SIGN = re.compile(r"±|∓|\\pm\b|\\mp\b|\+/-|-/\+")
 """Plus or minus, and minus or plus: two formulas in one."""
-UNCLEAR_SIGN = re.compile(r"\+-(?=\s*[A-Za-z\\(])")
+_UNCLEAR_SIGN = re.compile(r"\+-(?=\s*[A-Za-z\\(])")
 """Signs that may be meant as plus or minus, or as a minus that a program wrote."""
-EQUATION_NUMBER = re.compile(
+_EQUATION_NUMBER = re.compile(
     r"(?:\\(?:tag|label|eqno)\s*\{[^{}]*\}|\\(?:nonumber|notag|quad|qquad)\b|\\\\|(?<=[\w)\]}²])\s+\(\s*(?:[A-Z]\.)?\d+(?:\.\d+)*[a-z]?\s*\)"
     r"|[.,;\s])+$"
 )
 """What may stand behind a formula: its number in the text, marks of typesetting."""
-OBJECT = re.compile(r"^\s*(?:\w+\.)?Eq\s*\((.*)\)$", re.DOTALL)
+_OBJECT = re.compile(r"^\s*(?:\w+\.)?Eq\s*\((.*)\)$", re.DOTALL)
 """An equation of sympy's: Eq(left, right)."""
-TURNED_BACK = re.compile(
+_TURNED_BACK = re.compile(
     r"^\s*(?:\w+\.)?(?:wrapToPi|wrapTo2Pi|wrap_to_pi|mod|fmod)\s*\((.*?)(?:,\s*2\s*\*?\s*(?:\w+\.)?pi\s*)?\)$",
     re.DOTALL,
 )
 """A formula whose whole turns are taken off, which changes nothing."""
-SQUARE_OF_NAME = re.compile(r"^\s*(\\?[A-Za-z]\w*)\s*(?:\^|\*\*)\s*(?:2|\{2\}|\(2\))\s*$", re.ASCII)
+_SQUARE_OF_NAME = re.compile(r"^\s*(\\?[A-Za-z]\w*)\s*(?:\^|\*\*)\s*(?:2|\{2\}|\(2\))\s*$", re.ASCII)
 """The square of a name, on a side of its own: r^2 = px^2 + py^2 defines r."""
-FUNCTION_OF_NAME = re.compile(r"^\s*\\?(cos|tan)\s*\(?\s*(\\?[A-Za-z]\w*)\s*\)?\s*$", re.ASCII)
+_FUNCTION_OF_NAME = re.compile(r"^\s*\\?(cos|tan)\s*\(?\s*(\\?[A-Za-z]\w*)\s*\)?\s*$", re.ASCII)
 """A function of a name on a side of its own: cos(gamma) = ... and tan(beta) = y/x define angles."""
-ANOTHER = re.compile(r"[,;]\s*(?:where|with)?\s*(?=[^,;=()]*=)")
+_ANOTHER = re.compile(r"[,;]\s*(?:where|with)?\s*(?=[^,;=()]*=)")
 """What stands between a formula and the definition of a quantity in it."""
-COMMA = re.compile(",")
-JOINT_LETTERS = ("q", "th", "Th", "varth")
+_COMMA = re.compile(",")
+_JOINT_LETTERS = ("q", "th", "Th", "varth")
 """Beginnings of names that are a joint's variable and nothing else: q1, theta_1, th1."""
 
 
@@ -107,7 +107,7 @@ def given_steps(steps: Sequence[InverseStep], vocabulary: Vocabulary) -> list[Gi
 
 
 def _titled(joint: int, formula: str) -> str:
-    return formula if EQUALS.search(formula) else f"q{joint} = {formula}"
+    return formula if _EQUALS.search(formula) else f"q{joint} = {formula}"
 
 
 class _Reading:
@@ -152,9 +152,9 @@ class _Reading:
 
     def _plain(self, text: str) -> str:
         """Return a formula without its number in the text, and with entries of the pose by name."""
-        if UNCLEAR_SIGN.search(text):
+        if _UNCLEAR_SIGN.search(text):
             raise AnswerError(f"{quote(text)}: '+-' may be ± or a minus; write ± or +(-...)")
-        return with_pose_entries(EQUATION_NUMBER.sub("", text), self.vocabulary)
+        return with_pose_entries(_EQUATION_NUMBER.sub("", text), self.vocabulary)
 
     def forget_signs(self) -> None:
         """Take the names with two signs back: which sign a later step means is not known."""
@@ -180,7 +180,7 @@ class _Reading:
         own = f"q{self.joint}"
         for one, other in ((left, right), (right, left)):
             function = self._read(one)
-            if EITHER_SIGN.search(one) or not isinstance(function, Call) or own not in names_of(function):
+            if _EITHER_SIGN.search(one) or not isinstance(function, Call) or own not in names_of(function):
                 continue
             values = {sign: self._with_values(self._read(other, sign), sign) for sign in "+-"}
             if not any(own in names_of(value) for value in values.values()):
@@ -199,8 +199,8 @@ class _Reading:
 
         A chain that only defines has one side left.
         """
-        made = OBJECT.match(text)
-        sides = _parts(made[1], COMMA) if made else EQUALS.split(text)
+        made = _OBJECT.match(text)
+        sides = _parts(made[1], _COMMA) if made else _EQUALS.split(text)
         new = [name for name in map(self._new_name, sides) if name]
         known = [side for side in sides if not self._new_name(side)]
         if new and known:
@@ -217,7 +217,7 @@ class _Reading:
         A length is positive, and an angle of a triangle between 0 and pi; that of a quotient is in the quadrant of its
         numerator and denominator.
         """
-        square, function = SQUARE_OF_NAME.match(left), FUNCTION_OF_NAME.match(left)
+        square, function = _SQUARE_OF_NAME.match(left), _FUNCTION_OF_NAME.match(left)
         if square and self._new_name(square[1]):
             self._define(square[1], f"sqrt({right})")
         elif function and function[1] == "cos" and self._new_name(function[2]):
@@ -267,12 +267,12 @@ class _Reading:
         if not isinstance(tree, Name) or not self.vocabulary.is_position(name):
             return True
         is_found_here = tree.text == f"q{self.joint}" and not self.has_solutions
-        return not plain_name(name).startswith(JOINT_LETTERS) and not is_found_here
+        return not plain_name(name).startswith(_JOINT_LETTERS) and not is_found_here
 
     def _equations(self, text: str) -> list[tuple[str, str]]:
         """Return the sides of the equations of a text: a chain has several, a definition none."""
         sides = self._sides(text)
-        if len(sides) == 1 and EQUALS.search(text):
+        if len(sides) == 1 and _EQUALS.search(text):
             return []
         if len(sides) < 2 or not all(side.strip() for side in sides):
             raise AnswerError(f"{quote(text)}: no equals sign between two sides; expected an equation")
@@ -281,7 +281,7 @@ class _Reading:
     def _is_solution(self, left: str, right: str) -> bool:
         """Whether an equation has the step's joint on its left side, and not on its right."""
         own = f"q{self.joint}"
-        if EITHER_SIGN.search(left) or not _is_name(self._read(left), own):
+        if _EITHER_SIGN.search(left) or not _is_name(self._read(left), own):
             return False
         return own not in names_of(self._with_values(self._read(right), "+"))
 
@@ -300,19 +300,19 @@ class _Reading:
 
     def _both_signs(self, text: str) -> list[Tree]:
         """Return a formula, or two where it has the sign ±: first with +, then with -."""
-        text = EQUATION_NUMBER.sub("", text)
-        if wrapped := TURNED_BACK.match(text):
+        text = _EQUATION_NUMBER.sub("", text)
+        if wrapped := _TURNED_BACK.match(text):
             text = wrapped[1]
         plus, minus = (self._with_values(self._read(text, sign), sign) for sign in "+-")
         return [plus] if plus == minus else [plus, minus]
 
     def _solutions(self, text: str) -> list[Tree]:
         """Return the formulas of a solution; definitions may stand behind it, and the joint's name in front."""
-        formula, *others = _parts(text, ANOTHER)
+        formula, *others = _parts(text, _ANOTHER)
         for other in others:
             if len(self._sides(other)) != 1:
                 raise AnswerError(f"{quote(other)}: no definition of a new name, behind a solution")
-        sides = EQUALS.split(formula)
+        sides = _EQUALS.split(formula)
         for head in sides[:-1]:
             if self._new_name(head) or not _is_name(self._read(head), f"q{self.joint}"):
                 raise AnswerError(f"{quote(head.strip())} stands in front of a solution of q{self.joint}")
@@ -346,7 +346,7 @@ def _square_of_both(plus: Tree, minus: Tree) -> Tree | None:
 def _with_sign(text: str, sign: str) -> str:
     """Return a formula with ± read as a sign, and ∓ as the other."""
     other = "-" if sign == "+" else "+"
-    return EITHER_SIGN.sub(lambda match: other if match[0] in ("∓", r"\mp", "-/+") else sign, text)
+    return _EITHER_SIGN.sub(lambda match: other if match[0] in ("∓", r"\mp", "-/+") else sign, text)
 
 
 def _parts(text: str, separator: re.Pattern[str]) -> list[str]:

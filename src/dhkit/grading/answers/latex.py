@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 
 from dhkit.expressions.syntax import Token
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.tokens import (
     closing_bracket,
     derivative_by_time,
@@ -18,19 +19,13 @@ from dhkit.grading.answers.tokens import (
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 from dhkit.symbolic.equations.latex_names import GREEK as LETTERS
 
-MAX_DEPTH = 50
-"""Largest depth of nested arguments."""
-
-MAX_LETTERS = 64
-"""Largest number of letters in a row."""
-
-PIECE = re.compile(r"\s*(?:\\([A-Za-z]+|.)|(\d+\.?\d*|\.\d+)|([A-Za-z]+)|(\S))", re.ASCII | re.DOTALL)
-MIXED = re.compile(r"(?<![\w.{^])(\d+)\s*$", re.ASCII)
+_PIECE = re.compile(r"\s*(?:\\([A-Za-z]+|.)|(\d+\.?\d*|\.\d+)|([A-Za-z]+)|(\S))", re.ASCII | re.DOTALL)
+_MIXED = re.compile(r"(?<![\w.{^])(\d+)\s*$", re.ASCII)
 """A number in front of a fraction, which is no subscript or exponent."""
 SPACE_NAMES = word_set(
     "quad qquad displaystyle textstyle limits nolimits nonumber notag thinspace enspace space middle it rm bf sf"
 )
-SPACES = SPACE_NAMES | frozenset(",;:!> \n")
+_SPACES = SPACE_NAMES | frozenset(",;:!> \n")
 """Macros for spacing and fonts, which are ignored."""
 SIZES = word_set("left right big Big bigg Bigg bigl bigr Bigl Bigr biggl biggr Biggl Biggr")
 FRACTIONS = frozenset(("frac", "tfrac", "dfrac", "cfrac"))
@@ -40,13 +35,13 @@ STYLE_MACROS = word_set(
 SYMBOL_MACROS = {"cdot": "*", "times": "*", "ast": "*", "div": "/", "pi": "pi", "ell": "l"}
 DOT_MACROS = ("dot", "ddot")
 GREEK = LETTERS - {"pi", "Pi"} | {"varepsilon", "vartheta", "varrho", "varphi"}
-OVER = "\\over"
-MATRICES = frozenset(["matrix", "bmatrix", "pmatrix", "Bmatrix", "smallmatrix", "array"])
+_OVER = "\\over"
+_MATRICES = frozenset(["matrix", "bmatrix", "pmatrix", "Bmatrix", "smallmatrix", "array"])
 
 
-WORD = re.compile(r"[A-Za-z][A-Za-z0-9]*", re.ASCII)
+_WORD = re.compile(r"[A-Za-z][A-Za-z0-9]*", re.ASCII)
 
-OPERAND_ENDS = re.compile(
+_OPERAND_ENDS = re.compile(
     r"(?:\s|~|\$|\\[,;:! ]|\\q?quad\b)*(?:$|[-+)\]},;&=.|]|\\\\|\\(?:right|cr|end)\b|\\[bB]igg?r?\s*[)\]]"
     r"|\{?\s*(?:\\left)?\s*\(\s*t\s*(?:\\right)?\s*\))"
 )
@@ -94,7 +89,7 @@ class _LatexReader:
     # Pieces of the text
 
     def _peek(self) -> re.Match[str] | None:
-        return PIECE.match(self.text, self.at)
+        return _PIECE.match(self.text, self.at)
 
     def _next_is(self, sign: str) -> bool:
         piece = self._peek()
@@ -122,7 +117,7 @@ class _LatexReader:
 
     def _over(self, tokens: list[Token]) -> list[Token]:
         r"""Read {a \over b} as \frac{a}{b}."""
-        places = [k for k, token in enumerate(tokens) if token.text == OVER]
+        places = [k for k, token in enumerate(tokens) if token.text == _OVER]
         if not places:
             return tokens
         if len(places) > 1:
@@ -165,8 +160,8 @@ class _LatexReader:
     def _argument(self, at: int) -> list[Token]:
         """Read what a macro applies to: a group in braces, or one thing."""
         self.depth += 1
-        if self.depth > MAX_DEPTH:
-            fail(self.text, at, f"nested more than {MAX_DEPTH} deep")
+        if self.depth > BOUNDS.nesting:
+            fail(self.text, at, f"nested more than {BOUNDS.nesting} deep")
         piece = self._peek()
         if piece is None:
             fail(self.text, at, "ends where an argument was expected")
@@ -198,10 +193,10 @@ class _LatexReader:
 
     def _letters(self, letters: str, at: int) -> list[Token]:
         """Read letters: a known name, a function's, or one name each, the last with what stands below it."""
-        if len(letters) > MAX_LETTERS:
+        if len(letters) > BOUNDS.letters:
             fail(self.text, at, f"{len(letters)} letters in a row")
         digits = re.compile(r"\d+", re.ASCII).match(self.text, self.at)
-        run = WORD.match(self.text, at)
+        run = _WORD.match(self.text, at)
         if digits and run and run.end() > digits.end() and self.knows(run[0]):
             self.at = run.end()  # I2x
             return [Token("name", run[0], at)]
@@ -239,7 +234,7 @@ class _LatexReader:
     # Macros
 
     def _command(self, name: str, at: int, bare: bool = False) -> list[Token]:
-        if name in SPACES:
+        if name in _SPACES:
             return []
         if name in ("\\", "cr"):
             spacing = re.compile(r"\s*\[-?\d*\.?\d+(?:pt|em|ex|mm|cm)\]", re.ASCII).match(self.text, self.at)
@@ -252,7 +247,7 @@ class _LatexReader:
         if name in FRACTIONS:
             return self._fraction(self._bracketed(at), self._bracketed(at), at)
         if name == "over":
-            return [sign(OVER, at)]
+            return [sign(_OVER, at)]
         if name == "sqrt":
             if self._next_is("["):
                 fail(self.text, at, "a root other than the square root")
@@ -283,7 +278,7 @@ class _LatexReader:
             while above and above[0].text == "(" and closing_bracket(above, 0) == len(above) - 1:
                 above = above[1:-1]
             return self._derivative(above, order, at)
-        number = MIXED.search(self.text[:at])
+        number = _MIXED.search(self.text[:at])
         if number and [token.kind for token in above[1:-1]] == ["number"] == [token.kind for token in below[1:-1]]:
             part = f"{above[1].text}/{below[1].text}"
             both = f"{number[1]} + {part} or {number[1]}*{part}"
@@ -308,7 +303,7 @@ class _LatexReader:
             tokens += self._function_argument()
         elif len(tokens) != 1 or tokens[0].kind != "name":
             tokens = []
-        if not tokens or not OPERAND_ENDS.match(self.text, self.at):
+        if not tokens or not _OPERAND_ENDS.match(self.text, self.at):
             fail(self.text, at, "a derivative that may reach further than the name behind it; put brackets around what")
         return tokens
 
@@ -362,7 +357,7 @@ class _LatexReader:
 
     def _environment(self, name: str, at: int) -> list[Token]:
         match = re.compile(r"\s*\{(\w+)\*?\}(?:\{[clr|]*\})?", re.ASCII).match(self.text, self.at)
-        if match is None or match[1] not in MATRICES:
+        if match is None or match[1] not in _MATRICES:
             fail(self.text, at, "an environment that is no matrix")
         self.at = match.end()
         return [sign("[" if name == "begin" else "]", at)]

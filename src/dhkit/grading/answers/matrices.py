@@ -10,6 +10,7 @@ from itertools import accumulate, pairwise
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Token, Tree
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.computer_algebra import is_mathematica
 from dhkit.grading.answers.latex import is_latex
 from dhkit.grading.answers.pretty import in_one_line
@@ -28,23 +29,17 @@ from dhkit.grading.answers.tokens import (
 )
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Vocabulary
 
-MATRIX_WORDS = word_set("sym Matrix array matrix simplify transpose MutableDenseMatrix ImmutableMatrix DM SX")
+_MATRIX_WORDS = word_set("sym Matrix array matrix simplify transpose MutableDenseMatrix ImmutableMatrix DM SX")
 """Functions that give a matrix of the one in their brackets."""
 
 TRANSPOSES = (["'"], [".'"], [".", "T"], ["^", "T"], ["^", "top"], ["^", "(", "T", ")"], ["^", "(", "top", ")"])
 """Signs of a transpose, in tokens."""
 
-COLUMN_SIGNS, ROW_SIGNS = (",", "&"), (";", "\\\\")
+_COLUMN_SIGNS, _ROW_SIGNS = (",", "&"), (";", "\\\\")
 """Signs between the entries of a row, and between rows."""
 
-NOWHERE = -1
+_NOWHERE = -1
 """Place of the zeros beside a diagonal, which nobody typed."""
-
-MAX_DIAGONAL = 30
-"""Largest number of rows of a matrix that is given by its diagonal: arms have fewer joints."""
-
-MAX_ENTRIES = 1_024
-"""Largest number of entries."""
 
 
 def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]]]:
@@ -76,10 +71,10 @@ def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]
         hint = "; a matrix that it names is not on the sheet" if re.search(r"[A-Za-z]", text) else ""
         raise AnswerError(f"expected a matrix in brackets, found {text[:60]!r}{hint}")
     before, after, is_transposed = _factors(tokens[:start], tokens[end + 1 :], text)
-    entry_count = sum(token.text in (*COLUMN_SIGNS, *ROW_SIGNS) for token in tokens)
-    rows = _rows(tokens[start : end + 1], text) if entry_count <= MAX_ENTRIES else []
-    if entry_count > MAX_ENTRIES or sum(map(len, rows)) > MAX_ENTRIES:
-        raise AnswerError(f"a matrix of more than {MAX_ENTRIES} entries")
+    entry_count = sum(token.text in (*_COLUMN_SIGNS, *_ROW_SIGNS) for token in tokens)
+    rows = _rows(tokens[start : end + 1], text) if entry_count <= BOUNDS.matrix_entries else []
+    if entry_count > BOUNDS.matrix_entries or sum(map(len, rows)) > BOUNDS.matrix_entries:
+        raise AnswerError(f"a matrix of more than {BOUNDS.matrix_entries} entries")
     if is_transposed and len(rows) > 1 and max(map(len, rows)) > 1:
         if len(set(map(len, rows))) > 1:
             raise AnswerError(f"{quote(text)}: rows of different lengths, transposed")
@@ -115,10 +110,10 @@ def matrix_rows(tokens: Sequence[Token], text: str) -> list[list[list[Token]]]:
     Raises
     ------
     AnswerError
-        More than ``MAX_ENTRIES``, or brackets that do not match.
+        More than ``BOUNDS.matrix_entries``, or brackets that do not match.
     """
-    if sum(token.text in (*COLUMN_SIGNS, *ROW_SIGNS) for token in tokens) > MAX_ENTRIES:
-        raise AnswerError(f"a matrix of more than {MAX_ENTRIES} entries")
+    if sum(token.text in (*_COLUMN_SIGNS, *_ROW_SIGNS) for token in tokens) > BOUNDS.matrix_entries:
+        raise AnswerError(f"a matrix of more than {BOUNDS.matrix_entries} entries")
     return _rows(tokens, text)
 
 
@@ -161,7 +156,7 @@ def _unwrap(tokens: list[Token], text: str) -> list[Token]:
     k = 0
     while k < len(tokens):
         token = tokens[k]
-        if token.kind != "name" or token.text not in MATRIX_WORDS or not begins_with(tokens, k + 1, "("):
+        if token.kind != "name" or token.text not in _MATRIX_WORDS or not begins_with(tokens, k + 1, "("):
             result.append(token)
             k += 1
             continue
@@ -201,9 +196,9 @@ def _with_diagonal(tokens: list[Token], text: str) -> list[Token]:
         entries = [entry for row in _rows(inner, text) for entry in row]
     else:
         entries = _split(inner, (",",), text)
-    if len(entries) > MAX_DIAGONAL:
-        raise AnswerError(f"a matrix of more than {MAX_DIAGONAL} rows")
-    zero = [Token("number", "0", NOWHERE)]
+    if len(entries) > BOUNDS.diagonal_rows:
+        raise AnswerError(f"a matrix of more than {BOUNDS.diagonal_rows} rows")
+    zero = [Token("number", "0", _NOWHERE)]
     matrix: list[Token] = []
     for i, entry in enumerate(entries):
         for j in range(len(entries)):
@@ -263,13 +258,13 @@ def _rows(tokens: Sequence[Token], text: str) -> list[list[list[Token]]]:
         for row in rows:
             if not row or row[0].text != "[" or closing_bracket(row, 0) != len(row) - 1:
                 fail(text, row[0].at if row else inner[-1].at, "a row that is not in brackets, beside rows that are,")
-        return [_split(row[1:-1], COLUMN_SIGNS, text) for row in rows]
+        return [_split(row[1:-1], _COLUMN_SIGNS, text) for row in rows]
     may_have_spaces = not is_latex(text) and not is_mathematica(text)
     return [
         _split_at_spaces(row, text)
-        if may_have_spaces and not places_outside_brackets(row, *COLUMN_SIGNS)
-        else _split(row, COLUMN_SIGNS, text)
-        for row in _split(inner, ROW_SIGNS, text)
+        if may_have_spaces and not places_outside_brackets(row, *_COLUMN_SIGNS)
+        else _split(row, _COLUMN_SIGNS, text)
+        for row in _split(inner, _ROW_SIGNS, text)
         if row
     ]
 
@@ -307,7 +302,7 @@ def _split_at_spaces(row: Sequence[Token], text: str) -> list[list[Token]]:
 
 def _typed(entry: Sequence[Token], places: Sequence[int], text: str) -> str:
     """Return an entry as it was typed: up to where the next token after it begins."""
-    if not entry or entry[0].at == NOWHERE:
+    if not entry or entry[0].at == _NOWHERE:
         return "".join(token.text for token in entry)
     behind = bisect_right(places, entry[-1].at)
     return text[entry[0].at : places[behind] if behind < len(places) else len(text)].strip()

@@ -19,6 +19,7 @@ from typing import TypeAlias
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Number, Product, Sum, Token, Tree
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.latex import is_latex
 from dhkit.grading.answers.matrices import TRANSPOSES, matrix_rows, matrix_tokens
 from dhkit.grading.answers.reading import answer_tree
@@ -27,20 +28,14 @@ from dhkit.grading.answers.vocabulary import Vocabulary
 
 Rows: TypeAlias = list[list[Tree]]
 """A matrix by rows."""
-Value: TypeAlias = Tree | Rows
+_Value: TypeAlias = Tree | Rows
 """A number, or a matrix."""
 MatrixOf: TypeAlias = Callable[[str], Rows | None]
 """Matrix that a name stands for; None for another name."""
 
-TIMES, OVER = ("*", "@", "\\,"), ("/",)
-NUMPY = re.compile(r"\b(?:np|numpy)\b|\barray\s*\(")
+_TIMES, _OVER = ("*", "@", "\\,"), ("/",)
+_NUMPY = re.compile(r"\b(?:np|numpy)\b|\barray\s*\(")
 """Text in numpy's notation, in which * multiplies matrices entry by entry."""
-MAX_PRODUCTS = 20_000
-"""Largest number of products of two entries in an answer."""
-MAX_CHAIN = 64
-"""Largest number of products of matrices in an answer, powers written out."""
-MAX_POWER = 8
-"""Largest power of a matrix."""
 
 
 def no_names(name: str) -> Rows | None:
@@ -129,7 +124,7 @@ class _Reader:
         self.products = 0
         self.chain = 0
 
-    def value(self, tokens: Sequence[Token]) -> Value:
+    def value(self, tokens: Sequence[Token]) -> _Value:
         """Return the value of a sum."""
         terms = [(added, self._product(term)) for added, term in self._terms(tokens)]
         if len(terms) == 1 and terms[0][0]:
@@ -159,7 +154,7 @@ class _Reader:
             is_sign = depth == 0 and token.kind == "sign" and token.text in "+-"
             if is_sign and not term:
                 terms[-1] = added == (token.text == "+"), term
-            elif is_sign and not (term[-1].kind == "sign" and term[-1].text in (*TIMES, *OVER, "^")):
+            elif is_sign and not (term[-1].kind == "sign" and term[-1].text in (*_TIMES, *_OVER, "^")):
                 terms.append((token.text == "+", []))
             else:
                 term.append(token)
@@ -167,9 +162,9 @@ class _Reader:
             raise AnswerError(f"{quote(self.text)}: ends where a term is expected")
         return terms
 
-    def _product(self, tokens: Sequence[Token]) -> Value:
+    def _product(self, tokens: Sequence[Token]) -> _Value:
         """Return the value of a product."""
-        result: Value | None = None
+        result: _Value | None = None
         run: list[Token] = []
         k = 0
         while k < len(tokens):
@@ -193,7 +188,7 @@ class _Reader:
             raise AnswerError(f"{quote(self.text)}: a term is empty")
         return result
 
-    def _matrix(self, tokens: Sequence[Token], k: int, inside: Sequence[Token]) -> Value | None:
+    def _matrix(self, tokens: Sequence[Token], k: int, inside: Sequence[Token]) -> _Value | None:
         """Return the value of the factor at k if it is, or contains, a matrix; None of numbers."""
         first = tokens[k]
         if _begins_matrix(tokens, k, self.text):
@@ -214,7 +209,7 @@ class _Reader:
             fail(self.text, first.at, "a matrix with an empty entry")
         return answer_tree(entry, self.vocabulary, self.text)
 
-    def _with_postfix(self, value: Value, tokens: Sequence[Token], k: int) -> tuple[Value, int]:
+    def _with_postfix(self, value: _Value, tokens: Sequence[Token], k: int) -> tuple[_Value, int]:
         """Return a factor with the transposes and powers behind it, and where they end."""
         before = tokens[k - 1]
         if begins_with(tokens, k, "'") and before.kind == "name" and self.vocabulary.is_position(f"{before.text}1"):
@@ -231,7 +226,11 @@ class _Reader:
                 power = tokens[k + 1] if k + 1 < len(tokens) else tokens[k]
                 if self._is_entrywise(tokens[k]):
                     fail(self.text, tokens[k].at, "'.^' raises entry by entry; write ^ for the power of the matrix: it")
-                if power.kind != "number" or not power.text.isdecimal() or not 1 <= int(power.text[:3]) <= MAX_POWER:
+                if (
+                    power.kind != "number"
+                    or not power.text.isdecimal()
+                    or not 1 <= int(power.text[:3]) <= BOUNDS.matrix_power
+                ):
                     fail(self.text, tokens[k].at, "a power of a matrix that is no small whole number")
                 base, result = value, value
                 for _ in range(int(power.text) - 1):
@@ -241,11 +240,11 @@ class _Reader:
                 break
         return value, k
 
-    def _refuse_entrywise(self, left: Value | None, signs: Sequence[Token], right: Value) -> None:
+    def _refuse_entrywise(self, left: _Value | None, signs: Sequence[Token], right: _Value) -> None:
         """Refuse * between numpy's arrays, and signs of products entry by entry."""
         if left is None or _is_number(left) or _is_number(right):
             return
-        is_of_numpy = [token.text for token in signs] == ["*"] and NUMPY.search(self.text)
+        is_of_numpy = [token.text for token in signs] == ["*"] and _NUMPY.search(self.text)
         if is_of_numpy or (len(signs) == 1 and self._is_entrywise(signs[0])):
             fail(self.text, signs[0].at, f"{signs[0].text!r} multiplies entry by entry; write @ for the product: it")
 
@@ -256,17 +255,17 @@ class _Reader:
     def _numbers(self, run: Sequence[Token], is_before_matrix: bool) -> Tree | None:
         """Return the factor of the numbers between matrices, with the signs beside them; None if there is none."""
         run = list(run)
-        if run and run[0].text in TIMES:
+        if run and run[0].text in _TIMES:
             del run[0]
-        elif run and run[0].text in OVER:
+        elif run and run[0].text in _OVER:
             run.insert(0, Token("number", "1", run[0].at))
-        if is_before_matrix and run and run[-1].text in TIMES:
+        if is_before_matrix and run and run[-1].text in _TIMES:
             del run[-1]
-        elif run and run[-1].text in OVER:
+        elif run and run[-1].text in _OVER:
             fail(self.text, run[-1].at, "a division by a matrix")
         return answer_tree(run, self.vocabulary, self.text) if run else None
 
-    def _times(self, left: Value | None, right: Value | None) -> Value | None:
+    def _times(self, left: _Value | None, right: _Value | None) -> _Value | None:
         """Return a product; None stands for nothing."""
         if left is None or right is None:
             return right if left is None else left
@@ -286,8 +285,10 @@ class _Reader:
             raise AnswerError(f"{quote(self.text)}: a product of matrices of {m} x {n} and {p} x {q}")
         self.chain += 1
         self.products += len(left) * len(right) * len(right[0])
-        if self.chain > MAX_CHAIN or self.products > MAX_PRODUCTS:
-            raise AnswerError(f"{quote(self.text)}: more than {MAX_CHAIN} products of matrices, or too large ones")
+        if self.chain > BOUNDS.matrix_products or self.products > BOUNDS.entry_products:
+            raise AnswerError(
+                f"{quote(self.text)}: more than {BOUNDS.matrix_products} products of matrices, or too large ones"
+            )
         columns = list(zip(*right, strict=True))
         return [[_dot(row, column) for column in columns] for row in left]
 
@@ -306,11 +307,11 @@ def _is_zero(tree: Tree) -> bool:
     return isinstance(tree, Number) and tree.value == 0
 
 
-def _is_number(value: Value) -> bool:
+def _is_number(value: _Value) -> bool:
     return not isinstance(value, list) or _size(value) == (1, 1)
 
 
-def _as_matrix(value: Value) -> Rows:
+def _as_matrix(value: _Value) -> Rows:
     return value if isinstance(value, list) else [[value]]
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Call, Number, Power, Sum, Tree
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.derivatives import product, quotient
 from dhkit.grading.answers.reading import read_answer
 from dhkit.grading.answers.vocabulary import Vocabulary
@@ -21,16 +22,7 @@ from dhkit.grading.answers.vocabulary import Vocabulary
 if TYPE_CHECKING:
     from dhkit.symbolic.programs.graph import Node
 
-STATES = ("q", "qd", "qdd")
-
-MAX_NODES = 20_000
-"""Largest number of nodes of an expression: a PUMA's inverse dynamics in CasADi has 1,100."""
-
-MAX_NODES_SHOWN = 500
-"""Largest number of nodes of a CasADi expression that is shown as its text."""
-
-MAX_TEXT = 1_000
-"""Largest length of the text of a CasADi expression, in characters."""
+_STATES = ("q", "qd", "qdd")
 
 
 def entries_of(value: object, n: int) -> object:
@@ -111,8 +103,8 @@ def _text(value: object) -> str:
         if _library(value) == "sympy":
             import sympy
 
-            if sum(1 for _ in islice(sympy.preorder_traversal(value), MAX_NODES + 1)) > MAX_NODES:
-                raise AnswerError(f"an expression of more than {MAX_NODES} nodes")
+            if sum(1 for _ in islice(sympy.preorder_traversal(value), BOUNDS.object_nodes + 1)) > BOUNDS.object_nodes:
+                raise AnswerError(f"an expression of more than {BOUNDS.object_nodes} nodes")
         return str(value)
     except (RecursionError, ValueError):  # of integers of thousands of digits
         raise AnswerError("nested too deep, or a number too long") from None
@@ -148,10 +140,10 @@ def _casadi_entries(value: Any, n: int) -> Any:
     import casadi
 
     if isinstance(value, casadi.Function):
-        if value.n_in() > len(STATES) or value.n_out() != 1:
+        if value.n_in() > len(_STATES) or value.n_out() != 1:
             raise AnswerError(f"{value.name()}: expected a function of (q), (q, qd) or (q, qd, qdd) with one result")
         try:
-            value = value(*(casadi.SX.sym(name, n) for name in STATES[: value.n_in()]))
+            value = value(*(casadi.SX.sym(name, n) for name in _STATES[: value.n_in()]))
         except RuntimeError as error:
             raise AnswerError(f"{value.name()}: {str(error).splitlines()[-1][:200]}") from None
     if isinstance(value, casadi.DM):
@@ -170,16 +162,18 @@ class _CasadiScalar:
 
         self.scalar = scalar
         self.nodes = int(casadi.n_nodes(scalar))
-        is_short = self.nodes <= MAX_NODES_SHOWN
-        self.text = str(scalar)[:MAX_TEXT] if is_short else f"a CasADi expression of {self.nodes} nodes"
+        is_short = self.nodes <= BOUNDS.shown_casadi_nodes
+        self.text = (
+            str(scalar)[: BOUNDS.shown_casadi_characters] if is_short else f"a CasADi expression of {self.nodes} nodes"
+        )
 
     def tree(self, vocabulary: Vocabulary) -> Tree:
         import casadi
 
         from dhkit.symbolic.programs.graph import Graph
 
-        if self.nodes > MAX_NODES:
-            raise AnswerError(f"{self.text}; expected at most {MAX_NODES}")
+        if self.nodes > BOUNDS.object_nodes:
+            raise AnswerError(f"{self.text}; expected at most {BOUNDS.object_nodes}")
         symbols = casadi.symvar(self.scalar)
         inputs = [read_answer(name, vocabulary) for name in _counted_from_one([x.name() for x in symbols])]
         try:
@@ -204,7 +198,7 @@ def _counted_from_one(names: Sequence[str]) -> list[str]:
     ]
 
 
-TREES: dict[str, Callable[..., Tree]] = {
+_TREES: dict[str, Callable[..., Tree]] = {
     "negate": lambda a: Sum(((False, a),)),
     "add": lambda a, b: Sum(((True, a), (True, b))),
     "subtract": lambda a, b: Sum(((True, a), (False, b))),
@@ -226,8 +220,8 @@ def _tree_of(node: Node, arguments: Sequence[Tree], inputs: Sequence[Tree]) -> T
         return _decimal(node.value)
     if operation == "input":
         return inputs[node.arguments[1]]
-    if operation in TREES:
-        return TREES[operation](*arguments)
+    if operation in _TREES:
+        return _TREES[operation](*arguments)
     if operation in FUNCTIONS:
         return Call(FUNCTIONS[operation], tuple(arguments), 0)
     raise AnswerError(f"CasADi's {operation} is not read")

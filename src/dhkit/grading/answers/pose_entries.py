@@ -6,12 +6,12 @@ import re
 
 from dhkit.grading.answers.vocabulary import Meaning, Vocabulary
 
-BY_TWO = re.compile(
+_BY_TWO = re.compile(
     r"(?<![\w.\\])(T|R)\s*(?:\(\s*(\d)\s*,\s*(\d)\s*\)|\[\[\s*(\d)\s*,\s*(\d)\s*\]\]|\[\s*(\d)\s*(?:,|\]\s*\[)\s*(\d)\s*\])"
 )
 """By two indices: in round brackets (MATLAB) and in double ones (Mathematica) from 1, else (Python) from 0."""
-BY_ONE = re.compile(r"(?<![\w.\\])([pP])\s*(?:\(\s*(\d)\s*\)|\[\s*(\d)\s*\])")
-PAUL = {
+_BY_ONE = re.compile(r"(?<![\w.\\])([pP])\s*(?:\(\s*(\d)\s*\)|\[\s*(\d)\s*\])")
+_PAUL = {
     f"{letter}{axis}": f"r{row}{column}" for column, letter in enumerate("noa", 1) for row, axis in enumerate("xyz", 1)
 }
 """Paul's columns of the tool's rotation: n, o and a."""
@@ -32,14 +32,14 @@ def with_pose_entries(text: str, vocabulary: Vocabulary) -> str:
         i = int(round_bracket) if square is None else int(square) + 1
         return match[0] if not 1 <= i <= 3 or vocabulary.is_exactly(name) else f" p{'xyz'[i - 1]} "
 
-    return BY_ONE.sub(by_one, BY_TWO.sub(by_two, text))
+    return _BY_ONE.sub(by_one, _BY_TWO.sub(by_two, text))
 
 
 def other_names() -> dict[str, Meaning]:
     """Return other names of the pose's entries: T14, R13, Px, and Paul's ax."""
     names = {f"T{i}{j}": _entry("T", i, j) for i in (1, 2, 3) for j in (1, 2, 3, 4)}
     names |= {f"R{i}{j}": f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)}
-    names |= {f"P{axis}": f"p{axis}" for axis in "xyz"} | PAUL
+    names |= {f"P{axis}": f"p{axis}" for axis in "xyz"} | _PAUL
     return {name: (entry,) for name, entry in names.items() if entry is not None}
 
 

@@ -11,25 +11,20 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.tokens import quote
 
-MARKS = frozenset("⎛⎜⎝⎡⎢⎣─⋅")
-BAR = "─"
-DERIVATIVES = (("d", "dt"), ("d^(2)", "dt^(2)"))
+_MARKS = frozenset("⎛⎜⎝⎡⎢⎣─⋅")
+_BAR = "─"
+_DERIVATIVES = (("d", "dt"), ("d^(2)", "dt^(2)"))
 
-TALL_BRACKETS = {"⎛": "⎜⎝⎞⎟⎠", "⎡": "⎢⎣⎤⎥⎦"}
+_TALL_BRACKETS = {"⎛": "⎜⎝⎞⎟⎠", "⎡": "⎢⎣⎤⎥⎦"}
 """Of each upper hook: what continues it and ends it, then the upper hook, the side and the foot that close."""
-
-MAX_LINES, MAX_COLUMNS = 200, 2_000
-"""Largest size of a formula, in lines and in characters of a line."""
-
-MAX_DEPTH = 30
-"""Largest depth of fractions, powers and brackets inside one another."""
 
 
 def is_pretty(text: str) -> bool:
     """Whether a text is a formula over several lines, as sympy's pretty printer writes it."""
-    return "\n" in text.strip("\n") and not MARKS.isdisjoint(text) and "\\" not in text
+    return "\n" in text.strip("\n") and not _MARKS.isdisjoint(text) and "\\" not in text
 
 
 def in_one_line(text: str) -> str:
@@ -49,8 +44,8 @@ def in_one_line(text: str) -> str:
         return text
     lines = text.strip("\n").splitlines()
     width = max(map(len, lines))
-    if len(lines) > MAX_LINES or width > MAX_COLUMNS:
-        raise AnswerError(f"{quote(text)}: more than {MAX_LINES} lines or {MAX_COLUMNS} columns")
+    if len(lines) > BOUNDS.pretty_lines or width > BOUNDS.pretty_columns:
+        raise AnswerError(f"{quote(text)}: more than {BOUNDS.pretty_lines} lines or {BOUNDS.pretty_columns} columns")
     if any(mark in text for mark in "√╲╱⌠⎮"):
         raise AnswerError(f"{quote(text)}: a root or an integral over several lines; print it with str()")
     try:
@@ -71,8 +66,8 @@ class _Block:
     depth: int
 
     def part(self, rows: slice, columns: slice = slice(None)) -> _Block:
-        if self.depth >= MAX_DEPTH:
-            raise _LostError(f"nested more than {MAX_DEPTH} deep")
+        if self.depth >= BOUNDS.pretty_nesting:
+            raise _LostError(f"nested more than {BOUNDS.pretty_nesting} deep")
         return _Block(tuple(line[columns] for line in self.lines[rows]), self.depth + 1)
 
     @property
@@ -127,11 +122,11 @@ class _Block:
 
     def _bracket(self, column: int) -> tuple[int, str, Sequence[int]] | None:
         """Return a tall bracket that begins in a column: where it ends, its text, and its rows."""
-        top = next((row for row, line in enumerate(self.lines) if line[column] in TALL_BRACKETS), None)
+        top = next((row for row, line in enumerate(self.lines) if line[column] in _TALL_BRACKETS), None)
         if top is None:
             return None
         line, hook = self.lines[top], self.lines[top][column]
-        middle, foot, *side = list(TALL_BRACKETS[hook])
+        middle, foot, *side = list(_TALL_BRACKETS[hook])
         bottom = top + 1
         while bottom < len(self.lines) and self.lines[bottom][column] == middle:
             bottom += 1
@@ -153,9 +148,9 @@ class _Block:
     def _fraction(self, column: int) -> tuple[int, str, Sequence[int]] | None:
         """Return a fraction whose bar begins in a column, the longest of those that do: its end, text, and row."""
         bars = [
-            (len(line) - len(line[column:].lstrip(BAR)), row)
+            (len(line) - len(line[column:].lstrip(_BAR)), row)
             for row, line in enumerate(self.lines)
-            if line[column] == BAR and (column == 0 or line[column - 1] != BAR)
+            if line[column] == _BAR and (column == 0 or line[column - 1] != _BAR)
         ]
         if not bars:
             return None
@@ -164,7 +159,7 @@ class _Block:
         if not any(line.strip() for line in above.lines) or not any(line.strip() for line in below.lines):
             raise _LostError("a bar without a numerator or a denominator")
         top, bottom = above.text(), below.text()
-        return end, f"{top}/{bottom}" if (top, bottom) in DERIVATIVES else f"(({top})/({bottom}))", [row]
+        return end, f"{top}/{bottom}" if (top, bottom) in _DERIVATIVES else f"(({top})/({bottom}))", [row]
 
     def matrix(self) -> str:
         """Return the inside of a matrix as a list of rows: blank lines part rows, two blank columns entries."""

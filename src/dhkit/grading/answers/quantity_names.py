@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from dhkit.description import Description
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.sheet import ALIASES, quantity_names, shape_of
 from dhkit.grading.answers.sheet_values import NO_NAMES, Names
 from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
 
-MAX_NAME = 40
-"""Largest length of a name that may be an entry, in characters."""
-
-ENTRY = re.compile(r"([A-Za-z]+?)(\d*)_?(\d+)(?:[_,](\d+))?", re.ASCII)
+_ENTRY = re.compile(r"([A-Za-z]+?)(\d*)_?(\d+)(?:[_,](\d+))?", re.ASCII)
 SMALL_HEADS = {"m": "M"}
 """Small letters in front of two numbers: m12 is an entry of M. c12 and s12 are cosines and sines."""
 
@@ -87,7 +85,7 @@ class QuantityNames:
 
     def entries(self, name: str) -> list[Target]:
         """Return the entries that a name may stand for: several where its digits can be read in two ways."""
-        match = ENTRY.fullmatch(re.sub(r"[{}]", "", name)) if len(name) <= MAX_NAME else None
+        match = _ENTRY.fullmatch(re.sub(r"[{}]", "", name)) if len(name) <= BOUNDS.entry_name_characters else None
         if match is None or self.is_parameter(name):
             return []
         letters, digits, first, second = match.groups()

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dhkit.errors import AnswerError, ExpressionError
 from dhkit.expressions.syntax import Call, Name, Power, Product, Sum, Token, Tree, read_tokens
 from dhkit.expressions.trees import operands, with_operands
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.computer_algebra import from_mathematica, from_maxima, is_mathematica
 from dhkit.grading.answers.derivatives import number, quotient, time_derivative
 from dhkit.grading.answers.latex import is_latex, latex_tokens
@@ -17,22 +18,20 @@ from dhkit.grading.answers.rewriting import to_plain_grammar
 from dhkit.grading.answers.tokens import fail, nesting, quote, split_tokens, to_ascii
 from dhkit.grading.answers.vocabulary import Meaning, Vocabulary
 
-COMMENT = re.compile(r"(?<!\\)%(?!pi\b|e\b|i\b|\s*$).*|#.*")
+_COMMENT = re.compile(r"(?<!\\)%(?!pi\b|e\b|i\b|\s*$).*|#.*")
 """A comment behind an answer, such as its unit: % N m."""
 
-STORAGE = re.compile(r",\s*storage\s*=\s*rectangular\s*(?=\)\s*$)")
+_STORAGE = re.compile(r",\s*storage\s*=\s*rectangular\s*(?=\)\s*$)")
 """What sympy's maple_code adds to a matrix."""
 
-MAX_MEANING = 20_000
-"""Largest number of tokens that a student's own name stands for, after the names in its meaning are replaced."""
 
-BAR = re.compile(r"-{2,}")
+_BAR = re.compile(r"-{2,}")
 
-JOINED = re.compile(r"(?:[-+*/^(,;=\[{&]|\.\.\.|\\)\s*\n|\n\s*(?:[-+*/^),;=\]}&.]|\Z)")
+_JOINED = re.compile(r"(?:[-+*/^(,;=\[{&]|\.\.\.|\\)\s*\n|\n\s*(?:[-+*/^),;=\]}&.]|\Z)")
 """A line's end that an operator, or a bracket, joins to the next line."""
 
-TWO_ARGUMENTS = ("atan2", "atan2d", "hypot", "pow", "Rational", "min", "max")
-RECIPROCALS = {"sec": "cos", "csc": "sin", "cot": "tan"}
+_TWO_ARGUMENTS = ("atan2", "atan2d", "hypot", "pow", "Rational", "min", "max")
+_RECIPROCALS = {"sec": "cos", "csc": "sin", "cot": "tan"}
 
 
 def read_answer(text: str, vocabulary: Vocabulary) -> Tree:
@@ -72,8 +71,8 @@ def meaning_of(text: str, vocabulary: Vocabulary) -> Meaning:
     """
     read_answer(text, vocabulary)
     plain = to_plain_grammar(answer_tokens(text, vocabulary), vocabulary, text)
-    if len(plain) > MAX_MEANING:
-        raise AnswerError(f"written out, {len(plain)} signs; expected at most {MAX_MEANING}")
+    if len(plain) > BOUNDS.meaning_tokens:
+        raise AnswerError(f"written out, {len(plain)} signs; expected at most {BOUNDS.meaning_tokens}")
     return ("(", *(token.text for token in plain), ")")
 
 
@@ -88,12 +87,12 @@ def _refuse_lines_apart(text: str) -> None:
     text = text.strip()
     if "\n" not in text or is_latex(text) or is_mathematica(text):
         return
-    plain = re.sub(r"\s*\n\s*", "\n", COMMENT.sub("", text).strip())
-    depth, joined = 0, {match.start() + match[0].index("\n") for match in JOINED.finditer(plain)}
+    plain = re.sub(r"\s*\n\s*", "\n", _COMMENT.sub("", text).strip())
+    depth, joined = 0, {match.start() + match[0].index("\n") for match in _JOINED.finditer(plain)}
     for at, character in enumerate(plain):
         depth += nesting(character)
         is_apart = character == "\n" and depth <= 0 and at not in joined
-        if is_apart or BAR.match(plain, at):
+        if is_apart or _BAR.match(plain, at):
             raise AnswerError(f"{quote(text)}: lines that no operator joins; print the formula in one line, with str()")
 
 
@@ -106,7 +105,7 @@ def answer_tokens(text: str, vocabulary: Vocabulary) -> list[Token]:
         return from_mathematica(split_tokens(plain, places, text, allowed="{}\\"), text)
     if is_latex(plain):
         return latex_tokens(plain, vocabulary.knows)
-    return from_maxima(split_tokens(STORAGE.sub("", plain), places, text, allowed="{}%$@"))
+    return from_maxima(split_tokens(_STORAGE.sub("", plain), places, text, allowed="{}%$@"))
 
 
 def answer_tree(entry: Sequence[Token], vocabulary: Vocabulary, text: str) -> Tree:
@@ -132,7 +131,7 @@ def answer_tree(entry: Sequence[Token], vocabulary: Vocabulary, text: str) -> Tr
 
 def without_comments(text: str) -> str:
     """Return a text with spaces for the comments at the ends of its lines."""
-    return COMMENT.sub(lambda match: " " * len(match[0]), text)
+    return _COMMENT.sub(lambda match: " " * len(match[0]), text)
 
 
 # Functions that are written in terms of others
@@ -149,13 +148,13 @@ def _plain_call(function: str, arguments: tuple[Tree, ...], at: int) -> Tree:
         function = "atan2"  # Maple's arctan(y, x)
     if function == "Rational" and len(arguments) == 1:
         return arguments[0]
-    expected = 1 + (function in TWO_ARGUMENTS)
+    expected = 1 + (function in _TWO_ARGUMENTS)
     if len(arguments) != expected:
         raise AnswerError(f"{function} of {len(arguments)} arguments at position {at + 1}; expected {expected}")
     first = arguments[0]
     match function:
         case "sec" | "csc" | "cot":
-            return quotient(number(1, at), Call(RECIPROCALS[function], (first,), at))
+            return quotient(number(1, at), Call(_RECIPROCALS[function], (first,), at))
         case "ddt":
             return time_derivative(first)
         case "sind" | "cosd" | "tand":

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from dhkit.expressions.syntax import Token
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.indices import without_indices
 from dhkit.grading.answers.tokens import (
     begins_with,
@@ -22,27 +23,25 @@ from dhkit.grading.answers.tokens import (
 )
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Vocabulary, plain_name
 
-TRIGONOMETRIC = ("sin", "cos", "tan")
-SHORTHAND = ("c", "s")
+_TRIGONOMETRIC = ("sin", "cos", "tan")
+_SHORTHAND = ("c", "s")
 CALLED = frozenset(FUNCTION_NAMES.values())
 MODULES = word_set("np numpy math sp sympy sym ca cs casadi cmath mpmath mp cas")
-ATTRIBUTES = frozenset((*FUNCTION_NAMES, "pi"))
+_ATTRIBUTES = frozenset((*FUNCTION_NAMES, "pi"))
 DERIVATIVES = frozenset(("diff", "Derivative"))
 
-ORDERS = {"t": 1, "t,t": 2, "t,2": 2, "(t,2)": 2, "(t,1)": 1, "t,1": 1}
+_ORDERS = {"t": 1, "t,t": 2, "t,2": 2, "(t,2)": 2, "(t,1)": 1, "t,1": 1}
 """Orders of derivatives, by what stands behind the expression that is differentiated."""
 
 MATLAB = re.compile(r"\.[*/^']")
 """Signs that are MATLAB's alone."""
 
-BY_TIME = re.compile(r"\w+\s*(?:\(\s*t\s*\)|\[\s*t\s*\])")
-AMBIGUOUS = re.compile(r"(sin|cos|tan|[sScC](?=\d+[A-Za-z]))(\d+)([A-Za-z]\w*)?", re.ASCII)
+_BY_TIME = re.compile(r"\w+\s*(?:\(\s*t\s*\)|\[\s*t\s*\])")
+_AMBIGUOUS = re.compile(r"(sin|cos|tan|[sScC](?=\d+[A-Za-z]))(\d+)([A-Za-z]\w*)?", re.ASCII)
 
-MAX_TOKENS = 300_000
-"""Largest number of tokens of an answer, its names written out."""
 
-SQUARED = (("^", "2"), ("^", "(", "2", ")"))
-OVER_TIME = (("/", "dt"), ("/", "d", "t"), ("/", "(", "dt", ")"))
+_SQUARED = (("^", "2"), ("^", "(", "2", ")"))
+_OVER_TIME = (("/", "dt"), ("/", "d", "t"), ("/", "(", "dt", ")"))
 
 
 def to_plain_grammar(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[Token]:
@@ -81,7 +80,7 @@ class _Rewriting:
         """Take np. off np.sin; no other attribute is read."""
         plain: list[Token] = []
         for token in tokens:
-            if len(plain) > 1 and plain[-1].text == "." and token.kind == "name" and token.text in ATTRIBUTES:
+            if len(plain) > 1 and plain[-1].text == "." and token.kind == "name" and token.text in _ATTRIBUTES:
                 module = plain[-2]
                 if module.kind != "name" or module.text not in MODULES:
                     self._fail(module, f"an attribute of {module.text!r}, which is not read,")
@@ -138,7 +137,7 @@ class _Rewriting:
             end = self._closing(tokens, k + 1)
             inner = tokens[k + 2 : end]
             comma = next(iter(places_outside_brackets(inner, ",")), 0)
-            order = ORDERS.get("".join(x.text for x in inner[comma + 1 :]), 0)
+            order = _ORDERS.get("".join(x.text for x in inner[comma + 1 :]), 0)
             if not comma or not order:
                 self._fail(token, "a derivative other than by t")
             return derivative_by_time(self._derivatives(inner[:comma]), order, token.at), end + 1
@@ -163,7 +162,7 @@ class _Rewriting:
         """Return the derivative that begins with the d at k, and where it ends; None where there is none."""
         token, order, at = tokens[k], 1, k + 1
         if token.text == "d":
-            square = next((len(square) for square in SQUARED if begins_with(tokens, at, *square)), 0)
+            square = next((len(square) for square in _SQUARED if begins_with(tokens, at, *square)), 0)
             order, at = 1 + bool(square), at + square
             if end := _end_of_over_time(tokens, at, order):
                 stop = self._operand(tokens, end)
@@ -183,7 +182,7 @@ class _Rewriting:
     def _refuse_unclear_end(self, tokens: Sequence[Token], k: int, start: int, stop: int) -> None:
         """Refuse d/dt at k in front of an operand, from start to stop, that may go on behind it."""
         is_enclosed = start < len(tokens) and (
-            tokens[start].text == "(" or BY_TIME.match(self.text, tokens[start].at) is not None
+            tokens[start].text == "(" or _BY_TIME.match(self.text, tokens[start].at) is not None
         )
         following = tokens[stop] if stop < len(tokens) else sign("", 0)
         goes_on = following.kind != "sign" or following.text in ("(", "*", "/")
@@ -198,8 +197,8 @@ class _Rewriting:
         """Put in what names stand for."""
         plain: list[Token] = []
         for k, token in enumerate(tokens):
-            if len(plain) > MAX_TOKENS:
-                self._fail(token, f"more than {MAX_TOKENS} signs, names written out,")
+            if len(plain) > BOUNDS.tokens:
+                self._fail(token, f"more than {BOUNDS.tokens} signs, names written out,")
             if token.kind != "name":
                 plain.append(token)
                 continue
@@ -226,7 +225,7 @@ class _Rewriting:
         if name in FUNCTION_NAMES and is_exact and behind[:1] == ["("]:
             problem = f"{name} (...) may be the parameter {name} times the brackets, or a function; write {name}*(...)"
             self._fail(tokens[k], problem)
-        is_shorthand = name in SHORTHAND and not is_exact and k + 1 < len(tokens) and tokens[k + 1].kind == "name"
+        is_shorthand = name in _SHORTHAND and not is_exact and k + 1 < len(tokens) and tokens[k + 1].kind == "name"
         if is_shorthand and not vocabulary.is_position(behind[0]) and vocabulary.is_exactly(behind[0]):
             self._fail(tokens[k], f"{name} before {behind[0][:40]}, which is no angle,")
         is_number_in_brackets = len(behind) == 3 and behind[0] == "(" and behind[2] == ")" and behind[1].isdecimal()
@@ -235,7 +234,7 @@ class _Rewriting:
 
     def _refuse_ambiguous(self, tokens: Sequence[Token], k: int) -> None:
         """Refuse sin2q1, s2q1 and sin2(q1): the sine of q2 times q1, the sine of 2 q1, or a square."""
-        match = AMBIGUOUS.fullmatch(tokens[k].text)
+        match = _AMBIGUOUS.fullmatch(tokens[k].text)
         if match is None or tokens[k].text in self.vocabulary.own:
             return
         function, number, rest = match.groups()
@@ -253,7 +252,7 @@ class _Rewriting:
         """Read names that are run together: m2l1, sintheta1, and in front of a bracket l2cos."""
         vocabulary, at = self.vocabulary, token.at
         name = plain_name(token.text)
-        for function in TRIGONOMETRIC:
+        for function in _TRIGONOMETRIC:
             if is_called and name.endswith(function):
                 before = name.removesuffix(function)
                 factors = [*self._split(Token("name", before, at), False), sign("*", at)] if before else []
@@ -287,7 +286,7 @@ class _Rewriting:
             if "".join(x.text for x in power).strip("^()") == "-1":
                 if name in ("sec", "csc", "cot"):
                     self._fail(token, f"{name}^-1 may be the inverse function or 1/{name}")
-                if name in TRIGONOMETRIC:
+                if name in _TRIGONOMETRIC:
                     name, power = f"a{name}", []  # cos^-1 is the arc cosine
         end = self._operand(tokens, start, is_product=True)
         if name == "sqrt" and end - start > 1 and tokens[start].kind == "number":
@@ -299,7 +298,7 @@ class _Rewriting:
             self._fail(token, f"{name} without an argument")
         following = tokens[end] if end < len(tokens) else sign("", token.at)
         goes_on = following.kind in ("name", "function") or (argument[-1].text != ")" and following.text == "/")
-        if name in TRIGONOMETRIC and goes_on and all(x.kind in ("number", "sign") for x in argument):
+        if name in _TRIGONOMETRIC and goes_on and all(x.kind in ("number", "sign") for x in argument):
             self._fail(token, f"{name} of a number, or of more; put its argument in brackets")
         if argument[0].text != "(" or self._closing(argument, 0) != len(argument) - 1:
             argument = in_brackets(argument, token.at)
@@ -339,10 +338,10 @@ def _without_methods(tokens: Sequence[Token]) -> list[Token]:
 
 def _end_of_over_time(tokens: Sequence[Token], k: int, order: int) -> int:
     """Return where / dt, or / dt^2 for order 2, ends that begins at k; 0 where something else stands there."""
-    over = next((len(over) for over in OVER_TIME if begins_with(tokens, k, *over)), 0)
+    over = next((len(over) for over in _OVER_TIME if begins_with(tokens, k, *over)), 0)
     if not over or order == 1:
         return k + over if over else 0
-    square = next((len(square) for square in SQUARED if begins_with(tokens, k + over, *square)), 0)
+    square = next((len(square) for square in _SQUARED if begins_with(tokens, k + over, *square)), 0)
     return k + over + square if square else 0
 
 

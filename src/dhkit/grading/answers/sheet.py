@@ -12,6 +12,7 @@ from typing import TypeVar
 from dhkit.description.files import read_bounded
 from dhkit.description.toml_text import toml_document
 from dhkit.errors import AnswerError, DescriptionError
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.sheet_values import (
     AnswerSheet,
     Chain,
@@ -27,20 +28,6 @@ T = TypeVar("T")
 FORMAT = 1
 """Version of the format of answer sheets."""
 
-MAX_BYTES = 4_000_000
-"""Largest size of a sheet: a PUMA's M and C, multiplied out in numbers, are 2 MB."""
-
-MAX_NAMES = 100
-"""Largest number of names that a student defines."""
-
-MAX_BRANCHES = 64
-"""Largest number of branches of inverse kinematics."""
-
-MAX_STEPS = 64
-"""Largest number of steps of inverse kinematics, and of equations and of solutions in one."""
-
-MAX_LEFT_OUT = 20
-"""Largest number of statements of a program or a document that are listed as left out."""
 
 KEYS = {
     "sheet": ("format", "robot", "student", "names", "task", "answer", "rubric"),
@@ -82,7 +69,7 @@ JACOBIAN_ROWS = ("vx", "vy", "vz", "wx", "wy", "wz")
 QUANTITY = re.compile(r"M|C|h|g|tau|K|V|L|T|J|dh|ik|A[1-9][0-9]?")
 """Names of quantities."""
 
-PACKAGE = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,60}", re.ASCII)
+_PACKAGE = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,60}", re.ASCII)
 """Name of a package."""
 
 ALIASES = dict(D="M", G="g", KE="K", PE="V", U="V", P="V", Tau="tau", N="g", Jac="J", Lagrangian="L")
@@ -126,7 +113,7 @@ def source_sheet(
         answers=answers,
         file=file,
         notes=tuple(notes),
-        left_out=tuple(left_out[:MAX_LEFT_OUT]),
+        left_out=tuple(left_out[: BOUNDS.listed_statements]),
     )
 
 
@@ -139,7 +126,7 @@ def read_text(path: Path, expected: str) -> str:
         A file that cannot be read, is too long, or is not UTF-8.
     """
     try:
-        return read_bounded(path, MAX_BYTES, expected).decode("utf-8-sig")
+        return read_bounded(path, BOUNDS.sheet_bytes, expected).decode("utf-8-sig")
     except DescriptionError as error:
         raise AnswerError(str(error)) from None
     except UnicodeDecodeError as error:
@@ -288,8 +275,8 @@ def _is_entry(value: object) -> bool:
 def _names(checker: _Checker, data: Mapping[str, object]) -> Names:
     checker.keys(data, KEYS["names"], "names.")
     parameters = checker.table(data, "parameters", "names.")
-    if len(parameters) > MAX_NAMES:
-        raise checker.error("names.parameters", f"{len(parameters)} names", f"at most {MAX_NAMES}")
+    if len(parameters) > BOUNDS.names:
+        raise checker.error("names.parameters", f"{len(parameters)} names", f"at most {BOUNDS.names}")
     for name, value in parameters.items():
         if not _is_entry(value):
             raise checker.error(f"names.parameters: {name[:40]!r}", value, "an expression in the robot's parameters")
@@ -331,7 +318,7 @@ def _requirements(checker: _Checker, data: Mapping[str, object]) -> Requirements
 def _packages(checker: _Checker, data: Mapping[str, object]) -> tuple[str, ...]:
     packages = checker.texts(data.get("packages", []), "task.packages", 'a list of packages such as ["numpy", "sympy"]')
     for name in packages:
-        if not PACKAGE.fullmatch(name):
+        if not _PACKAGE.fullmatch(name):
             raise checker.error("task.packages", name, "the name of an installed package")
     return packages
 
@@ -353,8 +340,8 @@ def _steps(checker: _Checker, data: Mapping[str, object]) -> tuple[InverseStep, 
     if "branches" in data:
         raise checker.error("answer.ik", "both branches and steps", "one of them")
     steps = data.get("steps")
-    expected = f'1 to {MAX_STEPS} steps such as {{ joint = 1, equation = "...", solution = "..." }}'
-    if not isinstance(steps, list) or not 0 < len(steps) <= MAX_STEPS:
+    expected = f'1 to {BOUNDS.steps} steps such as {{ joint = 1, equation = "...", solution = "..." }}'
+    if not isinstance(steps, list) or not 0 < len(steps) <= BOUNDS.steps:
         raise checker.error("answer.ik.steps", steps, expected)
     read = [_step(checker, step, f"answer.ik.steps[{k}]", expected) for k, step in enumerate(steps)]
     return tuple(step for step in read if step.equations or step.solutions)
@@ -371,8 +358,8 @@ def _step(checker: _Checker, data: object, place: str, expected: str) -> Inverse
     for key in ("equation", "solution"):
         value = data.get(key, [])
         several = checker.texts(value if isinstance(value, list) else [value], f"{place}.{key}", "a formula, or a list")
-        if len(several) > MAX_STEPS:
-            raise checker.error(f"{place}.{key}", f"{len(several)} formulas", f"at most {MAX_STEPS}")
+        if len(several) > BOUNDS.steps:
+            raise checker.error(f"{place}.{key}", f"{len(several)} formulas", f"at most {BOUNDS.steps}")
         texts.append(tuple(text for text in several if text.strip()))
     if not {"equation", "solution"} & data.keys():
         raise checker.error(place, data, "an equation, a solution, or both")
@@ -382,8 +369,8 @@ def _step(checker: _Checker, data: object, place: str, expected: str) -> Inverse
 def _branches(checker: _Checker, data: Mapping[str, object]) -> tuple[tuple[str, ...], ...]:
     checker.keys(data, KEYS["ik"], "answer.ik.")
     branches = data.get("branches")
-    if not isinstance(branches, list) or not 0 < len(branches) <= MAX_BRANCHES:
-        raise checker.error("answer.ik.branches", branches, f"1 to {MAX_BRANCHES} lists of formulas, one a joint")
+    if not isinstance(branches, list) or not 0 < len(branches) <= BOUNDS.branches:
+        raise checker.error("answer.ik.branches", branches, f"1 to {BOUNDS.branches} lists of formulas, one a joint")
     return tuple(
         checker.texts(branch, f"answer.ik.branches[{k}]", "a list of formulas, one a joint")
         for k, branch in enumerate(branches)

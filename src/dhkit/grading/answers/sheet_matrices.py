@@ -13,7 +13,7 @@ from dhkit.grading.answers.reading import read_answer
 from dhkit.grading.answers.sheet_values import Entries
 from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
 
-VECTOR = re.compile(r"(?:d|dd|dot|ddot|d2)?(?:q|th|theta|Theta|vartheta)(?:d|dd|dot|ddot)?")
+_VECTOR = re.compile(r"(?:d|dd|dot|ddot|d2)?(?:q|th|theta|Theta|vartheta)(?:d|dd|dot|ddot)?")
 """Names of the columns of joint values, rates and accelerations; t is the time."""
 
 
@@ -46,7 +46,7 @@ class SheetMatrices:
         is_answer = quantity and quantity in self.answers and not vocabulary.is_own(plain_name(name))
         if vocabulary.knows(name) and not is_answer:
             return None
-        if VECTOR.fullmatch(plain_name(name)) and vocabulary.is_state(f"{name}1"):
+        if _VECTOR.fullmatch(plain_name(name)) and vocabulary.is_state(f"{name}1"):
             return [[read_answer(f"{name}{i + 1}", vocabulary)] for i in range(self.names.n)]
         if quantity in unknown or not isinstance(self.answers.get(quantity), str | list | Entries):
             return None

@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import TypeAlias
 
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.sheet import read_text
-
-MAX_CHARACTERS = 1_000_000
-"""Largest length of code or LaTeX, in characters; a notebook may be longer, since its figures do not count."""
 
 LineName: TypeAlias = Callable[[int], str]
 """Function from a line, from 1, to its name in messages."""
@@ -53,6 +51,6 @@ def source_code(path: Path) -> SourceCode:
 
         notebook = notebook_code(code.text, str(path))
         code = SourceCode(notebook.code, notebook.suffix, notebook.line_name, notebook.notes)
-    if len(code.text) > MAX_CHARACTERS:
-        raise AnswerError(f"{path}: more than {MAX_CHARACTERS} characters of code or LaTeX")
+    if len(code.text) > BOUNDS.code_characters:
+        raise AnswerError(f"{path}: more than {BOUNDS.code_characters} characters of code or LaTeX")
     return code

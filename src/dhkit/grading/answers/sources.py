@@ -15,7 +15,7 @@ from dhkit.grading.answers.source_code import LineName, source_code
 if TYPE_CHECKING:
     from dhkit.execution import Isolation
 
-Reader: TypeAlias = Callable[[str, str, LineName, Description, Names], AnswerSheet]
+_Reader: TypeAlias = Callable[[str, str, LineName, Description, Names], AnswerSheet]
 """Function from a text, the file's name, the names of lines, the robot and the task's names to the answers."""
 
 
@@ -44,7 +44,7 @@ def read_source(path: Path, description: Description, names: Names = NO_NAMES) -
         A file that cannot be read, one in which a statement may change any name, or one that assigns no quantity.
     """
     code = source_code(path)
-    sheet = LANGUAGES[code.suffix](code.text, str(path), code.line_name, description, names)
+    sheet = _LANGUAGES[code.suffix](code.text, str(path), code.line_name, description, names)
     return replace(sheet, notes=(*code.notes, *sheet.notes))
 
 
@@ -102,7 +102,7 @@ def _latex(text: str, file: str, line_name: LineName, description: Description, 
     return latex_answers(text, file, line_name, description, names)
 
 
-LANGUAGES: Mapping[str, Reader] = {".py": _python, ".m": _matlab, ".tex": _latex}
+_LANGUAGES: Mapping[str, _Reader] = {".py": _python, ".m": _matlab, ".tex": _latex}
 """Readers by suffix."""
-SHEET_SUFFIXES = (".toml", *LANGUAGES, ".ipynb")
+SHEET_SUFFIXES = (".toml", *_LANGUAGES, ".ipynb")
 """Suffixes of answer sheets; a notebook has a program of one of the languages."""

@@ -10,36 +10,31 @@ from typing import NoReturn
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Token
+from dhkit.grading.answers.bounds import BOUNDS
 
-MAX_LENGTH = 200_000
-"""Largest length of one entry, in characters: a PUMA's first, multiplied out in numbers, has 30,000."""
-
-MAX_DEPTH = 50
-"""Largest depth of nested brackets."""
-
-TOKEN = re.compile(
+_TOKEN = re.compile(
     r"\s*(?:((?:\d+(?:\.(?![*/^'])\d*)?|\.\d+)(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)"
     r"|(\*\*|\.\*|\./|\.\^|\.'|\\\\|<=|>=|==|[-+*/^(),;\[\]&'.<>=:]))",
     re.ASCII,
 )
-SAME = {".*": "*", "./": "/", ".^": "^", "**": "^"}
+_SAME = {".*": "*", "./": "/", ".^": "^", "**": "^"}
 """Signs of MATLAB and Python that mean one thing between numbers."""
 
-VULGAR_FRACTIONS = {"½": "(1/2)", "⅓": "(1/3)", "¼": "(1/4)", "¾": "(3/4)", "⅔": "(2/3)"}
+_VULGAR_FRACTIONS = {"½": "(1/2)", "⅓": "(1/3)", "¼": "(1/4)", "¾": "(3/4)", "⅔": "(2/3)"}
 
-ASCII_TEXTS = {
+_ASCII_TEXTS = {
     **dict.fromkeys("·×∗⋅∙•", "*"),
     **dict.fromkeys("−–—‐‑﹣", "-"),
     **dict.fromkeys("÷∕⁄", "/"),
     **dict.fromkeys("\u00a0\u2009\u202f\u2002\u2003\u200a\u2061\u2062", " "),
     **dict.fromkeys("′’‘", "'"),
     **{subscript: str(k) for k, subscript in enumerate("₀₁₂₃₄₅₆₇₈₉")},
-    **VULGAR_FRACTIONS,
+    **_VULGAR_FRACTIONS,
     **dict(zip("√ℓ\u0307\u0308", (" sqrt ", "l", "dot", "ddot"), strict=True)),
 }
 """ASCII text of characters; Greek letters and raised digits are told apart from these."""
 
-RAISED = {raised: str(k) for k, raised in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")} | {"⁻": "-", "⁺": "+"}
+_RAISED = {raised: str(k) for k, raised in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")} | {"⁻": "-", "⁺": "+"}
 
 
 def word_set(text: str) -> frozenset[str]:
@@ -74,22 +69,22 @@ def to_ascii(text: str) -> tuple[str, list[int]]:
     AnswerError
         A character that no formula has, or too many characters.
     """
-    if len(text) > MAX_LENGTH:
-        raise AnswerError(f"an entry of {len(text)} characters; expected at most {MAX_LENGTH}")
+    if len(text) > BOUNDS.entry_characters:
+        raise AnswerError(f"an entry of {len(text)} characters; expected at most {BOUNDS.entry_characters}")
     if text.isascii():
         return text, list(range(len(text)))
     pieces: list[str] = []
     places: list[int] = []
     before_raised = False
     for at, character in enumerate(unicodedata.normalize("NFD", text)):
-        piece, raised = character, character in RAISED
-        if character in VULGAR_FRACTIONS and pieces and pieces[-1][-1:].isdigit():
-            whole, part = pieces[-1][-1], ASCII_TEXTS[character]
+        piece, raised = character, character in _RAISED
+        if character in _VULGAR_FRACTIONS and pieces and pieces[-1][-1:].isdigit():
+            whole, part = pieces[-1][-1], _ASCII_TEXTS[character]
             fail(text, at, f"{whole}{character} may be {whole} + {part} or {whole}*{part}; write one of them")
         if raised:
-            piece = ("" if before_raised else "^") + RAISED[character]
+            piece = ("" if before_raised else "^") + _RAISED[character]
         elif not character.isascii():
-            piece = ASCII_TEXTS.get(character) or _greek(character) or fail(text, at, _described(character))
+            piece = _ASCII_TEXTS.get(character) or _greek(character) or fail(text, at, _described(character))
         before_raised = raised
         pieces.append(piece)
         places += [at] * len(piece)
@@ -116,9 +111,9 @@ def split_tokens(text: str, places: list[int], original: str, allowed: str = "")
     tokens: list[Token] = []
     at, end = 0, len(text.rstrip())
     while at < end:
-        if match := TOKEN.match(text, at):
+        if match := _TOKEN.match(text, at):
             group = match.lastindex or 1
-            word = SAME.get(match[group], match[group])
+            word = _SAME.get(match[group], match[group])
             tokens.append(Token(("number", "name", "sign")[group - 1], word, places[match.start(group)]))
             at = match.end()
             continue
@@ -136,7 +131,7 @@ def nesting(text: str) -> int:
 
 
 def check_depth(tokens: Sequence[Token], text: str) -> None:
-    """Refuse tokens whose brackets are nested deeper than :data:`MAX_DEPTH`.
+    """Refuse tokens whose brackets are nested deeper than ``BOUNDS.nesting``.
 
     Raises
     ------
@@ -146,8 +141,8 @@ def check_depth(tokens: Sequence[Token], text: str) -> None:
     depth = 0
     for token in tokens:
         depth += nesting(token.text)
-        if depth > MAX_DEPTH:
-            fail(text, token.at, f"brackets nested more than {MAX_DEPTH} deep")
+        if depth > BOUNDS.nesting:
+            fail(text, token.at, f"brackets nested more than {BOUNDS.nesting} deep")
 
 
 def closing_bracket(tokens: Sequence[Token], k: int) -> int:

@@ -10,14 +10,14 @@ from dhkit.expressions.syntax import Call, Name, Number, Power, Tree
 from dhkit.expressions.trees import Algebra, node_count, parts_of
 from dhkit.symbolic.equations.latex_names import latex_names
 
-MAX_NODES = 600
+_MAX_NODES = 600
 """Largest number of nodes of an entry that is typeset: a longer one fills a page."""
 
-VARIABLE = re.compile(r"(qdd|qd|q)(\d+)")
-LATEX_FUNCTIONS = {"asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan"}
-LATEX_NAMES = ("sin", "cos", "tan", "exp", "min", "max")
-LATEX_MARKS = {"qdd": r"\ddot{q}", "qd": r"\dot{q}", "q": "q"}
-SUM, PRODUCT, POWER = 0, 1, 2
+_VARIABLE = re.compile(r"(qdd|qd|q)(\d+)")
+_LATEX_FUNCTIONS = {"asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan"}
+_LATEX_NAMES = ("sin", "cos", "tan", "exp", "min", "max")
+_LATEX_MARKS = {"qdd": r"\ddot{q}", "qd": r"\dot{q}", "q": "q"}
+_SUM, _PRODUCT, _POWER = 0, 1, 2
 """How tightly an operation binds, which decides whether it stands in brackets inside another one."""
 
 
@@ -30,10 +30,10 @@ def typeset(tree: Tree) -> tuple[str, str]:
     >>> typeset(read("m1/2*cos(q1)^2"))
     ('m1/2*cos(q1)^2', '\\frac{m_{1}}{2} \\cos(q_{1})^{2}')
     """
-    if node_count(tree, MAX_NODES) > MAX_NODES:
+    if node_count(tree, _MAX_NODES) > _MAX_NODES:
         return "", ""
     names = {part.text for part in parts_of(tree) if isinstance(part, Name)}
-    symbols = latex_names([name for name in names if not VARIABLE.fullmatch(name)])
+    symbols = latex_names([name for name in names if not _VARIABLE.fullmatch(name)])
     text = _Writer(str, _plain_call, _plain_product, lambda base, exponent: f"{base}^{exponent}")
     latex = _Writer(lambda name: _latex_name(name, symbols), _latex_call, _latex_product, _latex_power)
     return text.of(tree).text, latex.of(tree).text
@@ -57,7 +57,7 @@ def typeset_equations(equations: Sequence[tuple[Tree, Tree]]) -> tuple[str, str]
 
 
 class _Text(NamedTuple):
-    """A part of a formula as text, and how tightly its operation binds: SUM, PRODUCT or POWER."""
+    """A part of a formula as text, and how tightly its operation binds: _SUM, _PRODUCT or _POWER."""
 
     text: str
     level: int
@@ -84,24 +84,24 @@ class _Writer(Algebra[_Text]):
         self._write_power = write_power
 
     def number(self, tree: Number) -> _Text:
-        return _Text(tree.text, POWER)
+        return _Text(tree.text, _POWER)
 
     def name(self, tree: Name) -> _Text:
-        return _Text(self._write_name(tree.text), POWER)
+        return _Text(self._write_name(tree.text), _POWER)
 
     def call(self, tree: Call) -> _Text:
-        return _Text(self._write_call(tree.function, [self.of(one).text for one in tree.arguments]), POWER)
+        return _Text(self._write_call(tree.function, [self.of(one).text for one in tree.arguments]), _POWER)
 
     def power(self, tree: Power) -> _Text:
         base, exponent = self.of(tree.base), self.of(tree.exponent)
-        return _Text(self._write_power(base.inside(POWER), exponent.inside(POWER)), POWER)
+        return _Text(self._write_power(base.inside(_POWER), exponent.inside(_POWER)), _POWER)
 
     def product(self, factors: Sequence[tuple[bool, _Text]]) -> _Text:
-        return _Text(self._write_product([(is_factor, one.inside(PRODUCT)) for is_factor, one in factors]), PRODUCT)
+        return _Text(self._write_product([(is_factor, one.inside(_PRODUCT)) for is_factor, one in factors]), _PRODUCT)
 
     def sum(self, terms: Sequence[tuple[bool, _Text]]) -> _Text:
-        signed = "".join(f" + {one.text}" if added else f" - {one.inside(PRODUCT)}" for added, one in terms)
-        return _Text(signed[3:] if signed.startswith(" + ") else f"-{signed[3:]}", SUM)
+        signed = "".join(f" + {one.text}" if added else f" - {one.inside(_PRODUCT)}" for added, one in terms)
+        return _Text(signed[3:] if signed.startswith(" + ") else f"-{signed[3:]}", _SUM)
 
 
 def _plain_call(function: str, arguments: Sequence[str]) -> str:
@@ -118,16 +118,16 @@ def _plain_product(factors: Sequence[tuple[bool, str]]) -> str:
 
 
 def _latex_name(name: str, symbols: dict[str, str]) -> str:
-    if match := VARIABLE.fullmatch(name):
-        return f"{LATEX_MARKS[match[1]]}_{{{match[2]}}}"
+    if match := _VARIABLE.fullmatch(name):
+        return f"{_LATEX_MARKS[match[1]]}_{{{match[2]}}}"
     return r"\pi" if name == "pi" else symbols[name]
 
 
 def _latex_call(function: str, arguments: Sequence[str]) -> str:
     if function == "sqrt":
         return rf"\sqrt{{{arguments[0]}}}"
-    name = rf"\{function}" if function in LATEX_NAMES else rf"\mathrm{{{function}}}"
-    return f"{LATEX_FUNCTIONS.get(function, name)}({', '.join(arguments)})"
+    name = rf"\{function}" if function in _LATEX_NAMES else rf"\mathrm{{{function}}}"
+    return f"{_LATEX_FUNCTIONS.get(function, name)}({', '.join(arguments)})"
 
 
 def _latex_product(factors: Sequence[tuple[bool, str]]) -> str:

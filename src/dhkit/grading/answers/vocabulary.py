@@ -12,12 +12,13 @@ from typing import TypeAlias
 from dhkit.description import Description
 from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.tokens import quote
 
 Meaning: TypeAlias = tuple[str, ...]
 """Tokens that a name stands for, in the robot's own names."""
 
-SPELLINGS = (
+_SPELLINGS = (
     dict(sin="sin Sin SIN s", cos="cos Cos COS c", tan="tan Tan TAN", asin="asin arcsin ArcSin Asin ASIN")
     | dict(acos="acos arccos ArcCos Acos ACOS", atan="atan arctan ArcTan Atan ATAN")
     | dict(atan2="atan2 arctan2 Atan2 ATAN2", sqrt="sqrt Sqrt SQRT", hypot="hypot")
@@ -29,25 +30,23 @@ SPELLINGS = (
 )
 """Functions that may be called, each with its spellings."""
 
-FUNCTION_NAMES = {spelling: name for name, spellings in SPELLINGS.items() for spelling in spellings.split()}
+FUNCTION_NAMES = {spelling: name for name, spellings in _SPELLINGS.items() for spelling in spellings.split()}
 """The function of each spelling."""
 
-ANGLES = ("q", "th", "theta", "Theta", "vartheta", "t", "phi", "varphi")
-SLIDES = ("d", "r", "x", "s", "rho")
+_ANGLES = ("q", "th", "theta", "Theta", "vartheta", "t", "phi", "varphi")
+_SLIDES = ("d", "r", "x", "s", "rho")
 """Letters for the variable of a sliding joint, beside those of all joints."""
 
-MAX_NAME = 64
-"""Largest length of a name that is taken apart, in characters."""
 
-RATES = re.compile(r"(?:omega|Omega)(\d+)", re.ASCII)
-DOTS = {"d": 1, "dot": 1, "p": 1, "D": 1, "dd": 2, "ddot": 2, "pp": 2, "d2": 2, "DD": 2}
+_RATES = re.compile(r"(?:omega|Omega)(\d+)", re.ASCII)
+_DOTS = {"d": 1, "dot": 1, "p": 1, "D": 1, "dd": 2, "ddot": 2, "pp": 2, "d2": 2, "DD": 2}
 """Marks of a derivative by time, and its order."""
 
-_LETTERS = "|".join(sorted((*ANGLES, *SLIDES), key=len, reverse=True))
-VARIABLE = re.compile(
+_LETTERS = "|".join(sorted((*_ANGLES, *_SLIDES), key=len, reverse=True))
+_VARIABLE = re.compile(
     rf"(dot|ddot|d|dd|d2|D|DD)??({_LETTERS})(d|dot|p|dd|ddot|pp)??(\d+)(d|dot|p|dd|ddot|pp)?", re.ASCII
 )
-SINE_OR_COSINE = re.compile(r"([csCS]|cos|sin|[csCS](?:q|th|theta|t))(\d(?:[pm]?\d)*)", re.ASCII)
+_SINE_OR_COSINE = re.compile(r"([csCS]|cos|sin|[csCS](?:q|th|theta|t))(\d(?:[pm]?\d)*)", re.ASCII)
 """The sine or the cosine of a sum of joint angles: c1, s12, c_{1-2}."""
 
 
@@ -235,11 +234,11 @@ class Vocabulary:
 
     def _joint_variable(self, name: str) -> Meaning | None:
         """Return a joint's variable, rate or acceleration, in any of the usual spellings."""
-        angular = RATES.fullmatch(name)
+        angular = _RATES.fullmatch(name)
         if angular and angular[1] in self.numbers and self.kinds[self.numbers[angular[1]] - 1] == "R":
             self.taken_for[name] = f"the rate of joint {self.numbers[angular[1]]}"
             return self._own_variable("qd", self.numbers[angular[1]])
-        match = VARIABLE.fullmatch(name)
+        match = _VARIABLE.fullmatch(name)
         if match is None:
             alone = len(self.kinds) == 1 and not name[-1:].isdigit() and (len(name) > 1 or name == "q")
             return self._joint_variable(name + "1") if alone else None
@@ -248,9 +247,9 @@ class Vocabulary:
         if not joints:
             return None
         marks = [mark for mark in (before, between, behind) if mark]
-        if len(marks) > 1 or (letter in SLIDES and letter not in ANGLES and self.kinds[joints[0] - 1] == "R"):
+        if len(marks) > 1 or (letter in _SLIDES and letter not in _ANGLES and self.kinds[joints[0] - 1] == "R"):
             return None
-        dots = DOTS[marks[0]] if marks else 0
+        dots = _DOTS[marks[0]] if marks else 0
         kind = ("q", "qd", "qdd")[dots]
         return _sum_of([self._own_variable(kind, joint) for joint in joints])
 
@@ -266,7 +265,7 @@ class Vocabulary:
 
     def _sine_or_cosine(self, name: str) -> Meaning | None:
         """Return the sine or the cosine of a sum of joint angles: c1, s12, c_{1-2}."""
-        match = SINE_OR_COSINE.fullmatch(name)
+        match = _SINE_OR_COSINE.fullmatch(name)
         if match is None:
             return None
         numbers = re.findall(r"[pm]?\d", match[2])
@@ -280,7 +279,7 @@ class Vocabulary:
 
     def _ambiguous(self, name: str) -> str:
         """Return why a name of an arm of ten joints or more has two meanings: c12 is cos(q12) or cos(q1 + q2)."""
-        match = SINE_OR_COSINE.fullmatch(name)
+        match = _SINE_OR_COSINE.fullmatch(name)
         if match is None or len(match[2]) < 2 or match[2] not in self.numbers:
             return ""
         function = "cos" if match[1][0] in "cC" else "sin"
@@ -289,7 +288,7 @@ class Vocabulary:
 
     def split(self, name: str) -> list[str] | None:
         """Return the known names that an unknown one is a product of, where there is one way: m2l1 is m2 l1."""
-        if len(name) > MAX_NAME:
+        if len(name) > BOUNDS.name_characters:
             return None
         fewest: dict[int, list[list[str]]] = {len(name): [[]]}
         for start in reversed(range(len(name))):
@@ -325,9 +324,9 @@ class Vocabulary:
             *FUNCTION_NAMES,
         ]
         known += [f"{kind}{i}" for i in range(1, len(self.kinds) + 1) for kind in ("q", "qd", "qdd", "c", "s")]
-        known = [other for other in known if len(other) <= MAX_NAME]
+        known = [other for other in known if len(other) <= BOUNDS.name_characters]
         close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-        own = (other for other in self.own if len(other) <= MAX_NAME and other not in self.aliases)
+        own = (other for other in self.own if len(other) <= BOUNDS.name_characters and other not in self.aliases)
         listed = [*self.further[:4:3], *own, *self.symbols, "q1", "qd1", "c1", "s1"]
         return f"did you mean {close[0]!r}?" if close else f"known are {', '.join(dict.fromkeys(listed[:12]))}"
 

@@ -10,9 +10,9 @@ from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tr
 from dhkit.expressions.trees import names_of, operands, parts_of, with_operands
 from dhkit.grading.answers.given import POSE_NAMES
 
-MIN_LAW_TERMS = 3
+_MIN_LAW_TERMS = 3
 """Smallest number of terms of the numerator in a law of cosines: two squared links, and a squared distance."""
-MIN_LAW_SQUARES = 2
+_MIN_LAW_SQUARES = 2
 """Smallest number of squares among them; a mistake may have removed one."""
 
 
@@ -96,7 +96,7 @@ def is_law(tree: Tree) -> bool:
     if not isinstance(tree, Product) or all(is_factor for is_factor, _ in tree.factors):
         return False
     sums = [_terms(part) for is_factor, part in tree.factors if is_factor]
-    return any(len(terms) >= MIN_LAW_TERMS and sum(map(_is_square, terms)) >= MIN_LAW_SQUARES for terms in sums)
+    return any(len(terms) >= _MIN_LAW_TERMS and sum(map(_is_square, terms)) >= _MIN_LAW_SQUARES for terms in sums)
 
 
 def _terms(tree: Tree) -> list[Tree]:

@@ -106,7 +106,7 @@ class Consistency:
         return self.truth.coordinates.rates(element_array([generator(ring, i) for i in range(self.n)]))
 
 
-Route = Callable[..., Elements]
+_Route = Callable[..., Elements]
 """Derives a quantity from the sheet's others, which follow its first argument, a :class:`Consistency`."""
 
 
@@ -163,7 +163,7 @@ def _jacobian(parts: Consistency, T: Elements) -> Elements:
     return np.array(columns, dtype=object).T
 
 
-_ROUTES: Mapping[str, tuple[tuple[str, ...], Route]] = {
+_ROUTES: Mapping[str, tuple[tuple[str, ...], _Route]] = {
     "M": (("K",), _hessian),
     "C": (("M",), _velocity_torques),
     "h": (("M",), _velocity_torques),

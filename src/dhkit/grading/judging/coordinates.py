@@ -18,7 +18,7 @@ ANGLE = re.compile(r"\b([cs])(\d[\d_]*)\b", re.ASCII)
 """A sine or cosine in a printed formula: c12."""
 
 
-VARIABLE = re.compile(r"(?:q|qd|qdd)\d+", re.ASCII)
+_VARIABLE = re.compile(r"(?:q|qd|qdd)\d+", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class Coordinates:
             if any(name in state for name in names):
                 values = [sum(state.get(names[i], 0.0) for i in joints) for joints in self.sums]
                 own |= dict(zip(names, values, strict=True))
-        return own | {name: value for name, value in state.items() if not VARIABLE.fullmatch(name)}
+        return own | {name: value for name, value in state.items() if not _VARIABLE.fullmatch(name)}
 
     def by_position(self, element: Element, i: int) -> Element:
         """Return the derivative by variable i."""

@@ -17,6 +17,7 @@ from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
 from dhkit.expressions.syntax import Tree
 from dhkit.expressions.trees import names_of
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.numeric import Evaluation
 
 if TYPE_CHECKING:
@@ -24,15 +25,11 @@ if TYPE_CHECKING:
 
 PRECISIONS = (60, 250, 1000, 6000)
 """Decimal digits in which a tree is worked out, one after the other until its value is known."""
-MAX_WORK = 1_000_000
-"""Largest product of a tree's parts and digits, beyond the first precision: about a second's work."""
 RELATIVE_DIGITS = 26
 """Known leading digits that are enough to tell a value from another one."""
-MAX_ARGUMENT_BITS, MAX_POWER_BITS = 2_000, 100_000
-"""Largest integer part of a function's argument or an exponent, and largest power, in bits."""
-TOO_LARGE = "a number too large to be worked out"
+_TOO_LARGE = "a number too large to be worked out"
 
-Interval = Any
+_Interval = Any
 """An interval of mpmath, which has no types."""
 
 
@@ -73,14 +70,14 @@ def enclosed(
     TooLargeError
         A number that is too large to be worked out.
     LostDigitsError
-        No precision in :data:`PRECISIONS` gives the value within :data:`MAX_WORK`: digits cancel, or a function has no
-        value nearby.
+        No precision in :data:`PRECISIONS` gives the value within ``BOUNDS.enclosure_work``: digits cancel, or a
+        function has no value nearby.
     """
     import mpmath
 
     used = names_of(tree)
     for digits in PRECISIONS:
-        if digits > PRECISIONS[0] and parts * digits > MAX_WORK:
+        if digits > PRECISIONS[0] and parts * digits > BOUNDS.enclosure_work:
             break
         iv, previous = mpmath.iv, mpmath.iv.dps
         iv.dps = digits
@@ -100,7 +97,7 @@ def enclosed(
 
 
 @lru_cache(maxsize=4096)
-def _rational(value: Fraction, digits: int) -> Interval:
+def _rational(value: Fraction, digits: int) -> _Interval:
     """Return a rational number in the working precision, which is ``digits``."""
     from mpmath import iv
 
@@ -108,7 +105,7 @@ def _rational(value: Fraction, digits: int) -> Interval:
 
 
 @lru_cache(maxsize=len(PRECISIONS))
-def _units(digits: int) -> Mapping[str, Interval]:
+def _units(digits: int) -> Mapping[str, _Interval]:
     """Return pi and the units in the working precision, which is ``digits``."""
     from mpmath import iv
 
@@ -116,7 +113,7 @@ def _units(digits: int) -> Mapping[str, Interval]:
     return {**units, "pi": +iv.pi, "deg": iv.pi / 180}
 
 
-def _magnitudes(x: Interval) -> list[int]:
+def _magnitudes(x: _Interval) -> list[int]:
     """Return the binary magnitudes of an interval's bounds, without those of zeros."""
     import mpmath
 
@@ -126,12 +123,12 @@ def _magnitudes(x: Interval) -> list[int]:
     return [int(mpmath.mag(bound)) for bound in bounds if bound]
 
 
-def _integer_bits(x: Interval) -> int:
+def _integer_bits(x: _Interval) -> int:
     """Return the bits of the larger bound before its point; negative for numbers below 1/2."""
     return max(_magnitudes(x), default=0)
 
 
-def _refuse_below(x: Interval, bound: int) -> None:
+def _refuse_below(x: _Interval, bound: int) -> None:
     """Refuse an argument below the lower end of a function's domain, and one that may be below it."""
     if x.b < bound:
         raise AnswerError("no real value")
@@ -139,7 +136,7 @@ def _refuse_below(x: Interval, bound: int) -> None:
         raise _UndecidedError
 
 
-def _divide(x: Interval, y: Interval) -> Interval:
+def _divide(x: _Interval, y: _Interval) -> _Interval:
     if 0 in y:
         if y.a == y.b:
             raise AnswerError("no finite value")
@@ -147,15 +144,15 @@ def _divide(x: Interval, y: Interval) -> Interval:
     return x / y
 
 
-def _power(base: Interval, exponent: Interval) -> Interval:
+def _power(base: _Interval, exponent: _Interval) -> _Interval:
     import mpmath
 
-    if _integer_bits(exponent) > MAX_ARGUMENT_BITS:
-        raise TooLargeError(TOO_LARGE)
+    if _integer_bits(exponent) > BOUNDS.argument_bits:
+        raise TooLargeError(_TOO_LARGE)
     size = max(map(abs, _magnitudes(base)), default=0)
     power = mpmath.mpf(exponent.mid)
-    if size * abs(power) > MAX_POWER_BITS:
-        raise TooLargeError(TOO_LARGE)
+    if size * abs(power) > BOUNDS.power_bits:
+        raise TooLargeError(_TOO_LARGE)
     if exponent.a == exponent.b and power == int(power):
         whole = int(power)
         return base**whole if whole >= 0 else _divide(mpmath.iv.mpf(1), base**-whole)
@@ -168,42 +165,42 @@ def _power(base: Interval, exponent: Interval) -> Interval:
 
 
 @lru_cache(maxsize=1)
-def _functions() -> Mapping[str, Callable[..., Interval]]:
+def _functions() -> Mapping[str, Callable[..., _Interval]]:
     """Return the functions of :data:`dhkit.grading.judging.numeric.FUNCTIONS` for intervals."""
     from mpmath import iv
 
-    def square_root(x: Interval) -> Interval:
+    def square_root(x: _Interval) -> _Interval:
         _refuse_below(x, 0)
         return iv.sqrt(x)
 
-    def other_leg(x: Interval) -> Interval:
+    def other_leg(x: _Interval) -> _Interval:
         """Return sqrt(1 - x^2): the cosine of an arc sine, and the sine of an arc cosine."""
         _refuse_below(1 - abs(x), 0)
         return square_root((1 - x) * (1 + x))
 
-    def arc_tangent(y: Interval, x: Interval) -> Interval:
+    def arc_tangent(y: _Interval, x: _Interval) -> _Interval:
         if 0 in x and 0 in y:
             if x.a == x.b and y.a == y.b:
                 raise AnswerError("no finite value")
             raise _UndecidedError
         return iv.atan2(y, x)
 
-    def sign(x: Interval) -> Interval:
+    def sign(x: _Interval) -> _Interval:
         if 0 in x and x.a != x.b:
             raise _UndecidedError
         return iv.mpf(int(x.a > 0) - int(x.a < 0))
 
-    def bounded(function: Callable[..., Interval]) -> Callable[..., Interval]:
+    def bounded(function: Callable[..., _Interval]) -> Callable[..., _Interval]:
         """Return a function that refuses arguments too large to be worked out."""
 
-        def apply(*arguments: Interval) -> Interval:
-            if any(_integer_bits(x) > MAX_ARGUMENT_BITS for x in arguments):
-                raise TooLargeError(TOO_LARGE)
+        def apply(*arguments: _Interval) -> _Interval:
+            if any(_integer_bits(x) > BOUNDS.argument_bits for x in arguments):
+                raise TooLargeError(_TOO_LARGE)
             return function(*arguments)
 
         return apply
 
-    functions: dict[str, Callable[..., Interval]] = {
+    functions: dict[str, Callable[..., _Interval]] = {
         "sin": iv.sin,
         "cos": iv.cos,
         "tan": lambda x: _divide(iv.sin(x), iv.cos(x)),

@@ -14,6 +14,7 @@ from dhkit.expressions import CONSTANTS
 from dhkit.expressions.syntax import Number, Sum, Tree
 from dhkit.expressions.trees import names_of, parts_of
 from dhkit.grading.judging import sampling
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.enclosures import LostDigitsError, TooLargeError, enclosed
 from dhkit.grading.judging.numeric import doubles, state_arrays
 from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient, RingReader
@@ -24,11 +25,9 @@ from dhkit.symbolic.equations import latex_text, plain_text
 from dhkit.symbolic.exact.compact import shortened
 from dhkit.symbolic.ring import Element, RingError, element_array
 
-MAX_WRITTEN_TERMS = 400
-"""Largest number of terms of a difference that is written in the angles which make it shortest."""
-MAX_NAMED_DIVISORS = 3
+_MAX_NAMED_DIVISORS = 3
 """Largest number of divisors that a statement names."""
-PROVED = "proved equal"
+_PROVED = "proved equal"
 
 
 def exact_difference(answer: Quotient, truth: Element) -> Sequence[Element]:
@@ -156,11 +155,11 @@ def _proof_statement(by: Comparison, divisors: Sequence[Element]) -> str:
     """Return for which states an answer is proved: it has no value where it divides by zero."""
     if not divisors:
         parameters = "" if by.condition else " and every value of the parameters"
-        return f"{PROVED}{by.condition}, for every state{parameters}"
-    texts = [plain_text(readable(by.arm, x)) for x in divisors[:MAX_NAMED_DIVISORS] if len(x) <= MAX_WRITTEN_TERMS]
+        return f"{_PROVED}{by.condition}, for every state{parameters}"
+    texts = [plain_text(readable(by.arm, x)) for x in divisors[:_MAX_NAMED_DIVISORS] if len(x) <= BOUNDS.written_terms]
     more = " or another divisor is 0" if len(texts) < len(divisors) else ""
     zeros = " or ".join(f"{text} = 0" for text in texts) + more
-    return f"{PROVED}{by.condition} wherever the answer is defined: it has no value where {zeros}"
+    return f"{_PROVED}{by.condition} wherever the answer is defined: it has no value where {zeros}"
 
 
 def equal(tree: Tree, truth: Element, by: Comparison) -> bool:
@@ -182,12 +181,12 @@ def _difference_texts(
     arm: ExactArm, answer: Quotient, truth: Element, difference: Element | None
 ) -> tuple[str | None, str]:
     if difference is not None:
-        if len(difference) > MAX_WRITTEN_TERMS:
+        if len(difference) > BOUNDS.written_terms:
             return plain_text(difference), ""
         short = readable(arm, difference)
         return plain_text(short), latex_text(short)
     numerator, denominator = answer.numerator_of_difference(truth), answer.denominator
-    if max(len(numerator), len(denominator)) > MAX_WRITTEN_TERMS:
+    if max(len(numerator), len(denominator)) > BOUNDS.written_terms:
         return None, ""
     numerator, denominator = readable(arm, numerator), readable(arm, denominator)
     return (
@@ -198,7 +197,7 @@ def _difference_texts(
 
 # Witnesses
 
-WITNESS_TRIALS = 24
+_WITNESS_TRIALS = 24
 """Number of states from which a witness is chosen; the second half has other parameters than the file's."""
 
 
@@ -210,14 +209,14 @@ def _find_witness(tree: Tree, truth: Element, by: Comparison) -> Witness | None:
     arm, rng = by.arm, np.random.default_rng(7)
     best: tuple[float, Witness] | None = None
     used = names_of(tree) | names_in(truth)
-    for k in range(WITNESS_TRIALS):
+    for k in range(_WITNESS_TRIALS):
         state = {
             f"{kind}{i + 1}": float(np.round(rng.uniform(-1.5, 1.5), 1))
             for kind in ("q", "qd", "qdd")
             for i in range(arm.n)
         }
         parameters = dict(arm.parameters)
-        if k >= WITNESS_TRIALS // 2:
+        if k >= _WITNESS_TRIALS // 2:
             parameters |= {p: float(np.round(v * rng.uniform(0.5, 2.0), 3)) for p, v in parameters.items()}
         value = float(doubles(tree, {**parameters, **state}))
         right = float(truth.value(arm.ring.values({**arm.values, **parameters}, *state_arrays(state, arm.n))))
@@ -242,15 +241,7 @@ def names_in(element: Element) -> set[str]:
 
 # Answers outside the ring
 
-MAX_NODES = 20_000
-"""Largest number of nodes of an answer that is tried at random states."""
-MAX_EVALUATIONS = 300_000
-"""Largest product of nodes and states."""
-MAX_WORK = 60 * MAX_EVALUATIONS
-"""Largest product of nodes and digits, over all states."""
-MIN_STATES = 15
-"""Smallest number of states: an answer too long for them cannot be judged."""
-STATES_PER_SET = 5
+_STATES_PER_SET = 5
 """States that share parameters if an energy's zero is free: the first of them sets it, the others are compared. A small
 number leaves many sets of parameters: a difference may exist in a part of their range alone."""
 
@@ -262,11 +253,11 @@ def _sample(tree: Tree, truth: Element, by: Comparison, reason: str) -> Finding:
     nodes = sum(1 for _ in parts_of(tree)) + len(truth)
     if by.up_to_constant is None:
         raise AnswerError(f"outside the exact ring ({reason}), where L is not judged up to a total derivative")
-    if nodes > MAX_NODES:
+    if nodes > BOUNDS.sampled_nodes:
         raise AnswerError(f"outside the exact ring ({reason}), and too long to be tried: {nodes} terms and factors")
     with mpmath.workdps(sampling.DIGITS):
-        count = max(MIN_STATES, min(sampling.MAX_SAMPLES, MAX_EVALUATIONS // nodes))
-        every = STATES_PER_SET if by.up_to_constant else 1
+        count = max(BOUNDS.fewest_states, min(BOUNDS.states, BOUNDS.evaluations // nodes))
+        every = _STATES_PER_SET if by.up_to_constant else 1
         states = sampling.samples(by.arm, by.numbers, by.seed, every=every, count=count)
         try:
             result = _first_difference(tree, nodes, truth, by, reason, states)
@@ -316,10 +307,10 @@ def _first_difference(
     for k, state in enumerate(states):
         right = sampling.element_value(truth, state)
         try:
-            for constant in constants if k % STATES_PER_SET == 0 else ():
+            for constant in constants if k % _STATES_PER_SET == 0 else ():
                 enclosed(constant, nodes, state.names, sampling.MIN_SIZE)
             # The error of the state that sets the zero is that of all states after it, however small their values.
-            sets_zero = by.up_to_constant and k % STATES_PER_SET == 0
+            sets_zero = by.up_to_constant and k % _STATES_PER_SET == 0
             size = sampling.MIN_SIZE if sets_zero else max(abs(right), sampling.MIN_SIZE)
             tolerance = sampling.TOLERANCE / 10 * size
             value, digits = enclosed(tree, nodes, state.names, tolerance, relative=not by.up_to_constant)
@@ -332,7 +323,7 @@ def _first_difference(
         if sampling.differ(value - shift, right):
             return differs(state, value - shift, right, f"outside the exact ring ({reason})")
         work += nodes * digits
-        if work > MAX_WORK and k + 1 >= MIN_STATES:
+        if work > BOUNDS.sampling_work and k + 1 >= BOUNDS.fewest_states:
             return k + 1
     return k + 1
 

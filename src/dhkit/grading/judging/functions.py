@@ -21,16 +21,16 @@ from dhkit.grading.judging.truth import Truth
 from dhkit.grading.report import Verdict, Witness
 from dhkit.symbolic.ring import Elements
 
-SAMPLES = 1_000
+_SAMPLES = 1_000
 """Number of random states."""
 GROUP = 10
 """Number of random states in a row with the same parameters."""
-TOLERANCE = 1e-9
+_TOLERANCE = 1e-9
 """Tolerance relative to a quantity's largest entry at a state: doubles, with room for a long formula's rounding."""
-STATES = ("q", "qd", "qdd")
+_STATES = ("q", "qd", "qdd")
 LIMITS = Limits(seconds=15.0, memory=2 * 1024**3)
 """Limits of the process that calls a function at all states: a function that hangs or exits ends that process alone."""
-ERROR_MARK = b"!"
+_ERROR_MARK = b"!"
 """First byte of a process's result that is an error message and no array."""
 
 
@@ -47,12 +47,12 @@ def judge_function(name: str, function: Callable[..., object], truth: Truth, see
     n, shape = truth.description.n, shape_of(name, truth.description.n)
     count = _argument_count(name, function)
     rng = np.random.default_rng(seed)
-    y = [_random_states(rng, n) for _ in STATES]
+    y = [_random_states(rng, n) for _ in _STATES]
     states = [v @ truth.coordinates.B.T.astype(float) for v in y]
     values = _call_at_states(name, function, y[:count], shape)
     right = truth.of("h" if name == "C" else name)
     expected = truth.arm(name).evaluate(right, *states)
-    states_by_name = dict(zip(STATES, y, strict=True))
+    states_by_name = dict(zip(_STATES, y, strict=True))
     return _compared(
         name,
         getattr(function, "__name__", "function") + "(...)",
@@ -63,7 +63,7 @@ def judge_function(name: str, function: Callable[..., object], truth: Truth, see
         truth,
         lambda k: {f"{kind}{i + 1}": float(x) for kind, rows in states_by_name.items() for i, x in enumerate(rows[k])},
         Verdict.UNDECIDED,
-        group=SAMPLES,
+        group=_SAMPLES,
     )
 
 
@@ -84,14 +84,14 @@ def judge_sampled(name: str, answer: SampledAnswer, truth: Truth, seed: int = 0)
     if answer.parameters - varied:  # one that others define would not follow them
         varied = frozenset()
     fixed = frozenset(truth.description.numbers.values) - varied
-    listed = list(samples(arm, fixed, seed, every=GROUP, count=SAMPLES))
+    listed = list(samples(arm, fixed, seed, every=GROUP, count=_SAMPLES))
     # The student's joint variables y, where q = B y.
     inverse = np.linalg.inv(truth.coordinates.B.astype(float))
     states = [_own_state(sample.names, inverse, n) for sample in listed]
     values = answer.at(states, shape)
     generators = np.array([[float(x) for x in sample.generators] for sample in listed]).T
-    flat = [np.broadcast_to(element.value(generators), SAMPLES) for element in right.reshape(-1)]
-    expected = np.stack(flat, axis=-1).reshape(SAMPLES, *right.shape)
+    flat = [np.broadcast_to(element.value(generators), _SAMPLES) for element in right.reshape(-1)]
+    expected = np.stack(flat, axis=-1).reshape(_SAMPLES, *right.shape)
     rates = np.array([[state[f"qd{i + 1}"] for i in range(n)] for state in states])
     return _compared(
         name, answer.name, values, expected, rates, right, truth, states.__getitem__, Verdict.SAMPLED, group=GROUP
@@ -101,7 +101,7 @@ def judge_sampled(name: str, answer: SampledAnswer, truth: Truth, seed: int = 0)
 def _own_state(names: Mapping[str, Any], inverse: Array, n: int) -> dict[str, float]:
     """Return a state with the student's joint variables in place of the robot's."""
     state = {name: float(value) for name, value in names.items()}
-    for kind in STATES:
+    for kind in _STATES:
         own = inverse @ np.array([state[f"{kind}{i + 1}"] for i in range(n)])
         state |= {f"{kind}{i + 1}": float(x) for i, x in enumerate(own)}
     return state
@@ -123,13 +123,13 @@ def _compared(
     shape = values.shape[1:]
     values = np.einsum("...ij,...j->...i", values, rates) if name == "C" else values
     if name in ("V", "L"):
-        first = np.arange(SAMPLES) // group * group
+        first = np.arange(_SAMPLES) // group * group
         values = values - values[first] + expected[first]
-    size = np.max(np.abs(expected).reshape(SAMPLES, -1), axis=1, initial=0.0)
+    size = np.max(np.abs(expected).reshape(_SAMPLES, -1), axis=1, initial=0.0)
     if name in ("V", "L", "J", "T") or name[:1] == "A":
         size = np.maximum(size, np.median(size))
-    size = np.maximum(size, 1e-3 * np.median(size) + 1e-12).reshape(SAMPLES, *(1,) * (expected.ndim - 1))
-    differs = ~(np.abs(values - expected) <= TOLERANCE * size)
+    size = np.maximum(size, 1e-3 * np.median(size) + 1e-12).reshape(_SAMPLES, *(1,) * (expected.ndim - 1))
+    differs = ~(np.abs(values - expected) <= _TOLERANCE * size)
     findings = {}
     for index in np.ndindex(shape):
         place = place_of(name, index)
@@ -139,21 +139,21 @@ def _compared(
 
 
 def _random_states(rng: np.random.Generator, n: int) -> Array:
-    """Return random values, shape (SAMPLES, n): half within 2 rad or m, half at scales from 0.01 to 100."""
-    scale = np.where(np.arange(SAMPLES) % 2, 2.0, 10.0 ** rng.uniform(-2.0, 2.0, SAMPLES))
-    return rng.uniform(-1.0, 1.0, (SAMPLES, n)) * scale[:, None]
+    """Return random values, shape (_SAMPLES, n): half within 2 rad or m, half at scales from 0.01 to 100."""
+    scale = np.where(np.arange(_SAMPLES) % 2, 2.0, 10.0 ** rng.uniform(-2.0, 2.0, _SAMPLES))
+    return rng.uniform(-1.0, 1.0, (_SAMPLES, n)) * scale[:, None]
 
 
 def _call_at_states(
     name: str, function: Callable[..., object], states: Sequence[Array], shape: tuple[int, ...]
 ) -> Array:
-    """Return the function's results, shape (SAMPLES, *shape)."""
+    """Return the function's results, shape (_SAMPLES, *shape)."""
 
     def work() -> bytes:
         try:
-            results = [_call(name, function, [state[k] for state in states], shape) for k in range(SAMPLES)]
+            results = [_call(name, function, [state[k] for state in states], shape) for k in range(_SAMPLES)]
         except AnswerError as error:
-            return ERROR_MARK + str(error).encode("utf-8", "replace")
+            return _ERROR_MARK + str(error).encode("utf-8", "replace")
         return np.array(results).tobytes()
 
     try:
@@ -162,10 +162,10 @@ def _call_at_states(
         raise AnswerError(f"{name}: the function {error}") from None
     except (ChildProcessError, OSError) as error:
         raise AnswerError(f"{name}: the function gave no result: {error}") from None
-    size = 8 * SAMPLES * int(np.prod(shape, dtype=int))
+    size = 8 * _SAMPLES * int(np.prod(shape, dtype=int))
     if len(received) != size:
-        raise AnswerError(received.removeprefix(ERROR_MARK).decode("utf-8", "replace")[:500])
-    return np.frombuffer(received).reshape(SAMPLES, *shape)
+        raise AnswerError(received.removeprefix(_ERROR_MARK).decode("utf-8", "replace")[:500])
+    return np.frombuffer(received).reshape(_SAMPLES, *shape)
 
 
 def _argument_count(name: str, function: Callable[..., object]) -> int:
@@ -175,7 +175,7 @@ def _argument_count(name: str, function: Callable[..., object]) -> int:
         raise AnswerError(
             f"{name}: a function whose arguments cannot be seen; expected (q), (q, qd) or (q, qd, qdd)"
         ) from None
-    if not 1 <= count <= len(STATES):
+    if not 1 <= count <= len(_STATES):
         raise AnswerError(f"{name}: a function of {count} arguments; expected (q), (q, qd) or (q, qd, qdd)")
     return count
 
@@ -203,11 +203,11 @@ def _finding(
 ) -> Finding:
     if not differs.any():
         found = "agrees" if verdict is Verdict.SAMPLED else "equal to the truth"
-        statement = f"not proved, since it is a function: {found} at {SAMPLES} random states, in doubles"
+        statement = f"not proved, since it is a function: {found} at {_SAMPLES} random states, in doubles"
         return Finding(verdict, statement)
     gap = np.moveaxis(np.abs(values - expected), 0, -1)[place]
     worst = int(np.argmax(np.where(np.isfinite(gap), gap, np.inf)))
     answer, right = float(values[(worst, *place)]), float(expected[(worst, *place)])
     witness = Witness(dict(state_of(worst)), answer if np.isfinite(answer) else None, right)
-    share = f"{int(differs.sum())} of {SAMPLES} random states show it"
+    share = f"{int(differs.sum())} of {_SAMPLES} random states show it"
     return Finding(Verdict.WRONG, share, witness=witness)

@@ -19,6 +19,7 @@ from dhkit.expressions.syntax import Tree
 from dhkit.expressions.trees import names_of, parts_of
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.catalogue import hint_of, sentence_of
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.inverse_branch import Branch, joint_order
 from dhkit.grading.judging.inverse_edits import with_signs_changed
 from dhkit.grading.judging.inverse_mistakes import Explanation, Search
@@ -26,9 +27,6 @@ from dhkit.grading.judging.inverse_poses import CLOSES, Poses
 from dhkit.grading.remarks import Note, NoteKind
 from dhkit.grading.report import Diagnosis, Entry, KinematicJudgement, Verdict, Witness, entry_name
 from dhkit.symbolic import table_lengths
-
-MAX_NODES = 5_000
-"""Largest number of nodes of a formula; a PUMA's longest has 200."""
 
 
 @dataclass(frozen=True)
@@ -170,8 +168,10 @@ def _check(description: Description, branches: Sequence[Sequence[Tree]]) -> None
         if len(branch) != n:
             raise AnswerError(f"ik, branch {b}: {len(branch)} formula{'s' * (len(branch) != 1)}; expected {n}")
         for k, tree in enumerate(branch):
-            if sum(1 for _ in islice(parts_of(tree), MAX_NODES + 1)) > MAX_NODES:
-                raise AnswerError(f"ik, branch {b}, q{k + 1}: a formula of more than {MAX_NODES} terms and factors")
+            if sum(1 for _ in islice(parts_of(tree), BOUNDS.formula_nodes + 1)) > BOUNDS.formula_nodes:
+                raise AnswerError(
+                    f"ik, branch {b}, q{k + 1}: a formula of more than {BOUNDS.formula_nodes} terms and factors"
+                )
             others = {f"q{i + 1}" for i in range(n) if i != k}
             for name in sorted(names_of(tree) - pose - others):
                 where = f"ik, branch {b}, q{k + 1}"

@@ -17,7 +17,7 @@ from dhkit.expressions.trees import names_of
 from dhkit.grading.judging.inverse_poses import MATCHES, Mask, Poses
 from dhkit.grading.judging.numeric import EditedDoubles, doubles
 
-CHANCE_SHARE = 0.01
+_CHANCE_SHARE = 0.01
 """Share of poses up to which a branch agrees with a solution by chance."""
 MISSED_SHARE = 0.1
 """Share of the failing poses for which Newton's method may have missed a solution."""
@@ -105,7 +105,7 @@ class Branch:
         solutions = self.poses.solutions
         if self.judged_joint is not None or not np.any(self.closed) or not self.poses.has_closed_form:
             return np.ones(len(self.closed), dtype=bool)
-        follows = np.mean(self.poses.matches(self.q, solutions)[self.closed], axis=0) > CHANCE_SHARE
+        follows = np.mean(self.poses.matches(self.q, solutions)[self.closed], axis=0) > _CHANCE_SHARE
         if not np.any(follows):
             return np.ones(len(self.closed), dtype=bool)
         reached: Mask = self.closed | np.any(np.isfinite(solutions[:, follows, 0]), axis=1)

@@ -16,6 +16,7 @@ from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tr
 from dhkit.expressions.trees import names_of, operands, parts_of, with_operands
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.judging import changed_formulas as formulas
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.changed_formulas import applied, leaf_text, minus, square_of, times
 
 ORDER = (
@@ -57,22 +58,16 @@ ORDER = (
     "term_extra",
 )
 """Mistakes in the order in which they are tried."""
-MAX_EDITS = 4_000
-"""Largest number of changes of one formula; a PUMA's longest, of 200 nodes, has 2,500."""
-MAX_LENGTHS = 12
-"""Largest number of lengths of the robot that are tried as a missing offset."""
-POSITIONS = POSE_NAMES[:3]
-ROTATIONS = POSE_NAMES[3:]
-ARCS = ("acos", "asin", "atan")
-ROOTS = ("sqrt", "acos", "asin")
+_POSITIONS = POSE_NAMES[:3]
+_ROTATIONS = POSE_NAMES[3:]
+_ARCS = ("acos", "asin", "atan")
+_ROOTS = ("sqrt", "acos", "asin")
 """Functions that give one of two signs."""
-SAME_LENGTH = 1e-9
+_SAME_LENGTH = 1e-9
 """Share of a length by which it differs from itself by rounding."""
-MIN_MEASURE = 10
+_MIN_MEASURE = 10
 """Smallest number that is taken for degrees or millimetres; smaller ones are factors and exponents."""
-MAX_LAW_TERMS = 8
-"""Largest number of terms of which pairs of signs are tried."""
-MAX_ROUNDED = 0.01
+_MAX_ROUNDED = 0.01
 """Largest share by which a number differs from a length that it is a rounded value of."""
 
 
@@ -119,7 +114,7 @@ class Lengths:
 
     def is_of_tool(self, k: int) -> bool:
         """Whether the length of ``trees[k]`` is one behind the last joint."""
-        return any(abs(self.values[k] - size) <= SAME_LENGTH * size for size in self.of_tool)
+        return any(abs(self.values[k] - size) <= _SAME_LENGTH * size for size in self.of_tool)
 
 
 def edits(
@@ -130,7 +125,7 @@ def edits(
     lengths: Lengths,
     mistakes: Collection[str] = ORDER,
 ) -> list[Edit]:
-    """Return the changes of a formula in the order in which they are tried, :data:`MAX_EDITS` at most.
+    """Return the changes of a formula in the order in which they are tried, ``BOUNDS.edits`` at most.
 
     Parameters
     ----------
@@ -150,7 +145,7 @@ def edits(
     whole = chain(_of_the_whole(tree, is_revolute, others, offsets), _with_triangle(tree, is_revolute, others, lengths))
     changes = [Edit(mistake, new, tree, new) for mistake, new in whole if mistake in mistakes]
     changes += edits_of_parts(tree, lengths, mistakes)
-    return sorted(changes, key=lambda edit: ORDER.index(edit.mistake))[:MAX_EDITS]
+    return sorted(changes, key=lambda edit: ORDER.index(edit.mistake))[: BOUNDS.edits]
 
 
 def edits_of_parts(tree: Tree, lengths: Lengths, mistakes: Collection[str] = ORDER) -> list[Edit]:
@@ -160,12 +155,12 @@ def edits_of_parts(tree: Tree, lengths: Lengths, mistakes: Collection[str] = ORD
         exchanged = formulas.with_calls_changed(tree, ("sin", "cos"), partial(_exchanged, angle))
         changes.append(Edit("term_function", exchanged, tree, exchanged))
     of_parts = _of_parts(tree, lengths, mistakes, lambda part: part, formulas.is_law(tree))
-    changes += islice(of_parts, 2 * MAX_EDITS)
+    changes += islice(of_parts, 2 * BOUNDS.edits)
     for mistake, change in renamings([tree], lengths):
         new = formulas.renamed(tree, change) if mistake in mistakes else tree
         if new is not tree:
             changes.append(Edit(mistake, new, tree, new))
-    return sorted(changes, key=lambda edit: ORDER.index(edit.mistake))[:MAX_EDITS]
+    return sorted(changes, key=lambda edit: ORDER.index(edit.mistake))[: BOUNDS.edits]
 
 
 def _angles(tree: Tree) -> list[frozenset[str]]:
@@ -186,35 +181,35 @@ def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, di
     names = set().union(*map(names_of, trees))
     if any(f"r{i}{j}" in names for i in "123" for j in "123" if i != j):
         yield "rotation_matrix_transposed", {f"r{i}{j}": Name(f"r{j}{i}", 0) for i in "123" for j in "123"}
-    for a, b in combinations(POSITIONS, 2):
+    for a, b in combinations(_POSITIONS, 2):
         if names & {a, b}:
             yield "axis_exchanged", {a: Name(b, 0), b: Name(a, 0)}
     parts = [part for tree in trees for part in parts_of(tree) if isinstance(part, Number)]
     numbers = {leaf_text(number) for number in parts if number.value.denominator != 1}  # integers are exponents
     yield from _other_angles(names)
     known = [length for length in lengths.trees if leaf_text(length) in names | numbers]
-    for first, second in combinations(known[:MAX_LENGTHS], 2):
+    for first, second in combinations(known[: BOUNDS.offset_lengths], 2):
         yield "lengths_exchanged", {leaf_text(first): second, leaf_text(second): first}
-    for place, length in enumerate(lengths.trees[:MAX_LENGTHS]):
+    for place, length in enumerate(lengths.trees[: BOUNDS.offset_lengths]):
         forgotten = "tool_length_forgotten" if lengths.is_of_tool(place) else "length_forgotten"
         for subtracted in (True, False):
-            for p in POSITIONS:
+            for p in _POSITIONS:
                 if p in names:
                     yield "offset_forgotten", {p: Sum(((True, Name(p, 0)), (not subtracted, length)))}
             for column in "123":
                 tool: dict[str, Tree] = {
                     p: Sum(((True, Name(p, 0)), (not subtracted, times(length, Name(f"r{i}{column}", 0)))))
-                    for i, p in enumerate(POSITIONS, start=1)
+                    for i, p in enumerate(_POSITIONS, start=1)
                 }
-                if names & {*POSITIONS}:
+                if names & {*_POSITIONS}:
                     yield forgotten, tool
-                if names & {*POSITIONS} and lengths.is_of_tool(place) and leaf_text(length) in names | numbers:
-                    twice = {p: times(Number(Fraction(2), "2", 0), length) for p in POSITIONS}
+                if names & {*_POSITIONS} and lengths.is_of_tool(place) and leaf_text(length) in names | numbers:
+                    twice = {p: times(Number(Fraction(2), "2", 0), length) for p in _POSITIONS}
                     yield (
                         "tool_length_added",
                         {
                             p: Sum(((True, Name(p, 0)), (not subtracted, times(twice[p], Name(f"r{i}{column}", 0)))))
-                            for i, p in enumerate(POSITIONS, start=1)
+                            for i, p in enumerate(_POSITIONS, start=1)
                         },
                     )
     for j, k in combinations("123", 2):
@@ -222,7 +217,7 @@ def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, di
         columns |= {f"r{i}{k}": Name(f"r{i}{j}", 0) for i in "123"}
         if names & {*columns}:
             yield "tool_axis_exchanged", columns
-    for first, second in permutations(known[:MAX_LENGTHS], 2):
+    for first, second in permutations(known[: BOUNDS.offset_lengths], 2):
         for added in (True, False):
             yield "length_forgotten", {leaf_text(first): Sum(((True, first), (added, second)))}
 
@@ -250,8 +245,10 @@ def with_signs_changed(tree: Tree) -> Iterator[Tree]:
     alone = Lengths((), ())
     for edit in _of_parts(tree, alone, ("elbow_sign",), lambda part: part, in_law=False):
         yield edit.tree
-    if formulas.has_call(tree, ROOTS):
-        yield formulas.with_calls_changed(tree, ROOTS, lambda call: call if formulas.is_constant(call) else minus(call))
+    if formulas.has_call(tree, _ROOTS):
+        yield formulas.with_calls_changed(
+            tree, _ROOTS, lambda call: call if formulas.is_constant(call) else minus(call)
+        )
 
 
 # Changes of a whole formula
@@ -273,12 +270,12 @@ def _of_the_whole(
         for chosen in combinations(others, count):
             for added in (False, True):
                 yield "earlier_joints_forgotten", Sum(((True, tree), *((added, Name(name, 0)) for name in chosen)))
-    for arc in ARCS:
+    for arc in _ARCS:
         yield "arc_function_forgotten", applied(arc, tree)
         yield "arc_function_forgotten", minus(applied(arc, tree))
     yield "root_forgotten", applied("sqrt", tree)
     for mistake, functions, change in (
-        ("elbow_sign", ROOTS, lambda call: call if formulas.is_constant(call) else minus(call)),
+        ("elbow_sign", _ROOTS, lambda call: call if formulas.is_constant(call) else minus(call)),
         ("atan2_arguments", ("atan2",), formulas.exchange_arguments),
     ):
         new = formulas.with_calls_changed(tree, functions, change)
@@ -293,12 +290,12 @@ def _with_triangle(
 
     beta = atan2(b sin q, a + b cos q) where q is the joint between them.
     """
-    arcs = sum(isinstance(part, Call) and part.function in ("atan2", *ARCS) for part in parts_of(tree))
+    arcs = sum(isinstance(part, Call) and part.function in ("atan2", *_ARCS) for part in parts_of(tree))
     if not is_revolute or arcs != 1:
         return
     for name in others:
         c, s = applied("cos", Name(name, 0)), applied("sin", Name(name, 0))
-        for a, b in permutations(lengths.trees[:MAX_LENGTHS], 2):
+        for a, b in permutations(lengths.trees[: BOUNDS.offset_lengths], 2):
             beta = Call("atan2", (times(b, s), Sum(((True, a), (True, times(b, c))))), 0)
             for added in (False, True):
                 yield "triangle_angle_forgotten", Sum(((True, tree), (added, beta)))
@@ -306,11 +303,11 @@ def _with_triangle(
 
 # Changes of one part
 
-Rebuild = Callable[[Tree], Tree]
+_Rebuild = Callable[[Tree], Tree]
 
 
 def _of_parts(
-    tree: Tree, lengths: Lengths, mistakes: Collection[str], rebuild: Rebuild, in_law: bool
+    tree: Tree, lengths: Lengths, mistakes: Collection[str], rebuild: _Rebuild, in_law: bool
 ) -> Iterator[Edit]:
     """Yield changes of a part and of the parts in it.
 
@@ -344,7 +341,7 @@ def _of_parts(
 def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, Tree]]:
     """Yield mistakes in a part, each with the part corrected."""
     if isinstance(tree, Sum | Call):
-        used = [length for length in lengths.trees[:MAX_LENGTHS] if leaf_text(length) in names_of(tree)]
+        used = [length for length in lengths.trees[: BOUNDS.offset_lengths] if leaf_text(length) in names_of(tree)]
         for one, two in combinations(used, 2):
             change: dict[str, Tree] = {leaf_text(one): two, leaf_text(two): one}
             yield "lengths_exchanged", formulas.renamed(tree, change)
@@ -364,7 +361,7 @@ def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, 
                 yield "term_factor", formulas.product_of([*factors[:k], *factors[k + 1 :]])
             if not all(is_factor for is_factor, _ in factors):
                 yield "cosine_law_squares" if in_law else "square_forgotten", square_of(tree)
-                for length in lengths.trees[:MAX_LENGTHS]:
+                for length in lengths.trees[: BOUNDS.offset_lengths]:
                     for is_factor in (False, True):
                         yield "length_forgotten", Product((*factors, (is_factor, length)))
         case Sum(terms):
@@ -374,24 +371,24 @@ def _changes(tree: Tree, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, 
 def _of_number(number: Number, lengths: Lengths, in_law: bool) -> Iterator[tuple[str, Tree]]:
     if abs(number.value) == 1:
         return
-    for length, value in zip(lengths.trees[:MAX_LENGTHS], lengths.values, strict=False):
-        if 0 < abs(float(number.value) - value) < MAX_ROUNDED * value:
+    for length, value in zip(lengths.trees[: BOUNDS.offset_lengths], lengths.values, strict=False):
+        if 0 < abs(float(number.value) - value) < _MAX_ROUNDED * value:
             yield "rounded_length", length
-    if number.value >= MIN_MEASURE:
+    if number.value >= _MIN_MEASURE:
         yield "degrees_for_radians", times(number, Name("deg", 0))
         yield "millimetres_for_metres", times(number, Name("mm", 0))
     yield "cosine_law_squares" if in_law else "square_forgotten", square_of(number)
 
 
 def _of_name(text: str, lengths: Lengths) -> Iterator[tuple[str, Tree]]:
-    if text in ROTATIONS:
+    if text in _ROTATIONS:
         yield "rotation_matrix_transposed", Name(f"r{text[2]}{text[1]}", 0)
-    family = next((family for family in (POSITIONS, ROTATIONS, lengths.parameters) if text in family), ())
+    family = next((family for family in (_POSITIONS, _ROTATIONS, lengths.parameters) if text in family), ())
     for other in family:
         if other != text:
             yield "term_parameter" if text in lengths.parameters else "axis_exchanged", Name(other, 0)
-    if text in POSITIONS:
-        for length in lengths.trees[:MAX_LENGTHS]:
+    if text in _POSITIONS:
+        for length in lengths.trees[: BOUNDS.offset_lengths]:
             for added in (False, True):
                 yield "offset_forgotten", Sum(((True, Name(text, 0)), (added, length)))
 
@@ -427,11 +424,11 @@ def _of_call(call: Call, in_law: bool) -> Iterator[tuple[str, Tree]]:
 
 def _of_sum(terms: tuple[tuple[bool, Tree], ...], lengths: Lengths, in_law: bool) -> Iterator[tuple[str, Tree]]:
     yield "root_forgotten", applied("sqrt", Sum(terms))
-    for length in lengths.trees[:MAX_LENGTHS]:
+    for length in lengths.trees[: BOUNDS.offset_lengths]:
         for term in (length, square_of(length)):
             for added in (False, True):
                 yield "length_forgotten", Sum((*terms, (added, term)))
-    for count in (1, 2) if in_law and len(terms) <= MAX_LAW_TERMS else (1,):
+    for count in (1, 2) if in_law and len(terms) <= BOUNDS.law_terms else (1,):
         for chosen in combinations(range(len(terms)), count):
             changed = tuple((added ^ (k in chosen), term) for k, (added, term) in enumerate(terms))
             yield "cosine_law_sign" if in_law else "term_sign", Sum(changed)

@@ -19,28 +19,23 @@ from dhkit.description import Array, Description
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Call, Name, Number, Sum, Tree
 from dhkit.expressions.trees import equal_parts, names_of, parts_of, replaced_everywhere
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.changed_formulas import has_call, is_joint, minus, renamed, with_calls_changed
 from dhkit.grading.judging.inverse_branch import Branch
 from dhkit.grading.judging.inverse_edits import ORDER, Edit, Lengths, edits, renamings
 from dhkit.grading.judging.inverse_poses import Mask
 
-MAX_POSES = 100
-"""Largest number of poses that fail, and of poses that are reached, at which mistakes are looked for."""
-MAX_WORK = 4_000_000
-"""Largest number of changes for one answer, each times the parts of its formula: a few seconds' work."""
-MAX_PARTS = 1_000
-"""Largest number of parts of a formula in which mistakes are looked for; a PUMA's longest has 200."""
-MIN_AGREEING_SHARE = 0.5
+_MIN_AGREEING_SHARE = 0.5
 """Share of the poses at which the values of a change must be a solution's for the change to be followed further."""
-MIN_EXPLAINED_SHARE = 0.3
+_MIN_EXPLAINED_SHARE = 0.3
 """Share of the failing poses that a mistake must explain to be named, though others are made besides."""
-FREQUENT = frozenset(
+_FREQUENT = frozenset(
     ("atan2_arguments", "quadrant", "elbow_sign", "degrees_for_radians", "millimetres_for_metres", "joint_sign")
 )
 """Mistakes that are named if they explain a good part of the poses by themselves."""
 
 
-ARCS: Mapping[str, tuple[str, Callable[[Call], Tree]]] = {
+_ARCS: Mapping[str, tuple[str, Callable[[Call], Tree]]] = {
     "acos": ("sign_lost", minus),
     "asin": ("quadrant", lambda call: Sum(((True, Name("pi", 0)), (False, call)))),
     "atan": ("quadrant", lambda call: Sum(((True, Name("pi", 0)), (True, call)))),
@@ -84,13 +79,13 @@ class Search:
     def __init__(self, description: Description, lengths: Lengths | None = None) -> None:
         self.revolute = [kind == "R" for kind in description.kinds]
         self.lengths = lengths or lengths_of(description)
-        self.left = MAX_WORK
+        self.left = BOUNDS.edit_work
         self.made: dict[int, set[str]] = {}
         """Mistakes that were found in each joint's formula of the branches so far."""
 
     def explanations(self, branch: Branch) -> Iterator[Explanation]:
         """Yield the mistakes of a branch; each is corrected before the next is looked for."""
-        current: Branch | None = branch.sample(MAX_POSES)
+        current: Branch | None = branch.sample(BOUNDS.edit_poses)
         while current is not None and not current.is_right:
             joint = current.wrong_joint()
             explanation = self._explain_anywhere(current) if joint is None else self._explain(current, joint)
@@ -135,10 +130,10 @@ class Search:
                 return candidate
         if found := partial or next(filter(leads_on, halves), None):
             return found
-        frequent = [_edited(branch, joint, edit) for edit in self._edits(branch, joint) if edit.mistake in FREQUENT]
+        frequent = [_edited(branch, joint, edit) for edit in self._edits(branch, joint) if edit.mistake in _FREQUENT]
         best = max((*frequent, *halves), key=_count_of_closed, default=Explanation(None, joint))
         gained = _count_of_closed(best) - int(np.sum(branch.closed))
-        return best if gained > MIN_EXPLAINED_SHARE * np.sum(branch.failing) else Explanation(None, joint)
+        return best if gained > _MIN_EXPLAINED_SHARE * np.sum(branch.failing) else Explanation(None, joint)
 
     def _edits(self, branch: Branch, joint: int, mistakes: Collection[str] = ORDER) -> list[Edit]:
         """Return the changes of a joint's formula, all or of some mistakes, as many as the bound on the work leaves."""
@@ -147,7 +142,7 @@ class Search:
         names = [f"q{k + 1}" for k in same_kind]
         tree = branch.trees[joint]
         size = sum(1 for _ in parts_of(tree))
-        if size > MAX_PARTS:
+        if size > BOUNDS.edited_nodes:
             return []
         changes = edits(tree, self.revolute[joint], names, offsets, self.lengths, mistakes)
         changes = changes[: self.left // size]
@@ -171,7 +166,7 @@ class Search:
                     x = branch.repaired(joint, formula.of(changed))
                 except AnswerError:  # it would need a joint that follows from this one
                     continue
-                if np.mean(branch.agrees(joint, x)[asked]) >= MIN_AGREEING_SHARE:
+                if np.mean(branch.agrees(joint, x)[asked]) >= _MIN_AGREEING_SHARE:
                     agreeing.append(replace(edit, tree=changed))
                     break
         return agreeing
@@ -185,7 +180,7 @@ class Search:
     def _explain_several(self, branch: Branch, agreeing: list[Edit]) -> Iterator[Explanation]:
         """Yield changes of the same part, or of the same names, in several formulas."""
         size = sum(1 for tree in branch.trees for _ in parts_of(tree))
-        if size > MAX_PARTS * branch.n:
+        if size > BOUNDS.edited_nodes * branch.n:
             return
         equal = equal_parts(branch.trees)
         for edit in agreeing:
@@ -265,9 +260,9 @@ def _lost_halves(branch: Branch, joint: int, first: int) -> list[tuple[str, Bran
         branches.append((mirrored, branch.with_repair(joint, lambda x: x + where_wrong(np.pi - 2 * x))))
     if own or has_call(tree, ("acos",)):
         branches.append(("sign_lost", branch.with_repair(joint, lambda x: x - where_wrong(2 * x))))
-    arcs = [function for function in ARCS if has_call(tree, (function,))]
+    arcs = [function for function in _ARCS if has_call(tree, (function,))]
     if own and len(arcs) == 1 and not isinstance(tree, Call):
-        mistake, change = ARCS[arcs[0]]
+        mistake, change = _ARCS[arcs[0]]
         changed = branch.editable(joint).of(with_calls_changed(tree, arcs, change))
         values = branch.repaired(joint, changed)
         branches.append((mistake, branch.with_repair(joint, lambda x: np.where(wrong, values, x))))

@@ -23,16 +23,16 @@ MATCHES = 1e-6
 because gaps widen at poses near singular ones."""
 KNOWN = "known"
 """Beginning of the names of joint values that are known from elsewhere; no answer can contain them."""
-TOOL_AXES = {f"pitch of the tool's {axis} axis": k for k, axis in enumerate("xyz")}
+_TOOL_AXES = {f"pitch of the tool's {axis} axis": k for k, axis in enumerate("xyz")}
 """By part of a pose that an arm reaches: the column of the tool's rotation that it determines."""
-FEW_JOINTS = 3
+_FEW_JOINTS = 3
 """Largest number of joints at which an arm without a closed form is asked for positions alone, if these determine its
 joints."""
-STARTS, STEPS = 12, 30
+_STARTS, _STEPS = 12, 30
 """Newton's method for one pose: number of random starts, and of steps from each."""
-DAMPING = 1e-9
+_DAMPING = 1e-9
 """Levenberg's damping, in units of squared singular values: keeps steps finite at singular poses."""
-ARRIVES = 1e-13
+_ARRIVES = 1e-13
 """Residual at which Newton's method stops: about the rounding errors of a product of ten transforms."""
 
 Mask: TypeAlias = NDArray[np.bool_]
@@ -94,7 +94,7 @@ class Poses:
         solutions = np.where(closed_form.valid[..., None], closed_form.q, np.nan)
         # A yaw with all positions is all that a planar arm or a SCARA leaves open.
         whole = len(parts) == 6 or "yaw" in parts
-        axis = next((TOOL_AXES[part] for part in parts if part in TOOL_AXES), None)
+        axis = next((_TOOL_AXES[part] for part in parts if part in _TOOL_AXES), None)
         return cls(description, q, T, solutions, parts, whole, axis, lower, upper)
 
     def at(self, chosen: Sequence[int] | NDArray[np.intp]) -> Poses:
@@ -143,28 +143,28 @@ class Poses:
         return int(np.linalg.matrix_rank(J, 1e-5)) == self.description.n
 
     def _search(self) -> Array:
-        """Return solutions by Newton's method from random starts, (S, STARTS, n), rad and m; NaN for no solution."""
+        """Return solutions by Newton's method from random starts, (S, _STARTS, n), rad and m; NaN for no solution."""
         S, n = self.q.shape
         if not self.isolated:
             return np.empty((S, 0, n))
-        q = np.random.default_rng(0).uniform(self.lower, self.upper, (S, STARTS, n)).reshape(-1, n)
-        T = np.repeat(self.T, STARTS, axis=0)
+        q = np.random.default_rng(0).uniform(self.lower, self.upper, (S, _STARTS, n)).reshape(-1, n)
+        T = np.repeat(self.T, _STARTS, axis=0)
         stroke = np.where(self.description.numbers.prismatic, self.scale, 1.0)
         # Newton's method with Levenberg's damping; starts that have arrived are left out of further steps.
         going = np.arange(len(q))
-        for _ in range(STEPS):
+        for _ in range(_STEPS):
             gap, J = self._linearised(q[going], T[going])
-            is_open = ~(np.max(np.abs(gap), axis=1) <= ARRIVES)
+            is_open = ~(np.max(np.abs(gap), axis=1) <= _ARRIVES)
             going, gap, J = going[is_open], gap[is_open], J[is_open]
             if not len(going):
                 break
-            # (J' J + DAMPING) step = -J' gap
-            normal = np.swapaxes(J, 1, 2) @ J + DAMPING * np.eye(n)
+            # (J' J + _DAMPING) step = -J' gap
+            normal = np.swapaxes(J, 1, 2) @ J + _DAMPING * np.eye(n)
             step = np.linalg.solve(normal, -np.einsum("sij,si->sj", J, gap)[..., None])[..., 0]
             longest = np.max(np.abs(step / stroke), axis=1, keepdims=True)
             q[going] += step * np.minimum(1.0, 1.0 / np.maximum(longest, 1e-300))
         converged = np.max(np.abs(self.residuals(q, T)), axis=1) <= CLOSES
-        return np.where(converged[:, None], q, np.nan).reshape(S, STARTS, n)
+        return np.where(converged[:, None], q, np.nan).reshape(S, _STARTS, n)
 
     def _linearised(self, q: Array, T: Array) -> tuple[Array, Array]:
         """Return :meth:`residuals` (S, k) and their derivatives by the joint values (S, k, n)."""
@@ -239,6 +239,6 @@ def _joint_ranges(description: Description) -> tuple[Array, Array]:
 
 def _positions_determine_joints(description: Description, q: Array) -> bool:
     """Whether the tool's position determines the joints near q, shape (n,): no joint only turns the tool."""
-    if description.n > FEW_JOINTS:
+    if description.n > _FEW_JOINTS:
         return False
     return bool(np.linalg.matrix_rank(jacobian(description, q)[:3], 1e-9) == description.n)

@@ -22,7 +22,7 @@ from dhkit.grading.judging.quotients import OutsideTheRingError, RingReader
 from dhkit.grading.judging.truth import Truth, exact_number, substituted
 from dhkit.symbolic.ring import Element, RingError, element_array
 
-NOTHING = Number(Fraction(0), "0", 0)
+_NOTHING = Number(Fraction(0), "0", 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,14 +106,14 @@ class WrittenNumbers:
         return substituted(element_array([right]), numbers, ring)[0]  # type: ignore[no-any-return]
 
 
-def is_written(number: Number, whole: Collection[Fraction] = ()) -> bool:
+def _is_written(number: Number, whole: Collection[Fraction] = ()) -> bool:
     """Whether a number may stand for a letter: a decimal, or one of some whole numbers."""
     return "." in number.text or "e" in number.text.lower() or number.value in whole
 
 
 def _has_written(tree: Tree) -> bool:
     """Whether a formula has a decimal."""
-    return any(isinstance(part, Number) and is_written(part) for part in parts_of(tree))
+    return any(isinstance(part, Number) and _is_written(part) for part in parts_of(tree))
 
 
 def _without_written(tree: Tree, whole: Collection[Fraction] = ()) -> Tree:
@@ -124,7 +124,7 @@ def _without_written(tree: Tree, whole: Collection[Fraction] = ()) -> Tree:
     """
     match tree:
         case Number():
-            return NOTHING if is_written(tree, whole) else tree
+            return _NOTHING if _is_written(tree, whole) else tree
         case Power(base, exponent):
             inner = _without_written(base, whole)
             return tree if inner is base else replace(tree, base=inner, exponent=exponent)
@@ -135,8 +135,8 @@ def _without_written(tree: Tree, whole: Collection[Fraction] = ()) -> Tree:
             parts: list[tuple[bool, Tree]] = []
             for is_factor, factor in factors:
                 inner = _without_written(factor, whole if is_factor else ())
-                if inner is NOTHING:
-                    return NOTHING
+                if inner is _NOTHING:
+                    return _NOTHING
                 parts.append((is_factor, inner))
             return tree if all(a[1] is b[1] for a, b in zip(parts, factors, strict=True)) else Product(tuple(parts))
         case Name() | Call():

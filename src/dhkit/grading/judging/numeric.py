@@ -32,7 +32,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "max": np.maximum,
 }
 """Functions that an answer may call; secants and the like are read as quotients of these."""
-UNITS = {name: float(constant) for name, constant in CONSTANTS.items()}
+_UNITS = {name: float(constant) for name, constant in CONSTANTS.items()}
 """Values of pi, deg, mm, cm and inch, in rad and m."""
 
 
@@ -150,7 +150,7 @@ class EditedDoubles:
     """
 
     def __init__(self, tree: Tree, values: Mapping[str, Any]) -> None:
-        self._evaluation = _Doubles({**UNITS, **values})
+        self._evaluation = _Doubles({**_UNITS, **values})
         self._tree = tree  # keeps its parts alive, whose ids are used
         with np.errstate(all="ignore"):
             self.numbers = self._evaluation.of(tree)

@@ -23,15 +23,15 @@ from dhkit.grading.judging.changed_formulas import leaf_text, renamed, square_of
 from dhkit.symbolic import table_lengths
 from dhkit.symbolic.inverse.chain import with_table_lengths
 
-LEAST_FACTOR, MOST_FACTOR = 0.8, 1.25
+_LEAST_FACTOR, _MOST_FACTOR = 0.8, 1.25
 """Factors by which values are changed."""
-SAME_VALUE = 1e-9
+_SAME_VALUE = 1e-9
 """Relative difference up to which a number that is written is the value of a letter."""
-MAX_FACTOR = 12
+_MAX_FACTOR = 12
 """Largest numerator and denominator of a factor that formulas have whatever the lengths are: 2, 1/2, 1/12."""
 
 
-TWO = Number(Fraction(2), "2", 0)
+_TWO = Number(Fraction(2), "2", 0)
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,9 @@ def with_other_values(description: Description, trees: Sequence[Tree], seed: int
     varied = letters.keys() - kept
     at_values = {name: letters[name] for name in kept | _names_of_all(in_letters.values()) if name not in used}
     rng = np.random.default_rng(seed)
-    values = {name: round(letters[name] * float(rng.uniform(LEAST_FACTOR, MOST_FACTOR)), 6) for name in sorted(varied)}
+    values = {
+        name: round(letters[name] * float(rng.uniform(_LEAST_FACTOR, _MOST_FACTOR)), 6) for name in sorted(varied)
+    }
     try:
         other = with_parameters(description, **{name: x for name, x in values.items() if name in parameters})
         lengths = {name: Fraction(str(x)) for name, x in values.items() if name in table}
@@ -117,7 +119,7 @@ def _kinematic_parameters(description: Description) -> list[str]:
 
 def _is_value(part: Number) -> bool:
     """Whether a number may be a length: a decimal, not a factor such as 2 or 1/2."""
-    is_factor = part.value.denominator <= MAX_FACTOR and abs(part.value.numerator) <= MAX_FACTOR
+    is_factor = part.value.denominator <= _MAX_FACTOR and abs(part.value.numerator) <= _MAX_FACTOR
     return "." in part.text or not is_factor
 
 
@@ -128,7 +130,7 @@ def _names_of_all(trees: Iterable[Tree]) -> frozenset[str]:
 def _letters_of(number: float, letters: Mapping[str, float]) -> list[Tree]:
     """Return the letters, and the simplest formulas of letters, whose value a number is."""
     for formulas in (_powers(letters), _products(letters)):
-        found = [tree for value, tree in formulas if abs(value - number) <= SAME_VALUE * abs(value)]
+        found = [tree for value, tree in formulas if abs(value - number) <= _SAME_VALUE * abs(value)]
         if found:
             return found
     return []
@@ -141,7 +143,7 @@ def _powers(letters: Mapping[str, float]) -> Iterator[tuple[float, Tree]]:
             tree = Name(name, 0)
             yield abs(value), tree
             yield value**2, square_of(tree)
-            yield 2 * abs(value), times(TWO, tree)
+            yield 2 * abs(value), times(_TWO, tree)
 
 
 def _products(letters: Mapping[str, float]) -> Iterator[tuple[float, Tree]]:
@@ -150,7 +152,7 @@ def _products(letters: Mapping[str, float]) -> Iterator[tuple[float, Tree]]:
         if first and second:
             tree = times(Name(one, 0), Name(two, 0))
             yield abs(first * second), tree
-            yield 2 * abs(first * second), times(TWO, tree)
+            yield 2 * abs(first * second), times(_TWO, tree)
 
 
 def are_ambiguous(description: Description, trees: Iterable[Tree]) -> bool:
@@ -160,4 +162,4 @@ def are_ambiguous(description: Description, trees: Iterable[Tree]) -> bool:
     used = frozenset().union(*map(names_of, trees))
     sizes = [abs(float(values[name])) for name in description.parameters if name in used]
     sizes += [abs(value) for name, value in table.items() if name in used]
-    return any(abs(x - 1) < SAME_VALUE for x in sizes) or len({round(x, 9) for x in sizes}) < len(sizes)
+    return any(abs(x - 1) < _SAME_VALUE for x in sizes) or len({round(x, 9) for x in sizes}) < len(sizes)

@@ -22,7 +22,7 @@ from dhkit.symbolic.ring import Element, Elements, RingError, element_array
 
 Index: TypeAlias = tuple[int, ...]
 """Indices of an entry in its quantity, from 0."""
-ROUNDED_DECIMALS = 5e-3
+_ROUNDED_DECIMALS = 5e-3
 """Relative tolerance that decimals of four digits stay below."""
 
 
@@ -180,7 +180,7 @@ def _contradicts(entry: Given, judged: JudgedQuantity, by: Comparison) -> bool:
         except (OutsideTheRingError, AnswerError, RingError):
             values = {**by.arm.parameters, **general_state(by.arm.n)}
             first, last = float(doubles(side, values)), float(doubles(entry.tree, values))
-            if not abs(first - last) <= ROUNDED_DECIMALS * max(abs(first), abs(last), 1e-9):
+            if not abs(first - last) <= _ROUNDED_DECIMALS * max(abs(first), abs(last), 1e-9):
                 return True
     return False
 

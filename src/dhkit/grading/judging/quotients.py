@@ -12,25 +12,15 @@ from dhkit.expressions.exact import Atom
 from dhkit.expressions.parser import value_of
 from dhkit.expressions.syntax import Call, Name, Number, Power, Tree
 from dhkit.expressions.trees import Algebra
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.symbolic.ring import Direction, Element, Ring, RingError
 
-MAX_EXPONENT = 64
-"""Largest exponent, and largest multiple of a joint variable in an angle, that is multiplied out."""
-MAX_WORK = 300_000
-"""Largest work of reading one entry: pairs of terms in products, weighted by the size of their coefficients. A PUMA's
-longest entry takes 60,000; the bound is about a second on sympy's rings."""
-WEIGHTED_BITS = 256
+_WEIGHTED_BITS = 256
 """Size of a coefficient, in bits, from which a pair of terms counts as more than one."""
-MAX_TERMS = 60_000
-"""Largest number of terms of a product."""
-MAX_COEFFICIENT_BITS = 8_192
-"""Largest size of a coefficient in bits. Doubles need 1,100; products of 8,192 bits still take microseconds."""
-MAX_DIVISORS = 16
-"""Largest number of divisors that are kept, to say where an entry is undefined."""
-CHECK_INTERVAL = 64
+_CHECK_INTERVAL = 64
 """Terms of a sum after which the size of its coefficients is measured."""
-NUMBER_TOO_LONG = "a number too long to be kept exactly"
-TOO_MANY_TERMS = "it multiplies out to too many terms"
+_NUMBER_TOO_LONG = "a number too long to be kept exactly"
+_TOO_MANY_TERMS = "it multiplies out to too many terms"
 
 
 class OutsideTheRingError(Exception):
@@ -112,7 +102,7 @@ class RingReader(Algebra[Quotient]):
         try:
             return self.of(tree)
         except RingError:
-            raise OutsideTheRingError(TOO_MANY_TERMS) from None
+            raise OutsideTheRingError(_TOO_MANY_TERMS) from None
 
     def element(self, tree: Tree) -> Element | None:
         """Return a syntax tree as an element of the ring; None if it is none, or cannot be read."""
@@ -174,7 +164,7 @@ class RingReader(Algebra[Quotient]):
                 polynomials = Quotient(polynomials.numerator, one, polynomials.bits + quotient.bits)
             else:
                 fractions = signed if fractions is None else self._add_fractions(fractions, signed)
-            if k % CHECK_INTERVAL == 0 or k == len(terms):
+            if k % _CHECK_INTERVAL == 0 or k == len(terms):
                 total = self.ring.sum([polynomials.numerator, *pending])
                 polynomials = self._bound_coefficients(Quotient(total, one, polynomials.bits))
                 pending = []
@@ -220,19 +210,19 @@ class RingReader(Algebra[Quotient]):
 
     def _note_divisor(self, element: Element) -> None:
         """Keep a divisor unless it is a number."""
-        if _rational(element) is not None or len(self.divisors) >= MAX_DIVISORS:
+        if _rational(element) is not None or len(self.divisors) >= BOUNDS.divisors:
             return
         if not any(element.polynomial == other.polynomial for other in self.divisors):
             self.divisors.append(element)
 
     def _power(self, base: Tree, exponent: int) -> Quotient:
         quotient, power = self.of(base), abs(exponent)
-        if quotient.bits * power > MAX_COEFFICIENT_BITS:
+        if quotient.bits * power > BOUNDS.coefficient_bits:
             quotient = self._bound_coefficients(
-                Quotient(quotient.numerator, quotient.denominator, MAX_COEFFICIENT_BITS + 1)
+                Quotient(quotient.numerator, quotient.denominator, BOUNDS.coefficient_bits + 1)
             )
-            if quotient.bits * power > 4 * MAX_COEFFICIENT_BITS:
-                raise OutsideTheRingError(NUMBER_TOO_LONG)
+            if quotient.bits * power > 4 * BOUNDS.coefficient_bits:
+                raise OutsideTheRingError(_NUMBER_TOO_LONG)
         numerator, denominator = (self._raise(part, power) for part in (quotient.numerator, quotient.denominator))
         if exponent < 0:
             self._note_divisor(quotient.numerator)
@@ -245,13 +235,13 @@ class RingReader(Algebra[Quotient]):
         Raises
         ------
         OutsideTheRingError
-            A coefficient exceeds :data:`MAX_COEFFICIENT_BITS`.
+            A coefficient exceeds ``BOUNDS.coefficient_bits``.
         """
-        if quotient.bits <= MAX_COEFFICIENT_BITS:
+        if quotient.bits <= BOUNDS.coefficient_bits:
             return quotient
         bits = max(_bits(quotient.numerator), _bits(quotient.denominator))
-        if bits > MAX_COEFFICIENT_BITS:
-            raise OutsideTheRingError(NUMBER_TOO_LONG)
+        if bits > BOUNDS.coefficient_bits:
+            raise OutsideTheRingError(_NUMBER_TOO_LONG)
         return Quotient(quotient.numerator, quotient.denominator, bits)
 
     def _raise(self, element: Element, exponent: int) -> Element:
@@ -269,19 +259,19 @@ class RingReader(Algebra[Quotient]):
         Raises
         ------
         OutsideTheRingError
-            The entry exceeds :data:`MAX_WORK`, or the product :data:`MAX_TERMS`.
+            The entry exceeds ``BOUNDS.reading_work``, or the product ``BOUNDS.product_terms``.
         """
         if left is self.ring.one:
             return right
         if right is self.ring.one:
             return left
         pairs = len(left) * len(right)
-        self._work += pairs + (pairs * _bits(right) // WEIGHTED_BITS if pairs > CHECK_INTERVAL else 0)
-        if self._work > MAX_WORK:
-            raise OutsideTheRingError(TOO_MANY_TERMS)
+        self._work += pairs + (pairs * _bits(right) // _WEIGHTED_BITS if pairs > _CHECK_INTERVAL else 0)
+        if self._work > BOUNDS.reading_work:
+            raise OutsideTheRingError(_TOO_MANY_TERMS)
         product = left * right
-        if len(product) > MAX_TERMS:
-            raise OutsideTheRingError(TOO_MANY_TERMS)
+        if len(product) > BOUNDS.product_terms:
+            raise OutsideTheRingError(_TOO_MANY_TERMS)
         return product
 
     def exponent(self, tree: Tree) -> int:
@@ -290,7 +280,7 @@ class RingReader(Algebra[Quotient]):
         Raises
         ------
         OutsideTheRingError
-            The exponent is no whole number, or exceeds :data:`MAX_EXPONENT`.
+            The exponent is no whole number, or exceeds ``BOUNDS.exponent``.
         """
         try:
             number = value_of(tree, ()).rational
@@ -298,8 +288,8 @@ class RingReader(Algebra[Quotient]):
             number = None
         if number is None or number.denominator != 1:
             raise OutsideTheRingError("an exponent that is no whole number")
-        if abs(number) > MAX_EXPONENT:
-            raise OutsideTheRingError(f"an exponent of {str(number)[:20]}, beyond {MAX_EXPONENT}")
+        if abs(number) > BOUNDS.exponent:
+            raise OutsideTheRingError(f"an exponent of {str(number)[:20]}, beyond {BOUNDS.exponent}")
         return int(number)
 
     def _call(self, function: str, arguments: tuple[Tree, ...]) -> Quotient:
@@ -368,8 +358,8 @@ class RingReader(Algebra[Quotient]):
             raise OutsideTheRingError(f"an angle of q{i + 1}")
         if times.denominator != 1:
             raise OutsideTheRingError(f"an angle of {times} q{i + 1}")
-        if abs(times) > MAX_EXPONENT:
-            raise OutsideTheRingError(f"an angle of {str(times)[:20]} q{i + 1}, beyond {MAX_EXPONENT} times")
+        if abs(times) > BOUNDS.exponent:
+            raise OutsideTheRingError(f"an angle of {str(times)[:20]} q{i + 1}, beyond {BOUNDS.exponent} times")
         single = (self.ring.cosine(i), self.ring.sine(i))
         cosine, sine = self.ring.one, self.ring.zero
         for _ in range(abs(int(times))):

@@ -19,32 +19,29 @@ import numpy as np
 
 from dhkit.expressions.syntax import Call, Name, Number, Power, Tree
 from dhkit.expressions.trees import Algebra, parts_of
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.quotients import Quotient, RingReader, varying
 from dhkit.symbolic.ring import Element, RingError
 from dhkit.symbolic.ring.elements import PolynomialRing
 
 Residuals = Callable[[Quotient, Element], Sequence[Element]]
 """Returns elements that are zero for a right answer, given the answer and the truth."""
-Monomial = tuple[tuple[int, int], ...]
+_Monomial = tuple[tuple[int, int], ...]
 """Numbers of atoms (names, sines and cosines of whole angles) with their exponents."""
 
-DOUBLE_DIGITS = 15
+_DOUBLE_DIGITS = 15
 """Significant digits from which a decimal is taken for a printed double."""
-DOUBLE_ALLOWANCE = Fraction(8, 2**52)
+_DOUBLE_ALLOWANCE = Fraction(8, 2**52)
 """Relative allowance of a printed double: eight units in its last place, the loss of a few dozen operations."""
-MAX_WORK = 200_000
-"""Largest number of products of two terms in multiplying an answer out: about a second."""
-MAX_COEFFICIENTS = 2_000
-"""Largest number of coefficients with an allowance: a PUMA's longest entry in numbers has 300."""
-SOLVER_MARGIN = Fraction(1, 10**9)
+_SOLVER_MARGIN = Fraction(1, 10**9)
 """Relative error of the linear program's doubles at the edge of an allowance."""
-DOUBLE_NOISE = 1e-15
+_DOUBLE_NOISE = 1e-15
 """Relative tolerance of equations without a rounded coefficient if the ring has numbers such as sqrt(2), which are
 doubles here; without such numbers they hold exactly."""
 
 
 class _TooLongError(Exception):
-    """Multiplying an answer out exceeds :data:`MAX_WORK`."""
+    """Multiplying an answer out exceeds ``BOUNDS.rounding_products``."""
 
 
 @dataclass(frozen=True)
@@ -100,10 +97,10 @@ class _Coefficient:
         return self.allowed / (self.positive + self.negative) if self.allowed else Fraction(0)
 
 
-Polynomial = dict[Monomial, _Coefficient]
+_Polynomial = dict[_Monomial, _Coefficient]
 
 
-class _Expansion(Algebra[tuple[Polynomial, Polynomial]]):
+class _Expansion(Algebra[tuple[_Polynomial, _Polynomial]]):
     """Multiplies trees out into pairs of numerator and denominator, polynomials in atoms."""
 
     def __init__(self, reader: RingReader, digits: int) -> None:
@@ -112,28 +109,28 @@ class _Expansion(Algebra[tuple[Polynomial, Polynomial]]):
         self.digits = digits
         self.work = 0
         self.atoms: list[Element] = []
-        self.one: Polynomial = {(): _Coefficient.of(Fraction(1), Fraction(0))}
+        self.one: _Polynomial = {(): _Coefficient.of(Fraction(1), Fraction(0))}
         self._numbers: dict[Any, int] = {}
-        self._images: dict[Monomial, Element] = {(): reader.ring.one}
+        self._images: dict[_Monomial, Element] = {(): reader.ring.one}
 
-    def number(self, tree: Number) -> tuple[Polynomial, Polynomial]:
+    def number(self, tree: Number) -> tuple[_Polynomial, _Polynomial]:
         """Return a number with what its decimals allow."""
         share = _allowance(tree.value, tree.text, self.digits)
-        return self._number(tree.value, share, share == DOUBLE_ALLOWANCE), self.one
+        return self._number(tree.value, share, share == _DOUBLE_ALLOWANCE), self.one
 
-    def name(self, tree: Name) -> tuple[Polynomial, Polynomial]:
+    def name(self, tree: Name) -> tuple[_Polynomial, _Polynomial]:
         """Return a name as an atom."""
         return self._atoms(tree)
 
-    def call(self, tree: Call) -> tuple[Polynomial, Polynomial]:
+    def call(self, tree: Call) -> tuple[_Polynomial, _Polynomial]:
         """Return a call as an atom: decimals in it are not rounded."""
         return self._atoms(tree)
 
-    def _atoms(self, tree: Tree) -> tuple[Polynomial, Polynomial]:
+    def _atoms(self, tree: Tree) -> tuple[_Polynomial, _Polynomial]:
         quotient = self.reader.read(tree)
         return self._atom(quotient.numerator), self._atom(quotient.denominator)
 
-    def power(self, tree: Power) -> tuple[Polynomial, Polynomial]:
+    def power(self, tree: Power) -> tuple[_Polynomial, _Polynomial]:
         """Return a power, multiplied out."""
         base, exponent = self.of(tree.base), self.reader.exponent(tree.exponent)
         numerator, denominator = base if exponent >= 0 else base[::-1]
@@ -142,7 +139,9 @@ class _Expansion(Algebra[tuple[Polynomial, Polynomial]]):
             top, bottom = self._multiply(top, numerator), self._multiply(bottom, denominator)
         return self._normalize(top, bottom)
 
-    def product(self, factors: Sequence[tuple[bool, tuple[Polynomial, Polynomial]]]) -> tuple[Polynomial, Polynomial]:
+    def product(
+        self, factors: Sequence[tuple[bool, tuple[_Polynomial, _Polynomial]]]
+    ) -> tuple[_Polynomial, _Polynomial]:
         """Return a product, multiplied out."""
         top, bottom = self.one, self.one
         for is_factor, quotient in factors:
@@ -150,7 +149,7 @@ class _Expansion(Algebra[tuple[Polynomial, Polynomial]]):
             top, bottom = self._normalize(self._multiply(top, numerator), self._multiply(bottom, denominator))
         return top, bottom
 
-    def image(self, monomial: Monomial) -> Element:
+    def image(self, monomial: _Monomial) -> Element:
         """Return a monomial as an element of the ring."""
         if monomial not in self._images:
             (atom, exponent), *rest = monomial
@@ -158,10 +157,10 @@ class _Expansion(Algebra[tuple[Polynomial, Polynomial]]):
             self._images[monomial] = self.image(lower) * self.atoms[atom]
         return self._images[monomial]
 
-    def _number(self, value: Fraction, share: Fraction, is_printed: bool = False) -> Polynomial:
+    def _number(self, value: Fraction, share: Fraction, is_printed: bool = False) -> _Polynomial:
         return {(): _Coefficient.of(value, share, is_printed)} if value else {}
 
-    def _atom(self, element: Element) -> Polynomial:
+    def _atom(self, element: Element) -> _Polynomial:
         key = frozenset(element.terms.items())
         if len(element) <= 1 and not any(any(monomial) for monomial in element.terms):
             return self._number(sum(element.terms.values(), Fraction(0)), Fraction(0)) if element != 1 else self.one
@@ -170,9 +169,9 @@ class _Expansion(Algebra[tuple[Polynomial, Polynomial]]):
             self.atoms.append(element)
         return {((self._numbers[key], 1),): _Coefficient.of(Fraction(1), Fraction(0))}
 
-    def sum(self, terms: Sequence[tuple[bool, tuple[Polynomial, Polynomial]]]) -> tuple[Polynomial, Polynomial]:
+    def sum(self, terms: Sequence[tuple[bool, tuple[_Polynomial, _Polynomial]]]) -> tuple[_Polynomial, _Polynomial]:
         """Return a sum over one denominator."""
-        top: Polynomial = {}
+        top: _Polynomial = {}
         bottom = self.one
         for added, (numerator, denominator) in terms:
             if not added:
@@ -185,15 +184,15 @@ class _Expansion(Algebra[tuple[Polynomial, Polynomial]]):
                 top[m] = top[m] + c if m in top else c
         return top, bottom
 
-    def _multiply(self, left: Polynomial, right: Polynomial) -> Polynomial:
+    def _multiply(self, left: _Polynomial, right: _Polynomial) -> _Polynomial:
         if left is self.one:
             return right
         if right is self.one:
             return left
         self.work += len(left) * len(right)
-        if self.work > MAX_WORK:
+        if self.work > BOUNDS.rounding_products:
             raise _TooLongError
-        product: Polynomial = {}
+        product: _Polynomial = {}
         for a, x in left.items():
             for b, y in right.items():
                 value = x.value * y.value
@@ -203,7 +202,7 @@ class _Expansion(Algebra[tuple[Polynomial, Polynomial]]):
                     product[m] = product[m] + contribution if m in product else contribution
         return product
 
-    def _normalize(self, top: Polynomial, bottom: Polynomial) -> tuple[Polynomial, Polynomial]:
+    def _normalize(self, top: _Polynomial, bottom: _Polynomial) -> tuple[_Polynomial, _Polynomial]:
         """Return numerator and denominator, divided by the denominator if that is a number."""
         if bottom is self.one or set(bottom) != {()} or not bottom[()].value:
             return top, bottom
@@ -211,7 +210,7 @@ class _Expansion(Algebra[tuple[Polynomial, Polynomial]]):
         return self._multiply(top, self._number(1 / divisor.value, divisor.share, divisor.is_printed)), self.one
 
 
-def _product(a: Monomial, b: Monomial) -> Monomial:
+def _product(a: _Monomial, b: _Monomial) -> _Monomial:
     powers = dict(a)
     for atom, exponent in b:
         powers[atom] = powers.get(atom, 0) + exponent
@@ -258,7 +257,7 @@ def rounding_share(tree: Tree, truth: Element, reader: RingReader, residuals: Re
         return None
     ring = truth.ring
 
-    def whole(polynomial: Polynomial) -> Element:
+    def whole(polynomial: _Polynomial) -> Element:
         return ring.sum(expansion.image(m) * c.value for m, c in polynomial.items())
 
     def residual_changes(change: Element) -> list[Element]:
@@ -274,7 +273,7 @@ def rounding_share(tree: Tree, truth: Element, reader: RingReader, residuals: Re
             for monomial, coefficient in polynomial.items():
                 allowed = abs(coefficient.value) * coefficient.share
                 if coefficient.is_printed and polynomial is top:
-                    allowed = max(allowed, DOUBLE_ALLOWANCE * largest)  # cos(pi/2) prints as 6e-17
+                    allowed = max(allowed, _DOUBLE_ALLOWANCE * largest)  # cos(pi/2) prints as 6e-17
                 if allowed:
                     change = expansion.image(monomial) * factor * allowed
                     columns.append(_coefficients(residual_changes(change), ring))
@@ -283,14 +282,14 @@ def rounding_share(tree: Tree, truth: Element, reader: RingReader, residuals: Re
     except RingError:
         return None
     columns = [column for column in columns if column]
-    if not columns or len(columns) > MAX_COEFFICIENTS:
+    if not columns or len(columns) > BOUNDS.rounded_coefficients:
         return None
     difference, reference = numerator - truth * denominator, truth * denominator
     is_energy = not is_quotient and not _is_plain(residuals, truth)
     if not _is_small(difference, reference, shares, is_energy):
         return None
     here = residual_changes(difference)
-    noise = Fraction(DOUBLE_NOISE) * largest if _numbers(ring) else Fraction(0)
+    noise = Fraction(_DOUBLE_NOISE) * largest if _numbers(ring) else Fraction(0)
     share = _least_share(_coefficients(here, ring), columns, noise)
     return share if share is not None and share <= 1 + 1e-9 else None
 
@@ -314,9 +313,9 @@ def _is_small(difference: Element, reference: Element, shares: Mapping[Any, Frac
         difference = varying(difference)
     references = {group: sum(sizes) for group, sizes in _groups(reference).items()}
     for group, sizes in _groups(difference).items():
-        share = shares.get(group, Fraction(0)) + DOUBLE_ALLOWANCE
+        share = shares.get(group, Fraction(0)) + _DOUBLE_ALLOWANCE
         largest = max(sizes)
-        if largest > share * (references.get(group, Fraction(0)) + largest) * (1 + SOLVER_MARGIN):
+        if largest > share * (references.get(group, Fraction(0)) + largest) * (1 + _SOLVER_MARGIN):
             return False
     return True
 
@@ -335,13 +334,13 @@ def _allowance(value: Fraction, text: str, digits: int) -> Fraction:
         return Fraction(0)
     half_unit = Fraction(1, 2) * Fraction(10) ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
     share = half_unit / abs(value)
-    return max(share, DOUBLE_ALLOWANCE) if significant >= DOUBLE_DIGITS else share
+    return max(share, _DOUBLE_ALLOWANCE) if significant >= _DOUBLE_DIGITS else share
 
 
-Coefficients = Mapping[Any, Fraction]
+_Coefficients = Mapping[Any, Fraction]
 
 
-def _coefficients(residuals: Sequence[Element], ring: PolynomialRing) -> Coefficients:
+def _coefficients(residuals: Sequence[Element], ring: PolynomialRing) -> _Coefficients:
     """Return coefficients by residual and monomial; constants that are numbers, such as roots, go into coefficients."""
     numbers = _numbers(ring)
     sums: dict[Any, Fraction] = {}
@@ -363,7 +362,7 @@ def _numbers(ring: PolynomialRing) -> dict[int, Fraction]:
     }
 
 
-def _least_share(here: Coefficients, columns: Sequence[Coefficients], noise: Fraction) -> float | None:
+def _least_share(here: _Coefficients, columns: Sequence[_Coefficients], noise: Fraction) -> float | None:
     """Return the smallest possible maximum of |x| with here + sum x columns = 0; None if there is no such x.
 
     Equations are scaled by their largest entry, so that the solver's tolerance is a share of an allowance.
@@ -381,7 +380,7 @@ def _least_share(here: Coefficients, columns: Sequence[Coefficients], noise: Fra
     return _solve(here, columns, size)
 
 
-def _solve(here: Coefficients, columns: Sequence[Coefficients], size: Mapping[Any, Fraction]) -> float | None:
+def _solve(here: _Coefficients, columns: Sequence[_Coefficients], size: Mapping[Any, Fraction]) -> float | None:
     from scipy.optimize import linprog
     from scipy.sparse import csr_array, eye_array, hstack, vstack
 

@@ -14,7 +14,7 @@ from dhkit.description import Array, Convention
 from dhkit.grading.judging.frame_changes import SAME, FrameChange, frame_changes, joint_changes, wrapped
 from dhkit.grading.judging.table_arms import TableArm
 
-MAX_STEPS = 12
+_MAX_STEPS = 12
 """Largest number of Newton steps; five or six are enough from within an eighth of a turn."""
 STATES = 4
 """Random joint values and parameters at which two arms are compared in doubles."""
@@ -187,7 +187,7 @@ class _Matching:
     def solve(self, senses: Array, B: Array, offsets: Array) -> tuple[Array, Array] | None:
         """Return the rigid motion and offsets near a start that map the first axes; None if there are none."""
         k = len(senses)
-        for _ in range(MAX_STEPS):
+        for _ in range(_MAX_STEPS):
             target = self.truth.screws(offsets, self.scale)[:k]
             moved = self.own[:k] @ _adjoint(B, self.scale).T
             gap = (moved - senses[:, None] * target).ravel()
@@ -198,7 +198,7 @@ class _Matching:
             joints = np.arange(1, k - 1)
             later = senses[:, None] * (np.arange(k) > joints[:, None])[..., None]
             later = later * _free(self.answer, self.truth)[1 : len(later) + 1, None, None]
-            columns = np.concatenate([moved @ BRACKETS, -(target @ np.tensordot(target[1:-1], BRACKETS, 1)) * later])
+            columns = np.concatenate([moved @ _BRACKETS, -(target @ np.tensordot(target[1:-1], _BRACKETS, 1)) * later])
             step = _newton_step(columns.reshape(len(columns), -1), gap)
             B = _exponential(step[:6], self.scale) @ B
             offsets = offsets.copy()
@@ -216,20 +216,20 @@ class _Matching:
         later = (np.arange(self.truth.n) > np.arange(self.truth.n)[:, None])[..., None] * senses
         stroke = np.where([kind == "R" for kind in self.truth.kinds], 1, self.scale)
         free = _free(self.answer, self.truth)
-        for _ in range(MAX_STEPS):
+        for _ in range(_MAX_STEPS):
             target, moved = self.truth.screws(offsets, self.scale), self.own @ _adjoint(B, self.scale).T
             given = _scaled(np.array([B, B @ last]), self.scale)
             wanted = _scaled(np.array([ends[0], self.truth.frames(offsets)[-1] @ ends[1]]), self.scale)
             gap = np.concatenate([(moved - senses * target).ravel(), (given - wanted).ravel()])
             if np.max(np.abs(gap)) < SAME / 100:
                 return replace(overlay, B=B, offsets=offsets)
-            turned = -(target @ np.tensordot(target, BRACKETS, 1)) * later
+            turned = -(target @ np.tensordot(target, _BRACKETS, 1)) * later
             at_end = np.array([[0 * wanted[1], -_rate(screw) @ wanted[1]] for screw in target])
             turned, at_end = turned * free[:, None, None], at_end * free[:, None, None, None]
             whole = np.array([_rate(unit) @ given for unit in np.eye(6)])
             columns = np.vstack(
                 [
-                    np.hstack([(moved @ BRACKETS).reshape(6, -1), whole.reshape(6, -1)]),
+                    np.hstack([(moved @ _BRACKETS).reshape(6, -1), whole.reshape(6, -1)]),
                     np.hstack([turned.reshape(len(turned), -1), at_end.reshape(len(turned), -1)]),
                 ]
             )
@@ -370,4 +370,4 @@ def _quarter_turns() -> list[Array]:
     return [_exponential(angle * unit, 1.0) for unit in units[:3] for angle in (np.pi / 2, -np.pi / 2)]
 
 
-BRACKETS = _brackets()
+_BRACKETS = _brackets()

@@ -11,6 +11,7 @@ import numpy as np
 
 from dhkit.expressions import Expression
 from dhkit.expressions.exact import Atom
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.ring import Element
 
@@ -18,13 +19,11 @@ if TYPE_CHECKING:
     from mpmath import mpf
 
 _Key = TypeVar("_Key")
-MAX_SAMPLES = 1_000
-"""Number of random states for one entry, unless it is long."""
 DIGITS = 50
 """Decimal digits of the arithmetic."""
 TOLERANCE, MIN_SIZE = 1e-25, 1e-3
 """Relative tolerance for taking two numbers for equal, and the smallest size that it is relative to."""
-NEAR_SIZES = {"q": 3.0, "qd": 2.0, "qdd": 2.0}
+_NEAR_SIZES = {"q": 3.0, "qd": 2.0, "qdd": 2.0}
 """Ranges of the states within one turn, in rad or m and their derivatives by time in s."""
 
 
@@ -45,7 +44,7 @@ class Sample:
 
 
 def samples(
-    arm: ExactArm, numbers: frozenset[str], seed: int, every: int = 1, count: int = MAX_SAMPLES
+    arm: ExactArm, numbers: frozenset[str], seed: int, every: int = 1, count: int = BOUNDS.states
 ) -> Iterator[Sample]:
     """Yield random states: a third within one turn, the others at scales from 1e-3 to 1e3 rad, m and their rates.
 
@@ -80,7 +79,7 @@ def samples(
         names = dict(parameters)
         common = 10.0 ** rng.uniform(-3.0, 3.0)
         for i in range(arm.n):
-            for kind, near in NEAR_SIZES.items():
+            for kind, near in _NEAR_SIZES.items():
                 size = (near, common, 10.0 ** rng.uniform(-3.0, 3.0))[k % 3]
                 names[f"{kind}{i + 1}"] = mpmath.mpf(rng.uniform(-size, size))
         yield Sample(names, _generators(arm, names))

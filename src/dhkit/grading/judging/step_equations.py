@@ -30,21 +30,21 @@ from dhkit.symbolic.inverse.steps import names_in
 from dhkit.symbolic.ring import Element, RingError
 from dhkit.symbolic.ring.ring import translated
 
-MAX_SHOWN = 200
+_MAX_SHOWN = 200
 """Longest difference of an equation's sides that is printed, in characters."""
-FREE_POSES = 32
+_FREE_POSES = 32
 """Number of random poses, unrelated to the joints; an equation that holds at one of them says nothing of the arm."""
-ZERO = 1e-9
+_ZERO = 1e-9
 """Largest difference of an equation's sides, relative to their size, that is rounding."""
-OF_BOTH_SIDES = ("square_forgotten", "square_too_much", "root_forgotten")
+_OF_BOTH_SIDES = ("square_forgotten", "square_too_much", "root_forgotten")
 """Changes of both sides of an equation at once, which are no correction."""
-STEP = 1e-6
+_STEP = 1e-6
 """Step of finite differences, rad, and relative to the reach."""
-WITH_NUMBERS = "proved: an identity of the arm with its own lengths"
+_WITH_NUMBERS = "proved: an identity of the arm with its own lengths"
 """Statement on an equation that is no identity whatever the lengths are."""
-NO_CHANGE = 1e-7
+_NO_CHANGE = 1e-7
 """Change of an equation, relative to the size of its terms, by a step of one, that is rounding."""
-SAME_RANK = 1e-5
+_SAME_RANK = 1e-5
 """Singular value, as a share of the largest, below which an equation adds nothing to the others."""
 
 
@@ -75,7 +75,7 @@ class Equations:
                     return self._wrong(k, tree, difference)
                 found, statement = Verdict.UNDECIDED, "true of one of the joint's roots; tried, not proved"
                 remarks.append(f"the equation is true of one root alone, at {share:.3g} % of the poses tried")
-            elif statement == WITH_NUMBERS and self._is_in_names(tree):
+            elif statement == _WITH_NUMBERS and self._is_in_names(tree):
                 remarks.append("the equation is true of this arm alone: it needs lengths that are equal, or zero, here")
             statements.append(statement)
             verdict = max(verdict, found, key=lambda one: one.severity)
@@ -141,7 +141,7 @@ class Equations:
         factors = _factors_of_zero(tree)
         if len(factors) < 2:
             return None
-        is_zero = [bool(np.max(np.abs(self.residual(factor))) < ZERO) for factor in factors]
+        is_zero = [bool(np.max(np.abs(self.residual(factor))) < _ZERO) for factor in factors]
         others = [f for f, zero in zip(factors, is_zero, strict=True) if not zero and own in names_of(f)]
         if not any(is_zero) or not others:
             return None
@@ -163,7 +163,7 @@ class Equations:
         difference: str | None = None
         for chain, known, statement in (
             (named, {}, "proved: an identity of the arm, whatever its lengths are"),
-            (numbers, {**table, **values}, WITH_NUMBERS),
+            (numbers, {**table, **values}, _WITH_NUMBERS),
         ):
             try:
                 element = self._element(tree, chain, known)
@@ -172,7 +172,7 @@ class Equations:
             if element.is_zero:
                 return Verdict.CORRECT, statement, None
             difference = difference or _shown(element)
-        if np.max(np.abs(self.residual(tree))) > ZERO:
+        if np.max(np.abs(self.residual(tree))) > _ZERO:
             return Verdict.WRONG, "", difference
         return Verdict.UNDECIDED, f"holds at {len(self.context.poses.q)} random poses; tried, not proved", None
 
@@ -200,12 +200,12 @@ class Equations:
         """Whether an equation holds at poses unrelated to the joints; at one of them, if it has roots."""
         rng = np.random.default_rng(5)
         n, scale = self.context.description.n, self.context.poses.scale
-        T = np.tile(np.eye(4), (FREE_POSES, 1, 1))
-        T[:, :3, :3] = Rotation.random(FREE_POSES, rng=rng).as_matrix()
-        T[:, :3, 3] = rng.uniform(-scale, scale, (FREE_POSES, 3))
-        poses = replace(self.context.poses, q=rng.uniform(-2, 2, (FREE_POSES, n)), T=T, known=None)
+        T = np.tile(np.eye(4), (_FREE_POSES, 1, 1))
+        T[:, :3, :3] = Rotation.random(_FREE_POSES, rng=rng).as_matrix()
+        T[:, :3, 3] = rng.uniform(-scale, scale, (_FREE_POSES, 3))
+        poses = replace(self.context.poses, q=rng.uniform(-2, 2, (_FREE_POSES, n)), T=T, known=None)
         values = {**poses.values, **_joints(poses.q)}
-        return bool(np.min(np.abs(self.residual(tree, values))) < ZERO)
+        return bool(np.min(np.abs(self.residual(tree, values))) < _ZERO)
 
     def _share_of_a_root(self, tree: Tree) -> float | None:
         """Return at how many poses, in %, an equation holds that is true of one root at all poses; None for another.
@@ -216,8 +216,8 @@ class Equations:
         truths = poses.truths
         holds = np.zeros(truths.shape[:2], dtype=bool)
         for b in range(truths.shape[1]):
-            holds[:, b] = np.abs(self.residual(tree, {**poses.values, **_joints(truths[:, b])})) < ZERO
-        share = 100 * float(np.mean(np.abs(self.residual(tree)) < ZERO))
+            holds[:, b] = np.abs(self.residual(tree, {**poses.values, **_joints(truths[:, b])})) < _ZERO
+        share = 100 * float(np.mean(np.abs(self.residual(tree)) < _ZERO))
         return share if share > 0 and poses.has_closed_form and np.all(holds.any(axis=1)) else None
 
     def _is_in_names(self, tree: Tree) -> bool:
@@ -230,7 +230,7 @@ class Equations:
         """Whether the equations determine the joint where those of earlier steps are known."""
         n, own = self.context.description.n, self.step.joint
         free = [j for j in range(n) if j not in self.before]
-        holds = np.all([np.abs(self.residual(tree)) < ZERO for tree in self.differences], axis=0)
+        holds = np.all([np.abs(self.residual(tree)) < _ZERO for tree in self.differences], axis=0)
         poses = self.context.poses.at(np.flatnonzero(holds)[:8])
         J = np.zeros((len(poses.q), len(self.differences), len(free)))
         for m, tree in enumerate(self.differences):
@@ -238,11 +238,11 @@ class Equations:
             for k, j in enumerate(free):
                 unit = poses.scale if poses.description.kinds[j] == "P" else 1.0
                 sides = [
-                    np.asarray(doubles(tree, {**poses.values, **_joints(poses.q + sign * STEP * unit * np.eye(n)[j])}))
+                    np.asarray(doubles(tree, {**poses.values, **_joints(poses.q + sign * _STEP * unit * np.eye(n)[j])}))
                     for sign in (0, 1)
                 ]
-                J[:, m, k] = (sides[1] - sides[0]) / STEP / np.maximum(at, 1e-12)
-        J[np.abs(J) < NO_CHANGE] = 0
+                J[:, m, k] = (sides[1] - sides[0]) / _STEP / np.maximum(at, 1e-12)
+        J[np.abs(J) < _NO_CHANGE] = 0
         without = np.delete(J, free.index(own), axis=2)
         return bool(np.mean(_ranks(J) > _ranks(without)) > 0.5)
 
@@ -270,7 +270,7 @@ class Equations:
         if (changed := self._single_change(tree)) is not None:
             return changed, ""
         for mistake, values in self.context.misread(self.context.poses):
-            if np.max(np.abs(self.residual(tree, {**values, **_joints(self.context.poses.q)}))) < ZERO:
+            if np.max(np.abs(self.residual(tree, {**values, **_joints(self.context.poses.q)}))) < _ZERO:
                 return mistake, ""
         zero = self._with_a_length_of_zero(tree)
         step = self.context.derived(self.step.joint)
@@ -299,13 +299,13 @@ class Equations:
         size = np.max(np.abs(np.asarray(formula.numbers))) + self.context.poses.scale
         own = self.step.joint
         for edit in (*_with_a_length(tree, lengths, own), *_inner_angles(tree, own), *edits_of_parts(tree, lengths)):
-            if edit.old is tree and edit.mistake in OF_BOTH_SIDES:
+            if edit.old is tree and edit.mistake in _OF_BOTH_SIDES:
                 continue
             try:
                 off = np.max(np.abs(np.nan_to_num(np.asarray(formula.of(edit.tree)), nan=np.inf)))
             except AnswerError:  # it needs a joint that the arm does not have
                 continue
-            if off < ZERO * size and not self._holds_always(edit.tree):
+            if off < _ZERO * size and not self._holds_always(edit.tree):
                 return edit.mistake
         return None
 
@@ -357,13 +357,13 @@ def _ranks(J: Array) -> NDArray[np.int_]:
     if not J.shape[2]:
         return np.zeros(len(J), dtype=int)
     sizes = np.linalg.svd(np.nan_to_num(J), compute_uv=False)
-    ranks: NDArray[np.int_] = np.sum(sizes > SAME_RANK * np.maximum(sizes[:, :1], 1e-12), axis=1)
+    ranks: NDArray[np.int_] = np.sum(sizes > _SAME_RANK * np.maximum(sizes[:, :1], 1e-12), axis=1)
     return ranks
 
 
 def _shown(element: Element) -> str:
     text = plain_text(element)
-    return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."
+    return text if len(text) <= _MAX_SHOWN else f"{text[: _MAX_SHOWN - 3]}..."
 
 
 def _factors_of_zero(difference: Tree) -> list[Tree]:

@@ -21,11 +21,11 @@ from dhkit.grading.judging.numeric import doubles
 from dhkit.grading.judging.step_context import StepContext
 from dhkit.symbolic.inverse.forms import Circle
 
-FEW_POSES = 60
+_FEW_POSES = 60
 """Number of random poses at which an arm with a length of zero is tried."""
-ALMOST_ALL = 0.99
+_ALMOST_ALL = 0.99
 """Share of poses at which a formula's value is that of joint 1 without its offset."""
-ROTATIONS = POSE_NAMES[3:]
+_ROTATIONS = POSE_NAMES[3:]
 
 
 class SolutionMistakes:
@@ -70,7 +70,7 @@ class SolutionMistakes:
             return "rotation_not_reduced", ""
         for name, other in _arms_without_a_length(self.context.description):
             try:
-                poses = Poses.random(other, FEW_POSES, self.context.seed)
+                poses = Poses.random(other, _FEW_POSES, self.context.seed)
                 if is_right_for(StepContext(other, poses, self.context.seed, explain=False)):
                     return "length_taken_as_zero", name
             except (AnswerError, DescriptionError):
@@ -107,7 +107,7 @@ class SolutionMistakes:
         straight = np.arctan2(B, A) + np.pi / 2 - offset
         x = self.branch.q[:, 0]
         near = [np.abs((x - straight - turn + np.pi) % (2 * np.pi) - np.pi) < MATCHES for turn in (0.0, np.pi)]
-        return bool(np.any(np.abs(C) > CLOSES) and np.mean(near[0] | near[1]) > ALMOST_ALL)
+        return bool(np.any(np.abs(C) > CLOSES) and np.mean(near[0] | near[1]) > _ALMOST_ALL)
 
     def _needs_another_sign(self) -> bool:
         """Whether the formula is right at a part of the poses, and at the others with another sign of a root in it."""
@@ -120,12 +120,12 @@ class SolutionMistakes:
     def _is_in_base(self) -> bool:
         """Whether the formula is right with the tool's rotation in the frame behind joints before, as R_36."""
         poses = self.branch.poses
-        if poses.known is None or not names_of(self.tree) & {*ROTATIONS}:
+        if poses.known is None or not names_of(self.tree) & {*_ROTATIONS}:
             return False
         frames = world_to_frames(self.context.description, poses.known)
         for k in range(1, self.joint + 1):
             R = np.swapaxes(frames[:, k, :3, :3], 1, 2) @ poses.T[:, :3, :3]
-            turned = dict(zip(ROTATIONS, R.reshape(-1, 9).T, strict=True))
+            turned = dict(zip(_ROTATIONS, R.reshape(-1, 9).T, strict=True))
             if np.all(self._right(doubles(self.tree, {**poses.values, **self._joints, **turned}))):
                 return True
         return False

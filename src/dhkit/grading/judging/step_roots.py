@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 from dhkit.description import Array
 from dhkit.grading.judging.inverse_poses import Poses
 
-TRIED_POSES = 12
+_TRIED_POSES = 12
 """Number of poses at which roots are looked for."""
-GRID = 720
+_GRID = 720
 """Joint values at which equations are tried first: every half degree, or every 1/180 of the reach."""
-REFINEMENTS = 45
+_REFINEMENTS = 45
 """Steps that narrow the interval about a smallest residual, each by a quarter."""
-MAY_BE_ROOT = 0.1
+_MAY_BE_ROOT = 0.1
 """Largest residual on the grid beside a root."""
-IS_ROOT = 1e-7
+_IS_ROOT = 1e-7
 """Largest residual of a root: relative to the largest size of an equation's terms at any joint value."""
-FAR = 1e-3
+_FAR = 1e-3
 """Least distance of a root from all solutions, rad or relative to the reach, that makes it another one."""
-LEAST_SHARE = 0.5
+_LEAST_SHARE = 0.5
 """Least share of the poses with another root: at single poses a root may be one by chance."""
 
 Residual: TypeAlias = Callable[[NDArray[np.intp], Array], Array]
@@ -47,12 +47,12 @@ def other_root(
         Function from the indices of poses (k,) and joint values (k, n) to the equations' residual, the largest of all,
         relative to the largest size of their terms there.
     """
-    count = min(TRIED_POSES, len(poses.q))
+    count = min(_TRIED_POSES, len(poses.q))
     truths = poses.truths[:count]
     is_solution = np.all(np.isfinite(truths), axis=-1)
     q = truths[np.arange(count), np.argmax(is_solution, axis=1)]
     reach = poses.scale if poses.description.numbers.prismatic[joint] else np.pi
-    grid = np.linspace(-reach, reach, GRID + 1)
+    grid = np.linspace(-reach, reach, _GRID + 1)
 
     def at(rows: NDArray[np.intp], x: Array) -> Array:
         joints: Array = q[rows].copy()
@@ -64,11 +64,11 @@ def other_root(
     residual = residual_on(every, at(every, values))
     rows, roots = _roots(lambda k, x: residual(k, at(k, x)), grid, count)
     # The solutions of a pose that have the same values of the joints before.
-    same = is_solution & np.all(poses.gaps(truths[..., before], q[:, None, before], list(before)) < FAR, axis=-1)
+    same = is_solution & np.all(poses.gaps(truths[..., before], q[:, None, before], list(before)) < _FAR, axis=-1)
     gaps = np.where(same[rows], poses.gaps(roots[:, None], truths[rows, :, joint], joint), np.inf)
-    is_other = np.all(gaps > FAR, axis=1)
+    is_other = np.all(gaps > _FAR, axis=1)
     share = len(np.unique(rows[is_other])) / count
-    return round(float(roots[is_other][0]), 6) + 0.0 if share >= LEAST_SHARE else None
+    return round(float(roots[is_other][0]), 6) + 0.0 if share >= _LEAST_SHARE else None
 
 
 def _roots(residual: Residual, grid: Array, count: int) -> tuple[NDArray[np.intp], Array]:
@@ -76,16 +76,16 @@ def _roots(residual: Residual, grid: Array, count: int) -> tuple[NDArray[np.intp
     every = np.repeat(np.arange(count), len(grid))
     values = np.nan_to_num(residual(every, np.tile(grid, count)), nan=np.inf).reshape(count, -1)
     inner = values[:, 1:-1]
-    is_low = (inner <= values[:, :-2]) & (inner <= values[:, 2:]) & (inner < MAY_BE_ROOT)
+    is_low = (inner <= values[:, :-2]) & (inner <= values[:, 2:]) & (inner < _MAY_BE_ROOT)
     rows, places = np.nonzero(is_low)
     centres = grid[1:-1][places]
     width = 2 * (grid[1] - grid[0])
     # A smallest value lies between the neighbours on the grid: the quarter that does not have it is left out.
     twice = np.concatenate([rows, rows])
-    for _ in range(REFINEMENTS if len(rows) else 0):
+    for _ in range(_REFINEMENTS if len(rows) else 0):
         both = residual(twice, np.concatenate([centres - width / 4, centres + width / 4]))
         left, right = np.split(np.nan_to_num(both, nan=np.inf), 2)
         centres = np.where(left < right, centres - width / 8, centres + width / 8)
         width *= 0.75
-    is_root = np.nan_to_num(residual(rows, centres), nan=np.inf) < IS_ROOT if len(rows) else np.zeros(0, dtype=bool)
+    is_root = np.nan_to_num(residual(rows, centres), nan=np.inf) < _IS_ROOT if len(rows) else np.zeros(0, dtype=bool)
     return rows[is_root], centres[is_root]

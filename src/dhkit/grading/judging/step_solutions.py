@@ -22,15 +22,13 @@ from dhkit.expressions.syntax import Name, Number, Product, Sum, Tree
 from dhkit.expressions.trees import names_of
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.answers.inverse_steps import GivenStep
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.inverse_branch import MISSED_SHARE, Branch
 from dhkit.grading.judging.inverse_poses import KNOWN, MATCHES, Mask
 from dhkit.grading.judging.numeric import doubles
 from dhkit.grading.judging.step_context import Part, StepContext
 from dhkit.grading.judging.step_mistakes import SolutionMistakes
 from dhkit.grading.report import Verdict, Witness
-
-MAX_HYPOTHESES = 100
-"""Largest number of ways to take earlier joints without a right solution that are followed at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +61,7 @@ Hypothesis: TypeAlias = tuple[Choice, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class _Trial:
     """The formulas of a step, tried after each choice of a hypothesis.
 
     Attributes
@@ -125,7 +123,7 @@ class Solutions:
                 for found in self._divided(hypothesis, self.unsolved)
                 if any(np.any(choice.alive) for choice in found)
             ]
-            self._hypotheses, self.unsolved = following[:MAX_HYPOTHESES], []
+            self._hypotheses, self.unsolved = following[: BOUNDS.hypotheses], []
         return self._hypotheses
 
     def skip(self, joint: int) -> None:
@@ -236,7 +234,7 @@ class Solutions:
 
     # Formulas
 
-    def _trial(self, hypothesis: Hypothesis, step: GivenStep, in_pairs: bool = False) -> Trial:
+    def _trial(self, hypothesis: Hypothesis, step: GivenStep, in_pairs: bool = False) -> _Trial:
         values: list[list[Array]] = []
         following: list[list[Choice]] = []
         shares = np.ones((2, len(step.solutions), len(hypothesis)))
@@ -254,7 +252,7 @@ class Solutions:
                         share[k, c] = np.mean(after.rows[rows])
                 values[-1].append(x)
                 following[-1].append(after)
-        return Trial(hypothesis, values, following, shares[0], shares[1], in_pairs)
+        return _Trial(hypothesis, values, following, shares[0], shares[1], in_pairs)
 
     def _evaluated(self, tree: Tree, choice: Choice) -> Array:
         given = {f"q{j + 1}": column for j, column in enumerate(choice.q.T)}
@@ -271,7 +269,7 @@ class Solutions:
         q[:, joint] = np.where(alive.any(axis=1), x, np.nan)
         return Choice(alive, q, choice.root if root is None else root)
 
-    def _reached(self, trial: Trial) -> bool:
+    def _reached(self, trial: _Trial) -> bool:
         """Whether there are poses at which the formulas were tried."""
         return any(np.any(choice.rows & self.context.within_limits) for choice in trial.choices)
 
@@ -301,7 +299,7 @@ class Solutions:
 
     # Mistakes
 
-    def _wrong(self, trial: Trial, step: GivenStep, before: Sequence[int]) -> Part:
+    def _wrong(self, trial: _Trial, step: GivenStep, before: Sequence[int]) -> Part:
         own, inside = step.joint, self.context.within_limits
         k = int(np.argmin(np.mean(trial.right_within_limits, axis=1)))
         which = f"solution {k + 1}" if len(step.solutions) > 1 else "solution"

@@ -14,6 +14,7 @@ from dhkit.description import Array, Convention, Description, Named
 from dhkit.description.parameters import resolved
 from dhkit.expressions import Expression, exact, substitute
 from dhkit.expressions.syntax import Tree
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.numeric import doubles
 from dhkit.symbolic.ring import Element
 
@@ -21,8 +22,6 @@ _T = TypeVar("_T", Array, Element)
 
 SAME_TRANSFORM = 1e-12
 """Relative tolerance, to the largest entry, within which two A_i are taken for equal in doubles."""
-MAX_ENTRY = 1e6
-"""Largest entry of a table, m or rad: no arm has larger ones, and comparing axes would lose digits."""
 
 Row: TypeAlias = tuple[Expression, Expression, Expression, Expression]
 """theta, d, a, alpha, with the joint variable in theta or d; rad and m."""
@@ -126,7 +125,7 @@ class TableArm:
             return np.array([row_numbers(row, named) for row in rows])
 
         entries, q = at(np.zeros(n)), np.linspace(0.3, 0.9, n)
-        if not np.all(np.abs(entries) < MAX_ENTRY):
+        if not np.all(np.abs(entries) < BOUNDS.table_entry):
             return None
         senses = np.sum((at(np.ones(n)) - entries) * own, axis=1)
         moved = entries + own * (senses * q)[:, None]

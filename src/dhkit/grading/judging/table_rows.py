@@ -17,6 +17,7 @@ from dhkit.expressions.budget import budgeted
 from dhkit.expressions.parser import value_of
 from dhkit.expressions.syntax import Tree
 from dhkit.expressions.trees import names_of
+from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.numeric import doubles
 from dhkit.grading.judging.quotients import multiple_angle, sum_of_angles
 from dhkit.grading.judging.same_arm import STATES
@@ -35,8 +36,6 @@ from dhkit.symbolic.exact.naming import Naming
 from dhkit.symbolic.ring import Direction, Ring
 from dhkit.symbolic.textbook_kinematics import with_massless_links
 
-MAX_MULTIPLE = 8
-"""Largest multiple of a joint variable in an angle that is compared exactly."""
 COLUMNS = ("theta", "d", "a", "alpha")
 
 
@@ -311,7 +310,7 @@ class _Reader:
             if joint is None:
                 constant.append(Expression(((monomial, coefficient),)))
                 continue
-            is_multiple = coefficient.denominator == 1 and abs(coefficient) <= MAX_MULTIPLE
+            is_multiple = coefficient.denominator == 1 and abs(coefficient) <= BOUNDS.angle_multiple
             if ring.kinds[joint] != "R" or monomial[0][1] != 1 or not is_multiple:
                 raise RingError(f"{monomial[0][0].text} in an angle")
             parts.append(multiple_angle(ring, joint, int(coefficient)))

@@ -26,9 +26,9 @@ from dhkit.grading.judging.table_rows import COLUMNS, Answer, JudgedRow, TableRo
 from dhkit.grading.remarks import Note, NoteKind
 from dhkit.grading.report import Diagnosis, Entry, KinematicJudgement, Verdict, entry_name
 
-OPEN_TASK = Requirements()
+_OPEN_TASK = Requirements()
 """Requirements that leaves frames and zero pose open."""
-UNEXPLAINED = {"theta": "wrong_theta", "d": "wrong_length", "a": "wrong_length", "alpha": "wrong_twist"}
+_UNEXPLAINED = {"theta": "wrong_theta", "d": "wrong_length", "a": "wrong_length", "alpha": "wrong_twist"}
 """By column: the mistake that is named if no more specific one explains an entry."""
 
 
@@ -57,7 +57,7 @@ def judge_table(
     rows: Sequence[Sequence[Tree]],
     convention: Convention | str,
     seed: int = 0,
-    task: Requirements = OPEN_TASK,
+    task: Requirements = _OPEN_TASK,
 ) -> TableJudgement:
     """Judge a table against a robot's.
 
@@ -127,7 +127,7 @@ def _judge_in_other_frames(
     table: TableRows,
     rows: Sequence[JudgedRow],
     wrong: Sequence[int],
-    mistakes: tuple[RowMistake, ...],
+    mistakes: tuple[_RowMistake, ...],
     overlay: Overlay,
     task: Requirements,
     notes: tuple[Note, ...],
@@ -217,7 +217,7 @@ def _is_of_other_convention(table: TableRows) -> bool:
 
 
 @dataclass(frozen=True)
-class RowMistake:
+class _RowMistake:
     """Mistake in a row.
 
     Attributes
@@ -244,14 +244,14 @@ class RowMistake:
         return Diagnosis(self.mistake, sentence, f"dh, row {self.row + 1}", names, hint_of(self.mistake))
 
 
-def _row_mistakes(table: TableRows, wrong: Sequence[int]) -> tuple[RowMistake, ...]:
+def _row_mistakes(table: TableRows, wrong: Sequence[int]) -> tuple[_RowMistake, ...]:
     """Return the mistakes in wrong rows, from 0, in their order; rows outside exact arithmetic are left out."""
     mistakes = []
     left = list(wrong)
     for i, j in combinations(wrong, 2):
         if i in left and j in left and _matches(table, i, j) and _matches(table, j, i):
             left = [k for k in left if k not in (i, j)]
-            mistakes += [RowMistake("rows_exchanged", k, f"rows {i + 1} and {j + 1}") for k in (i, j)]
+            mistakes += [_RowMistake("rows_exchanged", k, f"rows {i + 1} and {j + 1}") for k in (i, j)]
     for i in left:
         if None not in table.answer.entries[i]:
             mistakes += _explain_row(table, i)
@@ -265,7 +265,7 @@ def _matches(table: TableRows, i: int, j: int) -> bool:
     return any(all(table.equal(i, column, row[column]) for column in range(4)) for row in (moved, table.reference[j]))
 
 
-def _explain_row(table: TableRows, i: int) -> Iterator[RowMistake]:
+def _explain_row(table: TableRows, i: int) -> Iterator[_RowMistake]:
     """Yield the mistakes in row i: one of the whole row, or one for each wrong entry."""
     theta, d, a, alpha = table.reference[i]
     q = Expression.symbol(f"q{i + 1}")
@@ -274,19 +274,19 @@ def _explain_row(table: TableRows, i: int) -> Iterator[RowMistake]:
     column = (theta - q, d + q, a, alpha) if turning else (theta + q, d - q, a, alpha)
     for name, row in (("a_d_exchanged", exchanged), ("variable_column", column)):
         if all(table.equal(i, k, entry) for k, entry in enumerate(row)):
-            yield RowMistake(name, i, f"row {i + 1}")
+            yield _RowMistake(name, i, f"row {i + 1}")
             return
     for k, truth in enumerate(table.reference[i]):
         if not table.equal(i, k, truth):
             yield _explain_entry(table, i, k, truth)
 
 
-def _explain_entry(table: TableRows, i: int, k: int, truth: Expression) -> RowMistake:
+def _explain_entry(table: TableRows, i: int, k: int, truth: Expression) -> _RowMistake:
     where = f"row {i + 1}, {COLUMNS[k]} = {table.answer.entries[i][k]}"
     for name, entry in _wrong_entries(table, i, k, truth):
         if table.equal(i, k, entry):
-            return RowMistake(name, i, where)
-    return RowMistake(UNEXPLAINED[COLUMNS[k]], i, where, is_specific=False)
+            return _RowMistake(name, i, where)
+    return _RowMistake(_UNEXPLAINED[COLUMNS[k]], i, where, is_specific=False)
 
 
 def _wrong_entries(table: TableRows, i: int, k: int, truth: Expression) -> Iterator[tuple[str, Expression]]:

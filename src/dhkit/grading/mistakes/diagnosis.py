@@ -15,6 +15,7 @@ from dhkit.grading.judging.numeric import general_state, state_arrays
 from dhkit.grading.judging.quantities import Index, place_of
 from dhkit.grading.judging.quotients import varying
 from dhkit.grading.judging.truth import DYNAMICS, Truth, kinematic_quantity
+from dhkit.grading.mistakes.bounds import BOUNDS
 from dhkit.grading.mistakes.energy_variants import energy_variants, table_variants
 from dhkit.grading.mistakes.equation_variants import equation_variants, lagrangian_sum
 from dhkit.grading.mistakes.parameter_variants import parameter_variants
@@ -33,12 +34,10 @@ from dhkit.symbolic.textbook_kinematics import (
 
 Differences: TypeAlias = Mapping[Index, Element]
 """Answer less truth of a quantity's entries, zero for right ones; without entries that were not handed in."""
-Key: TypeAlias = frozenset[Any]
-TEXTBOOK = {*MISTAKES, *KINEMATIC_MISTAKES}
-ROUNDED_DECIMALS = 2e-3
+_Key: TypeAlias = frozenset[Any]
+_TEXTBOOK = {*MISTAKES, *KINEMATIC_MISTAKES}
+_ROUNDED_DECIMALS = 2e-3
 """Tolerance relative to the largest entry: numbers of four decimals, multiplied and added, stay below it."""
-MAX_DERIVED_PAIRS = 150
-"""Largest number of pairs of mistakes at one link that are derived for a quantity; their changes do not add up."""
 
 
 class Variants:
@@ -56,7 +55,7 @@ class Variants:
         self.truth = truth
         self.numbers = numbers
         self._changes: dict[str, list[_Changed]] = {}
-        self._by_entry: dict[str, dict[tuple[Index, Key], list[_Changed]]] = {}
+        self._by_entry: dict[str, dict[tuple[Index, _Key], list[_Changed]]] = {}
         self._pairs: dict[str, _Pairs] = {}
         self._values: dict[str, list[Array]] = {}
 
@@ -105,9 +104,9 @@ class Variants:
         if quantity in self._changes:
             return
         changes: list[_Changed] = []
-        by_entry: dict[tuple[Index, Key], list[_Changed]] = {}
+        by_entry: dict[tuple[Index, _Key], list[_Changed]] = {}
         for variant in self.dynamic if quantity in DYNAMICS else self.kinematic:
-            keys = {place: key_of(quantity, x) for place, x in np.ndenumerate(self.change(variant, quantity))}
+            keys = {place: _key_of(quantity, x) for place, x in np.ndenumerate(self.change(variant, quantity))}
             if not any(keys.values()):
                 continue
             changed = _Changed(variant, keys)
@@ -131,12 +130,12 @@ class Variants:
     def changes_none(self, variant: Variant, quantity: str, places: Sequence[Index]) -> bool:
         """Whether a mistake leaves some entries of a quantity unchanged."""
         change = self.change(variant, quantity)
-        return all(not key_of(quantity, change[place]) for place in {place_of(quantity, index) for index in places})
+        return all(not _key_of(quantity, change[place]) for place in {place_of(quantity, index) for index in places})
 
     def entry(self, quantity: str, index: Index, difference: Element) -> list[Variant]:
         """Return the mistakes that cause exactly the difference of one entry."""
         self.prepare(quantity)
-        key = (place_of(quantity, index), key_of(quantity, difference))
+        key = (place_of(quantity, index), _key_of(quantity, difference))
         return [changed.variant for changed in self._by_entry[quantity].get(key, [])]
 
     def near(self, quantity: str, truth: Elements, answer: Mapping[Index, float]) -> list[Variant]:
@@ -158,7 +157,7 @@ class Variants:
             changes = [self.change(changed.variant, quantity) for changed in self._changes[quantity]]
             self._values[quantity] = [arm.evaluate(change, q, qd, qdd) for change in changes]
         here = arm.evaluate(truth, q, qd, qdd)
-        tolerance = ROUNDED_DECIMALS * np.max(np.abs(here), initial=0.0)
+        tolerance = _ROUNDED_DECIMALS * np.max(np.abs(here), initial=0.0)
         return [
             changed.variant
             for changed, values in zip(self._changes[quantity], self._values[quantity], strict=True)
@@ -175,7 +174,7 @@ class Variants:
         self.prepare(quantity)
         distinct: dict[tuple[Any, ...], Variant] = {}
         for changed in self._changes[quantity]:
-            if changed.variant.identity in TEXTBOOK:
+            if changed.variant.identity in _TEXTBOOK:
                 distinct.setdefault(tuple(changed.keys.items()), changed.variant)
         return list(distinct.values())
 
@@ -185,7 +184,7 @@ class _Changed:
     """Mistake with the normal forms of its changes of a quantity's entries; empty for unchanged entries."""
 
     variant: Variant
-    keys: Mapping[Index, Key]
+    keys: Mapping[Index, _Key]
 
 
 def _kinematic_change(truth: Truth, made: MadeAt) -> Make:
@@ -219,17 +218,17 @@ class _Pairs:
         wanted = _keys_of(self.quantity, differences)
         return self._summed(differences, wanted) or self._derived(wanted)
 
-    def _summed(self, differences: Differences, wanted: Mapping[Index, Key]) -> tuple[Variant, Variant] | None:
+    def _summed(self, differences: Differences, wanted: Mapping[Index, _Key]) -> tuple[Variant, Variant] | None:
         """Return a pair whose second mistake explains what the first leaves of the differences."""
         for first in self.tables.textbook(self.quantity):
             change = self.tables.change(first, self.quantity)
             rest = {index: x - change[place_of(self.quantity, index)] for index, x in differences.items()}
             for second in self.tables.whole(self.quantity, rest):
-                if second.identity in TEXTBOOK and _fits(self._both(first, second), wanted):
+                if second.identity in _TEXTBOOK and _fits(self._both(first, second), wanted):
                     return first, second
         return None
 
-    def _both(self, first: Variant, second: Variant) -> dict[Index, Key]:
+    def _both(self, first: Variant, second: Variant) -> dict[Index, _Key]:
         """Return the changes by a derivation with both mistakes."""
         truth, judged, made = self.tables.truth, _judged_by(self.quantity), {first.made, second.made}
         array: Elements
@@ -239,16 +238,16 @@ class _Pairs:
             array = kinematic_quantity(derive_kinematics(truth.description, made), judged)
         change = element_array(truth.coordinates.in_y(judged, array) - truth.of(judged))
         change = element_array(self.tables.in_numbers(self.quantity, change))
-        return {place: key_of(self.quantity, x) for place, x in np.ndenumerate(change)}
+        return {place: _key_of(self.quantity, x) for place, x in np.ndenumerate(change)}
 
     @cached_property
     def _todo(self) -> Iterator[tuple[Variant, Variant]]:
         additive = self.quantity in DYNAMICS
         pairs = combinations(self.tables.textbook(self.quantity), 2)
         derived = ((a, b) for a, b in pairs if not (additive and _apart(a.made, b.made)))
-        return islice(derived, MAX_DERIVED_PAIRS)
+        return islice(derived, BOUNDS.derived_pairs)
 
-    def _derived(self, wanted: Mapping[Index, Key]) -> tuple[Variant, Variant] | None:
+    def _derived(self, wanted: Mapping[Index, _Key]) -> tuple[Variant, Variant] | None:
         for keys, pair in self.derived_pairs.items():
             if _fits(dict(keys), wanted):
                 return pair
@@ -271,17 +270,17 @@ def _judged_by(quantity: str) -> str:
     return "h" if quantity == "C" else quantity
 
 
-def _keys_of(quantity: str, differences: Differences) -> dict[Index, Key]:
+def _keys_of(quantity: str, differences: Differences) -> dict[Index, _Key]:
     """Return the normal forms of a quantity's differences; those of C by rows."""
-    return {place_of(quantity, index): key_of(quantity, element) for index, element in differences.items()}
+    return {place_of(quantity, index): _key_of(quantity, element) for index, element in differences.items()}
 
 
-def key_of(quantity: str, element: Element) -> Key:
+def _key_of(quantity: str, element: Element) -> _Key:
     """Return the hashable normal form of an element; of an energy without the terms that do not depend on the state."""
     return frozenset((varying(element) if quantity in ("V", "L") else element).terms.items())
 
 
-def _fits(keys: Mapping[Index, Key], wanted: Mapping[Index, Key]) -> bool:
+def _fits(keys: Mapping[Index, _Key], wanted: Mapping[Index, _Key]) -> bool:
     """Whether the changes of the entries that were handed in are the wanted ones."""
     return all(keys[place] == key for place, key in wanted.items())
 

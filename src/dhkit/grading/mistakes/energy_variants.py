@@ -11,14 +11,15 @@ from dhkit.description import Convention, Description, Joint
 from dhkit.errors import DhkitError
 from dhkit.expressions import ZERO, Expression
 from dhkit.grading.judging.truth import Truth
+from dhkit.grading.mistakes.bounds import BOUNDS
 from dhkit.grading.mistakes.variants import Change, Variant, make_lazily
 from dhkit.symbolic.mistakes import LINK_MISTAKES, MISTAKES, ROTOR_MISTAKES, MadeAt
 from dhkit.symbolic.ring import Element, element_array, translated
 from dhkit.symbolic.textbook import BodyMotion, TextbookDerivation, derive
 
-HALF = Fraction(1, 2)
-MILLIMETRES = 1000
-SHAPES = {
+_HALF = Fraction(1, 2)
+_MILLIMETRES = 1000
+_SHAPES = {
     "disc_for_rod": (6,),
     "rod_about_end": (4,),
     "point_mass_for_rod": (12, 9),
@@ -27,17 +28,15 @@ SHAPES = {
     "rod_with_half_length": (Fraction(1, 4),),
 }
 """By mistake: factors of a rod's m l^2/12 about its centre, such as 6 for m l^2/2."""
-OF_TURNING = frozenset(("velocity_at_joint", "inertia_about_joint", "inertia_about_com_at_joint")) | frozenset(
+_OF_TURNING = frozenset(("velocity_at_joint", "inertia_about_joint", "inertia_about_com_at_joint")) | frozenset(
     ("velocity_relative_angle", "height_relative_angle")
 )
 """Mistakes with the angle of a revolute joint, or with the inertia about its axis."""
-RARER = frozenset(("omega_unturned", "inertia_axes", "com_rotation_transposed", "gravity_axis", "gravity_axis_back"))
+_RARER = frozenset(("omega_unturned", "inertia_axes", "com_rotation_transposed", "gravity_axis", "gravity_axis_back"))
 """Mistakes of the textbook that are rarer than others which give the same answers."""
-INERTIA_MISTAKES = ("inertia_forgotten", "inertia_about_joint", "inertia_about_com_at_joint", "inertia_doubled")
+_INERTIA_MISTAKES = ("inertia_forgotten", "inertia_about_joint", "inertia_about_com_at_joint", "inertia_doubled")
 """Mistakes that may be made at some links alone, because the first link only turns about its own axis."""
-MAX_LINKS_OF_SUBSETS = 4
-"""Largest number of links of which all subsets are tried."""
-EXCHANGED_AXES = ((0, 1), (1, 2), (0, 2))
+_EXCHANGED_AXES = ((0, 1), (1, 2), (0, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +93,7 @@ def _textbook(textbook: TextbookDerivation) -> Iterator[Variant]:
     several = [part for part in _parts(textbook) if part.name is not None]
 
     def rarity(name: str) -> int:
-        return int(name in RARER)
+        return int(name in _RARER)
 
     for name in names:
         yield Variant(MadeAt(name), make_lazily(_derived, textbook, MadeAt(name)), rarity=rarity(name))
@@ -103,7 +102,7 @@ def _textbook(textbook: TextbookDerivation) -> Iterator[Variant]:
                 continue
             made = MadeAt(name, i)
             yield Variant(made, make_lazily(_derived, textbook, made), f"link {i}", rarity(name))
-    for name in INERTIA_MISTAKES:
+    for name in _INERTIA_MISTAKES:
         for links in _subsets([i for i in range(1, n + 1) if _is_possible(textbook, name, i)]):
             make = make_lazily(_derived, textbook, *(MadeAt(name, i) for i in links))
             yield Variant(MadeAt(name), make, _listed(links), 1)
@@ -116,12 +115,12 @@ def _textbook(textbook: TextbookDerivation) -> Iterator[Variant]:
 
 def _is_possible(textbook: TextbookDerivation, name: str, link: int) -> bool:
     """Whether a mistake can be made at a link, from 1: a sliding joint has no angle and no parallel axis."""
-    return name not in OF_TURNING or textbook.arm.ring.kinds[link - 1] == "R"
+    return name not in _OF_TURNING or textbook.arm.ring.kinds[link - 1] == "R"
 
 
 def _subsets(links: Sequence[int]) -> Iterator[tuple[int, ...]]:
     """Yield the subsets of at least two links, without all of them; none of more than four links."""
-    if len(links) <= MAX_LINKS_OF_SUBSETS:
+    if len(links) <= BOUNDS.subset_links:
         for count in range(2, len(links)):
             yield from combinations(links, count)
 
@@ -168,12 +167,12 @@ def _shapes(textbook: TextbookDerivation) -> Iterator[Variant]:
     """Yield mistakes with the inertia: of another body, or about another point; at all bodies or at one."""
     parts = _parts(textbook)
     rods = [part for part in parts if _is_rod(part)]
-    for identity, factors in SHAPES.items():
+    for identity, factors in _SHAPES.items():
         for factor in factors:
             yield from _scaled_inertia(textbook, identity, Fraction(factor), rods)
-    yield from _scaled_inertia(textbook, "inertia_halved", HALF, parts)
+    yield from _scaled_inertia(textbook, "inertia_halved", _HALF, parts)
     for part in parts:
-        for a, b in EXCHANGED_AXES:
+        for a, b in _EXCHANGED_AXES:
             place = f"{part.place}, I{'xyz'[a] * 2} and I{'xyz'[b] * 2}"
             make = make_lazily(_exchanged_moments, textbook, part, a, b)
             yield Variant(part.mistake("inertia_moments_exchanged"), make, place, 1)
@@ -203,7 +202,7 @@ def _is_rod(part: _Part) -> bool:
 
 def _more_inertia(textbook: TextbookDerivation, parts: Iterable[_Part], share: Fraction) -> Change:
     ring, motions = textbook.arm.ring, [part.motion for part in parts]
-    energies = [motion.omega @ motion.body.inertia @ motion.omega * HALF * share for motion in motions]
+    energies = [motion.omega @ motion.body.inertia @ motion.omega * _HALF * share for motion in motions]
     return Change(ring.sum(energies), ring.zero)
 
 
@@ -214,7 +213,7 @@ def _exchanged_moments(textbook: TextbookDerivation, part: _Part, a: int, b: int
     moments = tensor.diagonal()
     difference = moments[order] - moments
     ring = textbook.arm.ring
-    return Change(ring.sum(omega[k] * omega[k] * difference[k] * HALF for k in range(3)), ring.zero)
+    return Change(ring.sum(omega[k] * omega[k] * difference[k] * _HALF for k in range(3)), ring.zero)
 
 
 # Drives
@@ -238,7 +237,7 @@ def _exchanged_drives(textbook: TextbookDerivation, i: int, j: int) -> Change:
     arm = textbook.arm
     difference = arm.armature[j] - arm.armature[i]
     squares = [arm.ring.rate(k) * arm.ring.rate(k) for k in (i, j)]
-    return Change(difference * (squares[0] - squares[1]) * HALF, arm.ring.zero)
+    return Change(difference * (squares[0] - squares[1]) * _HALF, arm.ring.zero)
 
 
 def _inverted_gears(textbook: TextbookDerivation, joints: Iterable[int]) -> Change:
@@ -247,7 +246,7 @@ def _inverted_gears(textbook: TextbookDerivation, joints: Iterable[int]) -> Chan
         inverse = _inverse(arm.gear[i])
         if inverse is not None:
             rate = arm.ring.rate(i)
-            energies.append(arm.rotor[i] * (inverse * inverse - arm.gear[i] * arm.gear[i]) * rate * rate * HALF)
+            energies.append(arm.rotor[i] * (inverse * inverse - arm.gear[i] * arm.gear[i]) * rate * rate * _HALF)
     return Change(arm.ring.sum(energies), arm.ring.zero)
 
 
@@ -286,7 +285,7 @@ def _without_slide(textbook: TextbookDerivation, motions: Iterable[BodyMotion], 
         place = element_array([translated(x, ring, {ring.place("position", k): ring.zero}) for x in motion.com])
         velocity = element_array([x.by_time() for x in place])
         mass = motion.body.mass
-        K = K + mass * (velocity @ velocity - motion.velocity @ motion.velocity) * HALF
+        K = K + mass * (velocity @ velocity - motion.velocity @ motion.velocity) * _HALF
         V = V - mass * (arm.gravity @ (place - motion.com))
     return Change(K, V)
 
@@ -329,11 +328,11 @@ def _lengths(joint: Joint) -> list[Expression]:
 def _in_millimetres(joint: Joint) -> Joint:
     """Return a row whose lengths are multiplied by a thousand; inertias stay."""
     bodies = tuple(
-        replace(body, com=(x * MILLIMETRES, y * MILLIMETRES, z * MILLIMETRES))
+        replace(body, com=(x * _MILLIMETRES, y * _MILLIMETRES, z * _MILLIMETRES))
         for body in joint.bodies
         for x, y, z in [body.com]
     )
-    return replace(joint, a=joint.a * MILLIMETRES, d=joint.d * MILLIMETRES, bodies=bodies)
+    return replace(joint, a=joint.a * _MILLIMETRES, d=joint.d * _MILLIMETRES, bodies=bodies)
 
 
 def _with_twists_turned(description: Description, links: Collection[int]) -> Description:

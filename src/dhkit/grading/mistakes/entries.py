@@ -12,6 +12,7 @@ from dhkit.grading.judging.findings import Finding, readable
 from dhkit.grading.judging.quantities import Index, JudgedQuantity, place_of
 from dhkit.grading.judging.quotients import varying
 from dhkit.grading.judging.truth import Truth
+from dhkit.grading.mistakes.bounds import BOUNDS
 from dhkit.grading.mistakes.slips import Slip, kind_of_terms, slip_in
 from dhkit.grading.mistakes.wording import diagnosis_of_slip
 from dhkit.grading.report import Diagnosis, entry_name
@@ -20,18 +21,14 @@ from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.exact.compact import shortened_alike
 from dhkit.symbolic.ring import Element
 
-MAX_TERMS = 150
-"""Largest number of differing terms of an entry in which a slip is looked for."""
-MAX_DESCRIBED_TERMS = 600
-"""Largest number of terms of an entry that is described term by term."""
-MAX_NAMED_TERMS = 3
+_MAX_NAMED_TERMS = 3
 """Largest number of terms of each kind that a description names."""
 
 
 def slip_of(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None:
     """Return the slip in a term of a wrong entry; None if there is none, or more than one."""
     difference, right = quantity.findings[index].difference, quantity.right(index)
-    if difference is None or difference.is_zero or len(difference) > MAX_TERMS:
+    if difference is None or difference.is_zero or len(difference) > BOUNDS.compared_terms:
         return None
     arm = truth.arm(quantity.name)
     if quantity.name in ("V", "L"):  # they count from any zero
@@ -135,7 +132,7 @@ def described(truth: Truth, quantity: JudgedQuantity, index: Index) -> Diagnosis
     element = finding.answer.element() if finding.answer is not None else None
     if element is None:
         text = finding.statement
-    elif len(element) > MAX_DESCRIBED_TERMS:
+    elif len(element) > BOUNDS.described_terms:
         text = f"{len(element)} terms, where {len(right)} are right"
     else:
         own = truth.coordinates.in_own_rates
@@ -178,5 +175,5 @@ def compare_terms(arm: ExactArm, answer: Element, truth: Element) -> tuple[str, 
 
 
 def _few(terms: Sequence[str]) -> str:
-    more = f" and {len(terms) - MAX_NAMED_TERMS} more" if len(terms) > MAX_NAMED_TERMS else ""
-    return ", ".join(terms[:MAX_NAMED_TERMS]) + more
+    more = f" and {len(terms) - _MAX_NAMED_TERMS} more" if len(terms) > _MAX_NAMED_TERMS else ""
+    return ", ".join(terms[:_MAX_NAMED_TERMS]) + more

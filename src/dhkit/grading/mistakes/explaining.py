@@ -19,6 +19,7 @@ from dhkit.grading.judging.quantities import Index, JudgedQuantity
 from dhkit.grading.judging.rounding import has_decimals
 from dhkit.grading.judging.truth import DYNAMICS, Truth
 from dhkit.grading.mistakes import entries, plain_causes
+from dhkit.grading.mistakes.bounds import BOUNDS
 from dhkit.grading.mistakes.diagnosis import Differences
 from dhkit.grading.mistakes.plain_causes import tables_of
 from dhkit.grading.mistakes.variants import Variant
@@ -27,20 +28,19 @@ from dhkit.grading.report import Diagnosis, entry_name
 from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.ring import Element
 
-PARTS = {
+_PARTS = {
     "M": "in the terms with accelerations",
     "h": "in the terms with products of rates",
     "g": "in the terms of gravity",
     "K": "in the kinetic energy",
     "V": "in the potential energy",
 }
-MAX_ENTRIES_ALONE = 2
+_MAX_ENTRIES_ALONE = 2
 """Largest number of entries of which a sentence says that the mistake was made in them alone."""
-MAX_LIKELY_RARITY = 1
+_MAX_LIKELY_RARITY = 1
 """Largest rarity of mistakes that are tried before slips in single terms."""
-MIN_PAIR_TERMS, MAX_PAIR_TERMS = 3, 600
-"""Range of differing terms for which pairs of mistakes are tried: with fewer terms a slip is likelier, with more the
-search takes too long."""
+_MIN_PAIR_TERMS = 3
+"""Smallest number of differing terms for which pairs of mistakes are tried: with fewer terms a slip is likelier."""
 
 
 def explain(
@@ -75,7 +75,7 @@ def explain(
     _move(left, diagnoses, plain_causes.without_rates(left, following))
     _move(left, diagnoses, plain_causes.in_other_units(truth, left))
     # A mistake that explains only answers which follow from wrong ones is not the sheet's first error.
-    for allowed in (lambda names, rarity: rarity <= MAX_LIKELY_RARITY, lambda names, rarity: len(names) > 1):
+    for allowed in (lambda names, rarity: rarity <= _MAX_LIKELY_RARITY, lambda names, rarity: len(names) > 1):
         single = _single(truth, judged, left, allowed)
         _move(left, diagnoses, {names: one for names, one in single.items() if not following.issuperset(names)})
     _move(left, diagnoses, _nearly(truth, left, digits))
@@ -219,7 +219,7 @@ def _slips(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQ
 def _rare(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
     """Find single mistakes that are possible, but rare."""
     return list(
-        _single(truth, judged, {quantity.name: quantity}, lambda names, rarity: rarity > MAX_LIKELY_RARITY).values()
+        _single(truth, judged, {quantity.name: quantity}, lambda names, rarity: rarity > _MAX_LIKELY_RARITY).values()
     )
 
 
@@ -275,7 +275,7 @@ def _part_entries(truth: Truth, quantity: JudgedQuantity, part: str, whole: Diff
             continue
         difference = truth.coordinates.in_own_rates(difference)
         excess = entries.in_own_angles(truth, plain_text(readable(truth.arm(quantity.name), difference)))
-        diagnoses.append(Diagnosis(None, f"Too much {PARTS[part]}: {excess}.", entry, (entry,), hint_of(None)))
+        diagnoses.append(Diagnosis(None, f"Too much {_PARTS[part]}: {excess}.", entry, (entry,), hint_of(None)))
     return diagnoses
 
 
@@ -283,7 +283,7 @@ def _pair(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQu
     """Find two mistakes of a derivation that together explain a quantity."""
     differences = quantity.differences
     terms = sum(map(len, differences.values())) if differences else 0
-    if not differences or not MIN_PAIR_TERMS <= terms <= MAX_PAIR_TERMS:
+    if not differences or not _MIN_PAIR_TERMS <= terms <= BOUNDS.pair_terms:
         return []
     pair = tables_of(truth, quantity).pair(quantity.name, differences)
     if pair is None or any(_contradicted(truth, judged, variant) for variant in pair):
@@ -344,7 +344,7 @@ def _entries(truth: Truth, quantity: JudgedQuantity) -> list[Diagnosis]:
         if len(indices) == 1 and not certain:
             continue
         diagnosis = diagnosis_of(variants, [quantity], indices)
-        few = len(diagnosis.entries) <= MAX_ENTRIES_ALONE
+        few = len(diagnosis.entries) <= _MAX_ENTRIES_ALONE
         alone = f"{diagnosis.sentence[:-1]}, in {' and '.join(diagnosis.entries)} alone."
         diagnoses.append(replace(diagnosis, sentence=alone) if few else diagnosis)
         candidates = {index: v for index, v in candidates.items() if index not in indices}

@@ -10,12 +10,10 @@ from dhkit.description import INERTIA_PLACES, Description
 from dhkit.expressions import Expression
 from dhkit.grading.catalogue import PARAMETER_FACTORS, UNITS
 from dhkit.grading.judging.truth import Truth, right_value, translated_array
+from dhkit.grading.mistakes.bounds import BOUNDS
 from dhkit.grading.mistakes.variants import Make, Variant
 from dhkit.symbolic.mistakes import MadeAt
 from dhkit.symbolic.ring import Element, Elements
-
-MAX_JOINTS = 3
-"""Largest arm for which half of a length may stand for another length; larger ones have too many pairs."""
 
 
 def parameter_variants(truth: Truth) -> Iterator[Variant]:
@@ -36,7 +34,7 @@ def parameter_variants(truth: Truth) -> Iterator[Variant]:
         if (first, second) in alike or (second, first) in alike:
             made = MadeAt("parameter_for_another")
             yield Variant(made, _replaced(truth, {first: ring.constant(second)}), f"{second} for {first}", 1)
-            if kinds.get(first) == "length" and first in kinds and lag.n <= MAX_JOINTS:
+            if kinds.get(first) == "length" and first in kinds and lag.n <= BOUNDS.half_length_joints:
                 half = ring.constant(second) * Fraction(1, 2)
                 yield Variant(made, _replaced(truth, {first: half}), f"{second}/2 for {first}", 1)
                 yield Variant(made, _replaced(truth, {first: ring.constant(second) * 2}), f"2*{second} for {first}", 2)

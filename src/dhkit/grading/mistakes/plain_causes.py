@@ -25,12 +25,12 @@ from dhkit.grading.mistakes.wording import diagnosis_of_slip, diagnosis_of_whole
 from dhkit.grading.report import Diagnosis, Verdict
 from dhkit.symbolic.ring import Elements
 
-DEGREE_FACTORS = (Fraction(1, 180), Fraction(180))
+_DEGREE_FACTORS = (Fraction(1, 180), Fraction(180))
 """Factors, besides pi and 1/pi, of angles that are confused with degrees."""
-ZEROS = {"h": "velocity_torques_missing", "C": "velocity_torques_missing", "g": "gravity_torques_missing"}
+_ZEROS = {"h": "velocity_torques_missing", "C": "velocity_torques_missing", "g": "gravity_torques_missing"}
 """By quantity: the mistake if all its entries are zero."""
-RATE = re.compile(r"qd\d+")
-MIN_DIGITS = 2
+_RATE = re.compile(r"qd\d+")
+_MIN_DIGITS = 2
 """Smallest number of significant digits of decimals that count as too short rather than wrong."""
 
 
@@ -38,7 +38,7 @@ def in_degrees(truth: Truth, wrong: Mapping[str, JudgedQuantity]) -> dict[tuple[
     """Find quantities that are right if factors pi/180 or 180/pi are taken off their angles."""
     diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     for name, quantity in wrong.items():
-        readers = [RingReader(truth.arm(name).ring, angle_factor=factor) for factor in DEGREE_FACTORS]
+        readers = [RingReader(truth.arm(name).ring, angle_factor=factor) for factor in _DEGREE_FACTORS]
         if name != "C" and any(_is_right(quantity, reader) for reader in readers):
             diagnoses[(name,)] = diagnosis_of_whole(quantity, "degrees_for_radians")
     return diagnoses
@@ -105,7 +105,7 @@ def zeros(truth: Truth, left: Mapping[str, JudgedQuantity], following: set[str])
         wrong = quantity.wrong_indices
         if name in following or not quantity.is_zero or any(mirrored(quantity, index) for index in wrong):
             continue
-        identity = ZEROS.get(name, "entry_zero") if len(quantity.given) > 1 else "entry_zero"
+        identity = _ZEROS.get(name, "entry_zero") if len(quantity.given) > 1 else "entry_zero"
         diagnoses[(name,)] = replace(diagnosis_of_whole(quantity, identity), equivalent=equivalent(truth, quantity))
     return diagnoses
 
@@ -118,7 +118,7 @@ def without_rates(left: Mapping[str, JudgedQuantity], following: set[str]) -> di
         if quantity is None or name in following or quantity.is_zero:
             continue
         trees = [entry.tree for entry in quantity.given if entry.tree is not None]
-        if trees and not any(RATE.fullmatch(text) for tree in trees for text in names_of(tree)):
+        if trees and not any(_RATE.fullmatch(text) for tree in trees for text in names_of(tree)):
             diagnoses[(name,)] = diagnosis_of_whole(quantity, "rates_missing")
     return diagnoses
 
@@ -153,11 +153,11 @@ def too_few_digits(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity:
     name = quantity.name
     if name in ("C", "V", "L"):
         return []
-    by = Comparison(truth.arm(name), truth.reader(name), MIN_DIGITS)
+    by = Comparison(truth.arm(name), truth.reader(name), _MIN_DIGITS)
     wrong = quantity.wrong_indices
     for entry in quantity.given:
         if entry.index in wrong:
-            if entry.tree is None or not has_decimals(entry.tree, MIN_DIGITS):
+            if entry.tree is None or not has_decimals(entry.tree, _MIN_DIGITS):
                 return []
             if not equal(entry.tree, quantity.truth[entry.index], by):
                 return []

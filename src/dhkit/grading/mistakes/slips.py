@@ -7,19 +7,16 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from dhkit.expressions import ZERO
+from dhkit.grading.mistakes.bounds import BOUNDS
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.exact.compact import shortened_alike
 from dhkit.symbolic.ring import Element, Generator
 from dhkit.symbolic.ring.elements import PolynomialRing
 
-Terms = Mapping[tuple[int, ...], Fraction]
-UNITS = frozenset((Fraction(1000), Fraction(1000) ** 2, Fraction(1, 1000), Fraction(1, 1000) ** 2))
+_Terms = Mapping[tuple[int, ...], Fraction]
+_UNITS = frozenset((Fraction(1000), Fraction(1000) ** 2, Fraction(1, 1000), Fraction(1, 1000) ** 2))
 """Factors of terms with lengths in mm in place of m, or the reverse."""
-MAX_CHANGED = 16
-"""Largest number of terms by which an answer and the truth differ in which a slip is looked for."""
-MAX_TERMS = 4
-"""Largest number of terms that one slip changes: m2*(l1^2 + l2^2) may be multiplied out."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +92,7 @@ def _slip(answer: Element, truth: Element) -> Slip | None:
     ring, right, wrong = truth.ring, truth.terms, answer.terms
     changed = {m: wrong.get(m, Fraction(0)) - right.get(m, Fraction(0)) for m in {*right, *wrong}}
     changed = {m: c for m, c in changed.items() if c}
-    if not changed or len(changed) > MAX_CHANGED:
+    if not changed or len(changed) > BOUNDS.changed_terms:
         return None
     missing = {m: right[m] for m, c in changed.items() if m not in wrong}
     new = {m: c for m, c in changed.items() if m not in missing}
@@ -113,11 +110,11 @@ def _slip(answer: Element, truth: Element) -> Slip | None:
     return None
 
 
-def _rescaled(ring: PolynomialRing, shared: Terms, right: Terms) -> Slip | None:
+def _rescaled(ring: PolynomialRing, shared: _Terms, right: _Terms) -> Slip | None:
     """Return the slip if terms have another factor, the same for all of them."""
     factors = {(right[m] + c) / right[m] for m, c in shared.items()}
     # Terms with the same sines, cosines and rates are one term for a person, however many parameters multiply it.
-    is_one = len(shared) <= MAX_TERMS or len({_state_part(ring, m) for m in shared}) == 1
+    is_one = len(shared) <= BOUNDS.slip_terms or len({_state_part(ring, m) for m in shared}) == 1
     if len(factors) != 1 or not is_one or (len(shared) > 1 and len(shared) == len(right)):
         return None
     (factor,) = factors
@@ -127,7 +124,7 @@ def _rescaled(ring: PolynomialRing, shared: Terms, right: Terms) -> Slip | None:
         return Slip("square_of_sum" if mixed else "term_missing", terms)
     if factor == -1:
         return Slip("term_sign", terms)
-    if factor in UNITS:
+    if factor in _UNITS:
         return Slip("millimetres_for_metres", terms)
     wrong = plain_text(ring.from_terms({m: right[m] * factor for m in shared}))
     return Slip("term_factor", wrong, right=terms)
@@ -138,7 +135,7 @@ def _state_part(ring: PolynomialRing, term: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(0 if g.kind == "constant" else e for g, e in zip(ring.generators, term, strict=True))
 
 
-def _is_mixed_term(term: tuple[int, ...], right: Terms) -> bool:
+def _is_mixed_term(term: tuple[int, ...], right: _Terms) -> bool:
     """Whether a term is the 2ab of a square whose a^2 and b^2 occur."""
     for a in right:
         if a == term or right[a] <= 0:
@@ -149,7 +146,7 @@ def _is_mixed_term(term: tuple[int, ...], right: Terms) -> bool:
     return False
 
 
-def _replaced(ring: PolynomialRing, missing: Terms, new: Terms) -> Slip | None:
+def _replaced(ring: PolynomialRing, missing: _Terms, new: _Terms) -> Slip | None:
     """Return the slip if terms replace others, all of them by the same exchange of generators."""
     pairs = _paired(missing, new)
     if pairs is None:
@@ -161,7 +158,7 @@ def _replaced(ring: PolynomialRing, missing: Terms, new: Terms) -> Slip | None:
 
 
 def _of_pairs(
-    ring: PolynomialRing, pairs: Mapping[tuple[int, ...], tuple[int, ...]], missing: Terms, new: Terms
+    ring: PolynomialRing, pairs: Mapping[tuple[int, ...], tuple[int, ...]], missing: _Terms, new: _Terms
 ) -> Slip | None:
     """Return the slip if new terms stand in place of missing ones by the same exchange of generators."""
     exchanges = {tuple(b - a for a, b in zip(old, new, strict=True)) for old, new in pairs.items()}
@@ -174,7 +171,7 @@ def _of_pairs(
     return Slip(_identity(ring, removed, added, next(iter(pairs))), wrong, right=right)
 
 
-def _paired(old: Terms, new: Terms) -> dict[tuple[int, ...], tuple[int, ...]] | None:
+def _paired(old: _Terms, new: _Terms) -> dict[tuple[int, ...], tuple[int, ...]] | None:
     """Return the new term for each old one, matched by coefficients and common factors; None without a match."""
     pairs: dict[tuple[int, ...], tuple[int, ...]] = {}
     left = dict(new)

@@ -16,10 +16,10 @@ from dhkit.symbolic.exact.compact import parallel_runs, shortened
 from dhkit.symbolic.mistakes import MadeAt
 from dhkit.symbolic.ring import Element, Elements, Ring, translated
 
-Formula = Callable[[Element, Element, Element, Element], tuple[Element, Element]]
+_Formula = Callable[[Element, Element, Element, Element], tuple[Element, Element]]
 """Returns cosine and sine of a + b from cosine and sine of a, and of b."""
 
-FORMULAS: tuple[tuple[str, Formula], ...] = (
+_FORMULAS: tuple[tuple[str, _Formula], ...] = (
     ("sum_of_angles_split", lambda c, s, x, y: (c + x, s + y)),
     ("sum_of_angles_split", lambda c, s, x, y: (c + x, s * x + c * y)),
     ("sum_of_angles_split", lambda c, s, x, y: (c * x - s * y, s + y)),
@@ -49,7 +49,7 @@ def sums_of_angles(arm: ExactArm, right: Make, is_kinematic: bool = False) -> It
     """
     if any(len(run) > 1 for run in parallel_runs(arm)):
         for written in (_in_sums, shortened):
-            for identity, formula in FORMULAS:
+            for identity, formula in _FORMULAS:
                 change = partial(_with_formula, arm, right, formula, written)
                 yield Variant(MadeAt(identity), change, rarity=1, is_kinematic=is_kinematic)
 
@@ -92,7 +92,7 @@ def _without_minus(element: Element, joint: int) -> Element:
 def _with_formula(
     arm: ExactArm,
     right: Make,
-    formula: Formula,
+    formula: _Formula,
     written: Callable[[ExactArm, Elements], Elements],
     quantity: str,
 ) -> Elements:
@@ -104,7 +104,7 @@ def _with_formula(
     return changed
 
 
-def _in_angles(arm: ExactArm, element: Element, formula: Formula) -> Element:
+def _in_angles(arm: ExactArm, element: Element, formula: _Formula) -> Element:
     """Return an element written in sums of angles in single angles, by a formula for the sums."""
     ring = arm.ring
     single: dict[int, Element] = {}

@@ -11,10 +11,10 @@ from dhkit.grading.mistakes.slips import Slip
 from dhkit.grading.mistakes.variants import Variant
 from dhkit.grading.report import Diagnosis, entry_name
 
-MAX_ALTERNATIVES = 3
+_MAX_ALTERNATIVES = 3
 """Largest number of mistakes with the same answers that one sentence names."""
 
-CHRISTOFFEL = {
+_CHRISTOFFEL = {
     "kinetic_gradient_omitted": "of the Christoffel symbols the term that is taken off, dM_ij/dq_k / 2",
     "kinetic_gradient_sign": "of the Christoffel symbols the term dM_ij/dq_k / 2 is added, and should be taken off",
     "mass_rate_omitted": "of the Christoffel symbols the two terms that are added",
@@ -38,7 +38,7 @@ def merge(diagnoses: Sequence[Diagnosis]) -> list[Diagnosis]:
     return merged
 
 
-def entry_names(quantity: JudgedQuantity, indices: Sequence[Index]) -> tuple[str, ...]:
+def _entry_names(quantity: JudgedQuantity, indices: Sequence[Index]) -> tuple[str, ...]:
     """Return the names of entries, such as M12."""
     return tuple(entry_name(quantity.name, index) for index in indices)
 
@@ -49,7 +49,7 @@ def diagnosis_of(
     """Return the diagnosis of mistakes that all give the same answers, the likeliest first."""
     first = variants[0]
     quantities = list(dict.fromkeys(quantities))
-    names = (name for quantity in quantities for name in entry_names(quantity, indices or quantity.wrong_indices))
+    names = (name for quantity in quantities for name in _entry_names(quantity, indices or quantity.wrong_indices))
     entries = tuple(dict.fromkeys(names))
     places = [quantity.name for quantity in quantities] if not indices else entries
     where = ", ".join([*places, *([first.place] if first.place else [])])
@@ -59,18 +59,18 @@ def diagnosis_of(
         if variant.rarity == first.rarity:
             distinct.setdefault(variant.identity, variant)
     if len(distinct) > 1:
-        listed = "; or: ".join(_clause(variant, of_C) for variant in [*distinct.values()][:MAX_ALTERNATIVES])
+        listed = "; or: ".join(_clause(variant, of_C) for variant in [*distinct.values()][:_MAX_ALTERNATIVES])
         sentence = f"One of these: {listed}."
     else:
-        sentence = sentence_of(first.identity, first.place, CHRISTOFFEL.get(first.identity, "") if of_C else "")
+        sentence = sentence_of(first.identity, first.place, _CHRISTOFFEL.get(first.identity, "") if of_C else "")
     equivalent = tuple(dict.fromkeys(v.name for v in variants if v.name != first.name))
     return Diagnosis(first.identity, sentence, where, entries, hint_of(first.identity), equivalent)
 
 
 def _clause(variant: Variant, of_C: bool) -> str:
     sentence = LIBRARY[variant.identity].sentence
-    if of_C and variant.identity in CHRISTOFFEL:
-        sentence = f"{sentence}: {CHRISTOFFEL[variant.identity]}"
+    if of_C and variant.identity in _CHRISTOFFEL:
+        sentence = f"{sentence}: {_CHRISTOFFEL[variant.identity]}"
     return f"{variant.place}: {sentence}" if variant.place else sentence
 
 
@@ -88,5 +88,5 @@ def diagnosis_of_slip(quantity: JudgedQuantity, index: Index, slip: Slip) -> Dia
 
 def diagnosis_of_whole(quantity: JudgedQuantity, identity: str) -> Diagnosis:
     """Return the diagnosis of a mistake in all wrong entries of a quantity, which is made at no particular link."""
-    entries = entry_names(quantity, quantity.wrong_indices)
+    entries = _entry_names(quantity, quantity.wrong_indices)
     return Diagnosis(identity, sentence_of(identity), quantity.name, entries, hint_of(identity))

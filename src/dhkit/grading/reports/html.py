@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from html import escape
 
+from dhkit.grading.bounds import BOUNDS
 from dhkit.grading.marks import Mark, Marks
 from dhkit.grading.report import Entry, GradeReport, Verdict, worst_verdict
 from dhkit.grading.reports import sentences
 from dhkit.grading.reports.mathml import mathml
 from dhkit.grading.reports.sentences import plain, points, points_of
 
-BADGES = {
+_BADGES = {
     Verdict.CORRECT: ("right", "✓"),
     Verdict.ROUNDED: ("right", "≈"),
     Verdict.SAMPLED: ("open", "∼"),
@@ -21,7 +22,7 @@ BADGES = {
     Verdict.UNREADABLE: ("unread", "!"),
 }
 """CSS class of a verdict's badge, and a sign for readers who cannot tell its colours apart."""
-POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 """Content security policy of the pages."""
 STYLE = """
 :root { color-scheme: light dark; --ink: #1b1f24; --paper: #fff; --faint: #57606a; --line: #d8dee4;
@@ -75,7 +76,7 @@ def _page(title: str, body: str) -> str:
     """Return a page around a body that is HTML already."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{_text(title, 200)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<h1>{_text(title, 200)}</h1>\n"
         f"{body}\n</body>\n</html>\n"
@@ -177,10 +178,10 @@ def _sheet_name(report: GradeReport, number: int) -> str:
 
 
 def _badge(verdict: Verdict) -> str:
-    kind, sign = BADGES[verdict]
+    kind, sign = _BADGES[verdict]
     return f'<span class="badge {kind}">{sign} {escape(verdict.value)}</span>'
 
 
-def _text(line: str, most: int = sentences.MAX_CHARACTERS) -> str:
+def _text(line: str, most: int = BOUNDS.shown_characters) -> str:
     """Return text as HTML: one printable line, in which no character begins a tag or an entity."""
     return escape(plain(line, most))

@@ -10,12 +10,10 @@ from pydantic import ValidationError
 
 from dhkit.description.files import read_bounded
 from dhkit.errors import AnswerError, DescriptionError
+from dhkit.grading.bounds import BOUNDS
 from dhkit.grading.marks import Marks
 from dhkit.grading.report import GradeReport
 from dhkit.grading.rubric import Feedback
-
-MAX_BYTES = 500_000_000
-"""Largest file of reports, one a line: enough for a thousand students with long answers."""
 
 
 def json_report(report: GradeReport, marks: Marks, feedback: Feedback = "full") -> dict[str, object]:
@@ -57,7 +55,7 @@ def read_reports(path: Path) -> Iterator[GradeReport]:
         No such file, no reports, or reports that were reduced for students.
     """
     try:
-        text = read_bounded(path, MAX_BYTES).decode().strip()
+        text = read_bounded(path, BOUNDS.report_file_bytes).decode().strip()
     except DescriptionError as error:
         raise AnswerError(str(error).replace("expected a robot file", "expected reports")) from None
     except UnicodeDecodeError as error:

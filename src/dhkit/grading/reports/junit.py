@@ -10,7 +10,7 @@ from dhkit.grading.report import GradeReport, Verdict
 from dhkit.grading.reports.cases import Case, cases
 from dhkit.grading.reports.sentences import plain, points, summary
 
-OUTCOMES = {
+_OUTCOMES = {
     Verdict.WRONG: "failure",
     Verdict.INCOMPLETE: "failure",
     Verdict.UNREADABLE: "error",
@@ -61,7 +61,7 @@ def _add_case(suite: Element, one: Case) -> None:
     if one.verdict is None:
         SubElement(case, "failure", message=one.mark.rule, type="missing")
         return
-    outcome = OUTCOMES.get(one.verdict)
+    outcome = _OUTCOMES.get(one.verdict)
     if outcome is None:
         return
     if outcome == "skipped" and not one.passes:

@@ -11,12 +11,12 @@ from dhkit.grading.marks import Marks
 from dhkit.grading.report import GradeReport
 from dhkit.grading.reports.sentences import plain, points
 
-FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
+_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 """First characters of a text that a spreadsheet would compute."""
-NUMBER = re.compile(r"[+-]?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?")
-AFTER_POINTS = ("verdict", "judged at", "missing", "left out", "mistakes", "error")
+_NUMBER = re.compile(r"[+-]?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?")
+_AFTER_POINTS = ("verdict", "judged at", "missing", "left out", "mistakes", "error")
 """Columns behind the points of the quantities."""
-ORIGIN = ("sheet", "robot", "digest", "version")
+_ORIGIN = ("sheet", "robot", "digest", "version")
 """Last columns: fields of a report that say what was judged, and by what."""
 
 
@@ -28,7 +28,7 @@ def cell(text: str) -> str:
     >>> cell("=1+1"), cell("-2.5"), cell("ada")
     ("'=1+1", '-2.5', 'ada')
     """
-    return f"'{text}" if text.startswith(FORMULA) and not NUMBER.fullmatch(text) else text
+    return f"'{text}" if text.startswith(_FORMULA) and not _NUMBER.fullmatch(text) else text
 
 
 def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
@@ -36,7 +36,9 @@ def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
     quantities = list(dict.fromkeys(mark.name for sheet in marks for mark in sheet.quantities))
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(["student", "points", "most", *(cell(plain(name)) for name in quantities), *AFTER_POINTS, *ORIGIN])
+    writer.writerow(
+        ["student", "points", "most", *(cell(plain(name)) for name in quantities), *_AFTER_POINTS, *_ORIGIN]
+    )
     for report, sheet in zip(reports, marks, strict=True):
         by_quantity = {mark.name: points(mark.points) for mark in sheet.quantities}
         row = [
@@ -50,7 +52,7 @@ def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
             "; ".join(report.left_out),
             " ".join(dict.fromkeys(one.mistake for one in report.diagnosis if one.mistake)),
             report.fault,
-            *(getattr(report, name) or "" for name in ORIGIN),
+            *(getattr(report, name) or "" for name in _ORIGIN),
         ]
         writer.writerow([cell(plain(text)) for text in row])
     return file.getvalue()

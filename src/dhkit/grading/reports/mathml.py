@@ -6,18 +6,18 @@ import html
 import re
 from xml.etree.ElementTree import Element, SubElement, fromstring, tostring
 
-MAX_CHARACTERS = 4000
-"""Longest LaTeX of an answer that is converted: nobody reads a longer equation, and converting it takes seconds."""
-NAMESPACE = re.compile(r"\{.*?\}")
-ELEMENTS = re.compile(
+from dhkit.grading.bounds import BOUNDS
+
+_NAMESPACE = re.compile(r"\{.*?\}")
+_ELEMENTS = re.compile(
     "math|mrow|mi|mn|mo|mtext|mspace|mfrac|msqrt|mroot|msub|msup|msubsup|munder|mover|munderover|mtable|mtr|mtd|"
     "mstyle|mpadded|mphantom|menclose"
 )
-ATTRIBUTES = re.compile(
+_ATTRIBUTES = re.compile(
     "display|stretchy|fence|separator|lspace|rspace|width|height|linethickness|mathvariant|minsize|maxsize|form|"
     "columnalign|rowspacing|columnspacing"
 )
-VALUE = re.compile(r"[A-Za-z0-9.%+ -]{0,60}")
+_VALUE = re.compile(r"[A-Za-z0-9.%+ -]{0,60}")
 
 
 def mathml(latex: str) -> str | None:
@@ -33,7 +33,7 @@ def mathml(latex: str) -> str | None:
     """
     from latex2mathml.converter import convert
 
-    if not latex.strip() or len(latex) > MAX_CHARACTERS or "<" in latex or "&lt" in latex:
+    if not latex.strip() or len(latex) > BOUNDS.converted_characters or "<" in latex or "&lt" in latex:
         return None
     try:
         root = fromstring(convert(latex, display="block"))  # noqa: S314 - no "<" in it: no declarations
@@ -44,10 +44,10 @@ def mathml(latex: str) -> str | None:
 
 def _copy_harmless(element: Element, parent: Element | None) -> Element:
     """Return a copy with known elements and attributes alone; an unknown element becomes a row."""
-    tag = NAMESPACE.sub("", str(element.tag))
-    tag = tag if ELEMENTS.fullmatch(tag) else "mrow"
+    tag = _NAMESPACE.sub("", str(element.tag))
+    tag = tag if _ELEMENTS.fullmatch(tag) else "mrow"
     allowed = {
-        key: value for key, value in element.attrib.items() if ATTRIBUTES.fullmatch(key) and VALUE.fullmatch(value)
+        key: value for key, value in element.attrib.items() if _ATTRIBUTES.fullmatch(key) and _VALUE.fullmatch(value)
     }
     copy = Element(tag, allowed) if parent is None else SubElement(parent, tag, allowed)
     copy.text = html.unescape(element.text or "")

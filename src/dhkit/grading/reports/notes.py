@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from dhkit.grading.remarks import Note, NoteKind
 
-AGREEMENT = {
+_AGREEMENT = {
     "M": "the matrix of second derivatives of the sheet's own {} by the rates",
     "C": "what the sheet's own {} gives: C qd = dM/dt qd - dK/dq",
     "h": "what the sheet's own {} gives: h = dM/dt qd - dK/dq",
@@ -61,7 +61,7 @@ def note_text(note: Note) -> str:
     """
     values = ", ".join(note.values)
     first, second, *_ = (*note.values, "", "")
-    agreement = AGREEMENT.get(note.quantity, "what the sheet's own {} give").format(values)
+    agreement = _AGREEMENT.get(note.quantity, "what the sheet's own {} give").format(values)
     return SENTENCES[note.kind].format(
         quantity=note.quantity, values=values, first=first, second=second, agreement=agreement
     )

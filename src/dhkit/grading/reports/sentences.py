@@ -11,16 +11,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from dhkit import display
+from dhkit.grading.bounds import BOUNDS
 from dhkit.grading.marks import Mark, Marks
 from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict, Witness
 from dhkit.grading.reports.notes import note_text
 from dhkit.grading.rubric import Feedback
 
-MAX_CHARACTERS = 4000
-"""Longest text shown of one answer or message, in characters: an answer may be a megabyte."""
 
-
-def plain(text: str, most: int = MAX_CHARACTERS) -> str:
+def plain(text: str, most: int = BOUNDS.shown_characters) -> str:
     """Return text as one line of at most ``most`` printable characters; see :func:`dhkit.display.plain`."""
     return display.plain(text, most)
 

@@ -14,7 +14,7 @@ from dhkit.grading.report import GradeReport, Verdict, worst_verdict
 from dhkit.grading.reports import sentences
 from dhkit.grading.reports.sentences import plain, points_of
 
-STYLES = {
+_STYLES = {
     Verdict.CORRECT: "green",
     Verdict.ROUNDED: "green",
     Verdict.SAMPLED: "yellow",
@@ -23,7 +23,7 @@ STYLES = {
     Verdict.WRONG: "red",
     Verdict.UNREADABLE: "magenta",
 }
-BAR_COLUMNS = 40
+_BAR_COLUMNS = 40
 """Width of a mistake's bar if all sheets have the mistake, in columns of the terminal."""
 
 
@@ -38,7 +38,7 @@ def terminal_report(report: GradeReport, marks: Marks, read: bool = False) -> Re
         Whether to show, before the verdicts, how each entry was read.
     """
     title = ", ".join(plain(part) for part in (report.student, report.sheet or "", report.robot) if part)
-    verdict = (sentences.summary(report, marks), STYLES[report.verdict])
+    verdict = (sentences.summary(report, marks), _STYLES[report.verdict])
     parts: list[RenderableType] = [Text.assemble((title or "answers", "bold"), ": ", verdict)]
     if read:
         parts += [Text(line, style="blue") for line in sentences.reading_lines(report)]
@@ -47,7 +47,7 @@ def terminal_report(report: GradeReport, marks: Marks, read: bool = False) -> Re
     for entry, mark in zip(report.entries, marks.entries, strict=False):
         if entry.verdict not in (Verdict.CORRECT, Verdict.ROUNDED, Verdict.INCOMPLETE):
             worth = f" ({points_of(mark)} points)"
-            verdict = (entry.verdict.value, STYLES[entry.verdict])
+            verdict = (entry.verdict.value, _STYLES[entry.verdict])
             parts.append(Text.assemble((plain(entry.name), "bold"), ": ", verdict, worth))
             parts += [Text(f"  {line}") for line in sentences.entry_lines(entry, mark)]
     parts += [Text(line, style="cyan") for line in sentences.diagnosis_lines(report)]
@@ -63,7 +63,7 @@ def _quantities_table(report: GradeReport, marks: Marks) -> Table:
         worst = worst_verdict(entries)
         table.add_row(
             Text(plain(mark.name)),
-            Text(worst.value, STYLES[worst]) if worst else Text(mark.rule, "red"),
+            Text(worst.value, _STYLES[worst]) if worst else Text(mark.rule, "red"),
             Text(f"{passed} of {len(entries)} pass" if entries else ""),
             Text(points_of(mark)),
         )
@@ -76,7 +76,7 @@ def terminal_class(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> Re
     for report, mark in zip(reports, marks, strict=True):
         table.add_row(
             Text(plain(report.student, 60)),
-            Text(plain(report.conclusion), STYLES[report.verdict]),
+            Text(plain(report.conclusion), _STYLES[report.verdict]),
             Text(points_of(mark)),
             Text(sentences.fault_of(report) if report.error else plain(report.sheet or "", 120)),
         )
@@ -90,7 +90,7 @@ def _mistake_bars(counts: Sequence[tuple[str, int]], sheets: int) -> Iterator[Re
     yield Text(f"\nmistakes, and on how many of {sheets} sheets", style="bold")
     table = Table.grid(padding=(0, 2, 0, 0))
     for name, count in counts:
-        bar = ProgressBar(total=sheets, completed=count, width=BAR_COLUMNS, complete_style="red", finished_style="red")
+        bar = ProgressBar(total=sheets, completed=count, width=_BAR_COLUMNS, complete_style="red", finished_style="red")
         table.add_row(Text(plain(name, 60)), Text(str(count)), bar)
     yield table
 

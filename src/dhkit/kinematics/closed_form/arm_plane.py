@@ -91,7 +91,7 @@ class Shoulder:
         return hypot(self.r - hypot(x, offset), rise)
 
 
-def shoulders(point: Vector, offset: SX, scale: SX, reach: SX, free: Pair) -> tuple[Shoulder, Shoulder]:
+def _shoulders(point: Vector, offset: SX, scale: SX, reach: SX, free: Pair) -> tuple[Shoulder, Shoulder]:
     """Return the two positions of joint 1 that give a point the coordinate v = ``offset``: point in front, then behind.
 
     Parameters
@@ -131,7 +131,7 @@ def ordered_shoulders(p: Mapping[str, SX], position: Vector, pose: PoseSymbols) 
 
     Without lateral offset there is no left and right; the shoulder in front then comes first.
     """
-    front, back = shoulders(position, p["offset"], pose.scale, p["reach"], pose.free_1)
+    front, back = _shoulders(position, p["offset"], pose.scale, p["reach"], pose.free_1)
     swap = sign(p["up"][1]) * p["offset"] > 0
 
     def either(a: Shoulder, b: Shoulder) -> Shoulder:

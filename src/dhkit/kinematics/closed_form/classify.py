@@ -23,9 +23,9 @@ FAMILIES = (
     Family("slider", planar.slider_fit, planar.slider_formulas),
 )
 """Families of closed forms, in the order in which they are tried."""
-EXACT_MEMBER = 2e-16
+_EXACT_MEMBER = 2e-16
 """Tolerance within which an arm misses a family by rounding alone."""
-NEAR_MISSES = (1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
+_NEAR_MISSES = (1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
 """Tolerances (rad, share of the reach) within which an arm that misses a family probably has a typing error."""
 
 
@@ -81,12 +81,12 @@ def classify(description: Description) -> Classification:
         branches = f"{count} branch{'es' if count > 1 else ''}"
         met = "" if len(fit.coordinates) == 6 else f"; meets {', '.join(fit.coordinates)}"
         words = f"{kinds}, {fit.geometry}: closed form, {branches}{met}"
-        exactly = _first(Axes.of(description, EXACT_MEMBER))
+        exactly = _first(Axes.of(description, _EXACT_MEMBER))
         is_exact = exactly is not None and exactly[0] is family
         meets_all = fit.coordinates == ALL_COORDINATES
         return Classification(words, family, fit, found if meets_all and not is_exact else None)
     words = f"{kinds}: no closed form known"
-    near = next(filter(None, (_first(Axes.of(description, tolerance)) for tolerance in NEAR_MISSES)), None)
+    near = next(filter(None, (_first(Axes.of(description, tolerance)) for tolerance in _NEAR_MISSES)), None)
     if near is not None:
         words += f" (nearly one of {kinds} with {near[1].geometry}, but not to {TOLERANCE:g}: are its angles rounded?"
         words += " as_designed=True (--as-designed) reads them as right angles)"

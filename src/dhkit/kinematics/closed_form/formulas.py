@@ -53,7 +53,7 @@ def _of_casadi(name: str) -> Callable[..., SX]:
     return function
 
 
-sqrt, fabs, fmax, atan2, if_else, logic_and, logic_or, logic_not = map(
+sqrt, fabs, fmax, _atan2, if_else, logic_and, logic_or, logic_not = map(
     _of_casadi, ("sqrt", "fabs", "fmax", "atan2", "if_else", "logic_and", "logic_or", "logic_not")
 )
 
@@ -106,7 +106,7 @@ def add_angles(a: Pair, b: Pair, sense: float | SX = 1.0) -> Pair:
 
 def angle(pair: Pair) -> SX:
     """Return the angle of a pair in (-pi, pi]."""
-    return atan2(pair[1], pair[0])
+    return _atan2(pair[1], pair[0])
 
 
 def turn_by_pi(x: SX) -> SX:

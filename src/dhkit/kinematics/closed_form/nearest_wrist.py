@@ -16,11 +16,11 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.kinematics.closed_form.family import Fit
 
-DIRECTIONS = 32
+_DIRECTIONS = 32
 """Number of directions from axis 2 in which the boundary of the ring is tried at first."""
-NEWTON_STEPS = 8
+_NEWTON_STEPS = 8
 """Number of Newton steps from such a direction: the last ones change nothing but the rounding."""
-CHUNK = 4096
+_CHUNK = 4096
 """Number of poses at a time."""
 
 
@@ -34,8 +34,8 @@ def nearest_wrist_distance(fit: Fit, T: Array) -> Array:
     T
         Poses of the tool in the world that are out of reach, shape (N, 4, 4).
     """
-    if len(T) > CHUNK:
-        return np.concatenate([nearest_wrist_distance(fit, T[k : k + CHUNK]) for k in range(0, len(T), CHUNK)])
+    if len(T) > _CHUNK:
+        return np.concatenate([nearest_wrist_distance(fit, T[k : k + _CHUNK]) for k in range(0, len(T), _CHUNK)])
     T_plane_world = np.asarray(fit.parameters["T_plane_world"])
     T_tool_wrist = np.asarray(fit.parameters["T_tool_wrist"])
     a1 = float(np.asarray(fit.parameters["a1"]))
@@ -62,8 +62,8 @@ def nearest_wrist_distance(fit: Fit, T: Array) -> Array:
 
 def _distance_of_circle(r: Array, u: Array, a1: float, offset: float, rho: float) -> Array:
     """Return the distances, shape (N,), from points (r, u) to a circle of radius rho about axis 2 in the plane."""
-    step = 2 * np.pi / DIRECTIONS
-    phi: Array = step * np.arange(DIRECTIONS, dtype=float)
+    step = 2 * np.pi / _DIRECTIONS
+    phi: Array = step * np.arange(_DIRECTIONS, dtype=float)
     g = np.hypot(a1 + rho * np.cos(phi), offset)
     values = np.hypot(g - r[:, None], rho * np.sin(phi) - u[:, None])
     # A minimum lies within a step of each direction that is nearer than both its neighbours.
@@ -79,7 +79,7 @@ def _minimum_near(start: Array, step: float, r: Array, u: Array, a1: float, offs
     """Return the smallest distances found by Newton's method within a step of directions ``start``, all (M,)."""
     phi = start
     smallest = np.full(len(start), np.inf)
-    for _ in range(NEWTON_STEPS):
+    for _ in range(_NEWTON_STEPS):
         c = rho * np.cos(phi)
         s = rho * np.sin(phi)
         x = a1 + c

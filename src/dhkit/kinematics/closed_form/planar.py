@@ -49,16 +49,16 @@ from dhkit.kinematics.closed_form.formulas import (
     weighted_sum,
 )
 
-FLAT = 1e-9
+_FLAT = 1e-9
 """Share of the reach by which a pose may lie off the plane of a planar arm."""
-IDENTITY = np.eye(4)[:3]
-CHAINS = ("RR", "RRR", "RRPR", "RRRP", "PRRR", "RPRR", "RRP", "RPR", "PRR")
+_IDENTITY = np.eye(4)[:3]
+_CHAINS = ("RR", "RRR", "RRPR", "RRRP", "PRRR", "RPRR", "RRP", "RPR", "PRR")
 """Orders of joints that form a chain: two or three revolute joints and at most one prismatic."""
 
 
 def chain_fit(axes: Axes) -> Fit | None:
     """Recognize two or three parallel revolute joints with at most one slide along them."""
-    if axes.kinds not in CHAINS or not all(axes.parallel(1, i) for i in range(2, axes.n + 1)):
+    if axes.kinds not in _CHAINS or not all(axes.parallel(1, i) for i in range(2, axes.n + 1)):
         return None
     revolute = [i for i in range(1, axes.n + 1) if not axes.prismatic[i - 1]]
     first = revolute[0]
@@ -97,7 +97,7 @@ def chain_fit(axes: Axes) -> Fit | None:
 
 def chain_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return two branches: the elbow left of the line from the first axis to the last, seen from above; then right."""
-    T = pose.seen(p["T_plane_world"], IDENTITY)
+    T = pose.seen(p["T_plane_world"], _IDENTITY)
     kinds = pose.structure
     turning = kinds.count("R") == 3
     wanted = weighted_sum(p["axis"], T.rotation)
@@ -148,7 +148,7 @@ def polar_fit(axes: Axes) -> Fit | None:
 
 def polar_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return two branches: the prismatic joint extended in its positive direction, then in its negative."""
-    x, u, v = pose.seen(p["T_plane_world"], IDENTITY).position
+    x, u, v = pose.seen(p["T_plane_world"], _IDENTITY).position
     R, lift = hypot(x, u), fabs(p["lift"])
     beyond = lift - R > BOUNDARY_SHARE * pose.scale
     square = (R - lift) * (R + lift)
@@ -200,7 +200,7 @@ def slider_fit(axes: Axes) -> Fit | None:
 
 def slider_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return two branches: the tool ahead of the revolute axis along the prismatic joint, then behind it."""
-    x, u, v = pose.seen(p["T_plane_world"], IDENTITY).position
+    x, u, v = pose.seen(p["T_plane_world"], _IDENTITY).position
     L = p["L"]
     beyond = fabs(u) - L > BOUNDARY_SHARE * pose.scale
     square = (L - u) * (L + u)
@@ -235,4 +235,4 @@ def _sensed(pair: Pair, sense: SX) -> SX:
 
 
 def _off_plane(rise: SX, scale: SX) -> SX:
-    return if_else(fabs(rise) > FLAT * scale, fabs(rise), 0.0)
+    return if_else(fabs(rise) > _FLAT * scale, fabs(rise), 0.0)

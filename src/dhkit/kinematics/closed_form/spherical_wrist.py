@@ -49,7 +49,7 @@ from dhkit.kinematics.closed_form.wrist import ill_determined, joints_5_and_6, w
 
 
 @dataclass(frozen=True)
-class Region:
+class _Region:
     """One solution of the first three joints for the position of the wrist's centre."""
 
     q: tuple[SX, SX, SX]
@@ -88,7 +88,7 @@ def elbow_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     branches = []
     for shoulder in ordered_shoulders(p, T.position, pose):
         for elbow in elbows(p, shoulder.x - p["a1"], T.position[1], shoulder.q1, pose.scale):
-            region = Region(
+            region = _Region(
                 q=(angle(shoulder.q1), *elbow.joints),
                 rho=elbow.rotation,
                 shoulder=shoulder,
@@ -144,7 +144,7 @@ def slide_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
             q2 = add_angles(
                 unit_pair(x, u, pose.scale), add_angles(p["boom"], unit_pair(along, p["lift"], pose.scale)), -1.0
             )
-            region = Region(
+            region = _Region(
                 q=(angle(shoulder.q1), angle(q2), along - p["start"]),
                 rho=q2,
                 shoulder=shoulder,
@@ -165,7 +165,7 @@ def _wrist_centre(axes: Axes) -> Array | None:
 
 
 def _with_wrist(
-    p: Mapping[str, SX], rotation: tuple[Vector, Vector, Vector], region: Region, pose: PoseSymbols
+    p: Mapping[str, SX], rotation: tuple[Vector, Vector, Vector], region: _Region, pose: PoseSymbols
 ) -> list[Branch]:
     """Return the two branches of the wrist: no flip (joint 5 turned to its positive side), and flip.
 

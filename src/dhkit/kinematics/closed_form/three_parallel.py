@@ -49,7 +49,7 @@ from dhkit.kinematics.closed_form.wrist import (
     wrist_parameters,
 )
 
-ROTATION_SLACK = 1e-12
+_ROTATION_SLACK = 1e-12
 """Largest error of the tool's rotation, rad, that is accepted to reach a pose near the wrist's singularity."""
 
 
@@ -148,7 +148,7 @@ def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX, p
     turned = (sense * turned[0], sense * turned[1])
     cost = swing * hypot(turned[0] - rho[0], turned[1] - rho[1])
     is_beyond = logic_or(of_flip, excess > 0)
-    is_harmless = cost < ROTATION_SLACK + ERROR_OVER_DEFECT * pose.noise
+    is_harmless = cost < _ROTATION_SLACK + ERROR_OVER_DEFECT * pose.noise
     return select_pair(logic_and(is_beyond, is_harmless), turned, rho)
 
 

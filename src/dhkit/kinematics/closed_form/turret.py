@@ -30,7 +30,7 @@ from dhkit.kinematics.closed_form.formulas import (
 )
 from dhkit.kinematics.closed_form.links import ELBOWS, elbows, link_parameters
 
-IDENTITY = np.eye(4)[:3]
+_IDENTITY = np.eye(4)[:3]
 
 
 def pan_tilt_fit(axes: Axes) -> Fit | None:
@@ -52,7 +52,7 @@ def pan_tilt_fit(axes: Axes) -> Fit | None:
 
 def pan_tilt_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return the branches that aim: the tool lies in the direction of the pose's origin, at whatever distance."""
-    position = pose.seen(p["T_plane_world"], IDENTITY).position
+    position = pose.seen(p["T_plane_world"], _IDENTITY).position
     branches = []
     for shoulder in ordered_shoulders(p, position, pose):
         x, u = shoulder.x - p["a1"], position[1]
@@ -87,7 +87,7 @@ def yaw_two_fit(axes: Axes) -> Fit | None:
 
 def yaw_two_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return the four branches that put the tool's origin in place: shoulder, then elbow."""
-    position = pose.seen(p["T_plane_world"], IDENTITY).position
+    position = pose.seen(p["T_plane_world"], _IDENTITY).position
     branches = []
     for shoulder in ordered_shoulders(p, position, pose):
         branches += _branches(p, shoulder, shoulder.x - p["a1"], position[1], pose.scale, None, 0.0)
@@ -123,7 +123,7 @@ def yaw_three_fit(axes: Axes) -> Fit | None:
 
 def yaw_three_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return the four branches that put the tool's origin in place and point it: shoulder, then elbow."""
-    T = pose.seen(p["T_plane_world"], IDENTITY)
+    T = pose.seen(p["T_plane_world"], _IDENTITY)
     branches = []
     for shoulder in ordered_shoulders(p, T.position, pose):
         wanted = to_arm_frame(weighted_sum(p["axis"], T.rotation), shoulder.q1)

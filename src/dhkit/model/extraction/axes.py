@@ -22,22 +22,22 @@ import numpy as np
 
 from dhkit.description import Array
 
-ENTRY_COST = 1000.0
+_ENTRY_COST = 1000.0
 """Cost of an entry that is not zero: more than all other preferences of a table together."""
-OBLIQUE_COST, STRAIGHT_COST, NEGATIVE_COST = 20.0, 2.0, 1.0
+_OBLIQUE_COST, _STRAIGHT_COST, _NEGATIVE_COST = 20.0, 2.0, 1.0
 """Extra costs of an angle that is no multiple of 90 degrees, of one of 180 degrees, and of a negative number."""
-LONG, TOO_LONG_COST = 2.0, 1e5
+_LONG, _TOO_LONG_COST = 2.0, 1e5
 """Length, in units of the longest step, from which an entry is too long, and the cost of each unit beyond it: no entry
 that is saved is worth a long one."""
-EARLY_COST = 0.1
+_EARLY_COST = 0.1
 """Extra cost of an offset d for each row after it, so that the last of parallel axes has the whole offset."""
-ON_AXIS_DISTANCE = 1e-9
+_ON_AXIS_DISTANCE = 1e-9
 """Distance from an axis, relative to the arm's size, below which a point counts as on the axis."""
 ZERO = 1e-10
 """Lengths, relative to the arm's size, and angles, rad, below this number count as zero when tables are compared."""
-MIN_SINE = 1e-3
+_MIN_SINE = 1e-3
 """Directions closer to an axis than this sine define no perpendicular direction."""
-MAX_PARTIAL_TABLES = 336
+_MAX_PARTIAL_TABLES = 336
 """Beam width of the search times the number of joints: 48 partial tables are kept at each axis of a 7-joint arm."""
 
 
@@ -87,7 +87,7 @@ class Axes:
         """
         z, feet = self.directions[i], self.feet
         if len(feet):
-            feet = feet[np.linalg.norm(np.cross(feet - on_axis, z), axis=1) < ON_AXIS_DISTANCE]
+            feet = feet[np.linalg.norm(np.cross(feet - on_axis, z), axis=1) < _ON_AXIS_DISTANCE]
         return np.vstack(
             [on_axis[None], self.points[max(i - 1, 0) : i + 3], np.zeros((1, 3)), self.T_base_tip[None, :3, 3], feet]
         )
@@ -112,7 +112,7 @@ class Axes:
         directions = np.vstack(known if previous is None else [previous[None], *known])
         flat = directions - (directions @ self.directions[i])[:, None] * self.directions[i]
         lengths = np.linalg.norm(flat, axis=1)
-        parts: Array = flat[lengths > MIN_SINE] / lengths[lengths > MIN_SINE, None]
+        parts: Array = flat[lengths > _MIN_SINE] / lengths[lengths > _MIN_SINE, None]
         return parts
 
 
@@ -159,8 +159,8 @@ class Path:
 def length_costs(lengths: Array) -> Array:
     """Return the costs of entries with these lengths, any shape, in units of about the longest step; same shape."""
     size = np.abs(lengths)
-    too_long = TOO_LONG_COST * np.maximum(size - LONG, 0.0)
-    return np.where(size <= ZERO, 0.0, ENTRY_COST + NEGATIVE_COST * (lengths < 0) + too_long)
+    too_long = _TOO_LONG_COST * np.maximum(size - _LONG, 0.0)
+    return np.where(size <= ZERO, 0.0, _ENTRY_COST + _NEGATIVE_COST * (lengths < 0) + too_long)
 
 
 def angle_costs(angles: Array) -> Array:
@@ -169,7 +169,7 @@ def angle_costs(angles: Array) -> Array:
     is_oblique = np.abs(angles - quarter * (np.pi / 2)) > ZERO
     is_straight = ~is_oblique & (np.abs(quarter) == 2)
     is_negative = (angles < 0) & ~is_straight
-    costs = ENTRY_COST + OBLIQUE_COST * is_oblique + STRAIGHT_COST * is_straight + NEGATIVE_COST * is_negative
+    costs = _ENTRY_COST + _OBLIQUE_COST * is_oblique + _STRAIGHT_COST * is_straight + _NEGATIVE_COST * is_negative
     return np.where(np.abs(angles) <= ZERO, 0.0, costs)
 
 
@@ -203,7 +203,7 @@ def tidiest_normals(axes: Axes, begin: Callable[[Normal], Choice], finish: Calla
         cost, start = begin(normal)
         row = length_costs(np.array([normal.length]))[0] + angle_costs(np.array([_alpha(axes, 0, normal)]))[0]
         paths.append(Path((normal,), cost + float(row), start))
-    count = max(6, MAX_PARTIAL_TABLES // axes.n)
+    count = max(6, _MAX_PARTIAL_TABLES // axes.n)
     paths = _cheapest(paths, count)
     for i in range(1, axes.n - 1):
         paths = _cheapest([longer for path in paths for longer in _extended(axes, i, path)], count)
@@ -228,7 +228,7 @@ def _extended(axes: Axes, i: int, path: Path) -> list[Path]:
     d = (start - previous.end) @ z
     theta = angle_about(z, previous.x, x)
     a, alpha = np.array([[normal.length, _alpha(axes, i, normal)] for normal in normals]).T
-    early = np.where(np.abs(d) > ZERO, EARLY_COST * (axes.n - i), 0.0)
+    early = np.where(np.abs(d) > ZERO, _EARLY_COST * (axes.n - i), 0.0)
     costs = length_costs(d) + early + angle_costs(theta) + length_costs(a) + angle_costs(alpha)
     return [
         Path((*path.normals, normal), path.cost + float(cost), path.start)

@@ -30,22 +30,23 @@ from dhkit.description import (
     world_to_frames,
 )
 from dhkit.description.bodies import Vector, eigenvalue_tolerance
-from dhkit.description.validation import MAX_NAME_LENGTH, RESERVED_NAME
+from dhkit.description.bounds import BOUNDS
+from dhkit.description.validation import RESERVED_NAME
 from dhkit.expressions import PI, ZERO, Expression, exact, exact_angle
 from dhkit.model.extraction.table import Table
 from dhkit.model.urdf_chain import Chain
 from dhkit.model.urdf_tree import UrdfJoint
 
-SIGNIFICANT_DIGITS = 12
+_SIGNIFICANT_DIGITS = 12
 """Significant digits of masses and inertias that are rounded; centres of mass are rounded to a tenth of a picometre."""
-ANGLE_STEP = math.pi / 12
+_ANGLE_STEP = math.pi / 12
 """15 degrees, rad: rounded angles near a multiple of it become that multiple."""
-MAX_LOCKED_COSINE = 1e-12
+_MAX_LOCKED_COSINE = 1e-12
 """Cosine of a pitch that counts as 90 degrees."""
-GRAVITY = np.array([0.0, 0.0, -9.81])
-GRAVITY_DECIMALS = 14
+_GRAVITY = np.array([0.0, 0.0, -9.81])
+_GRAVITY_DECIMALS = 14
 """Decimals of gravity: torques about nearly vertical axes are small, and must be right as well."""
-SHAPE_DECIMALS = 12
+_SHAPE_DECIMALS = 12
 """Decimals of the poses of shapes, m and rad."""
 
 
@@ -63,8 +64,8 @@ class Rounding:
         """Return an angle, rad; one within the last decimal of a multiple of 15 degrees is that multiple."""
         if self.decimals is None:
             return exact_angle(exact(float(value) + 0.0))
-        steps = round(value / ANGLE_STEP)
-        if abs(value - steps * ANGLE_STEP) <= 10.0**-self.decimals:
+        steps = round(value / _ANGLE_STEP)
+        if abs(value - steps * _ANGLE_STEP) <= 10.0**-self.decimals:
             return PI * Fraction(steps, 12)
         return exact(round(float(value), self.decimals) + 0.0)
 
@@ -77,7 +78,7 @@ class Rounding:
         """Return a pose, shape (4, 4), m, as origin and fixed-axis roll, pitch, yaw."""
         xyz, (yaw, pitch, roll) = pose_parts(T, order="ZYX")
         last_decimal = 0.0 if self.decimals is None else 10.0**-self.decimals
-        if np.hypot(T[0, 0], T[1, 0]) < max(MAX_LOCKED_COSINE, last_decimal):
+        if np.hypot(T[0, 0], T[1, 0]) < max(_MAX_LOCKED_COSINE, last_decimal):
             # At gimbal lock, rounding errors alone would decide how roll and yaw share the angle.
             roll, yaw = np.arctan2(-T[1, 2], T[1, 1]), 0.0
         r, p, y = (self.angle(float(value)) for value in (roll, pitch, yaw))
@@ -91,14 +92,14 @@ class Rounding:
         largest = float(np.abs(inertia).max())
         moments = Inertia.of_tensor(inertia)
         if self.decimals is not None and largest:
-            places = SIGNIFICANT_DIGITS - 1 - math.floor(math.log10(largest))
+            places = _SIGNIFICANT_DIGITS - 1 - math.floor(math.log10(largest))
             rounded = {key: round(float(inertia[place]), places) + 0.0 for key, place in INERTIA_PLACES.items()}
             moments = Inertia(**{key: exact(moment) for key, moment in rounded.items()})
-        weight = mass if self.decimals is None else float(f"{mass:.{SIGNIFICANT_DIGITS}g}")
+        weight = mass if self.decimals is None else float(f"{mass:.{_SIGNIFICANT_DIGITS}g}")
         lowest, _, highest = np.linalg.eigvalsh(inertia)
         # Half of the tolerance of a description: rounding changes the eigenvalue once more.
         is_impossible = lowest < -eigenvalue_tolerance(highest) / 2
-        center = Rounding(None if self.decimals is None else SIGNIFICANT_DIGITS + 1).vector(com)
+        center = Rounding(None if self.decimals is None else _SIGNIFICANT_DIGITS + 1).vector(com)
         return Body(exact(weight), center, moments, unphysical=bool(is_impossible))
 
 
@@ -139,13 +140,13 @@ class Draft:
     def _without_bodies(self, table: Table, rounding: Rounding) -> Description:
         """Return the description without bodies, shapes and tool."""
         chain = self.chain
-        gravity_rounding = UNROUNDED if rounding.decimals is None else Rounding(GRAVITY_DECIMALS)
+        gravity_rounding = UNROUNDED if rounding.decimals is None else Rounding(_GRAVITY_DECIMALS)
         joints = zip(_joint_names(chain.names), chain.joints, table.rows, strict=True)
         return Description(
             name=self.name,
             convention=self.convention,
             joints=tuple(_joint(name, joint, row, rounding) for name, joint, row in joints),
-            gravity=gravity_rounding.vector(chain.T_base_root[:3, :3] @ GRAVITY),
+            gravity=gravity_rounding.vector(chain.T_base_root[:3, :3] @ _GRAVITY),
             base=Base(rounding.placement(table.T_base_first)),
             configurations=_configurations(chain),
             drawn=not any(self.shapes),
@@ -173,7 +174,7 @@ class Draft:
         return rounding.body(mass, center, second)
 
     def _placed_shapes(self, i: int, T_base_frame: Array) -> tuple[Shape, ...]:
-        to_frame, rounding = np.linalg.inv(T_base_frame), Rounding(SHAPE_DECIMALS)
+        to_frame, rounding = np.linalg.inv(T_base_frame), Rounding(_SHAPE_DECIMALS)
         return tuple(replace(shape, placement=rounding.placement(to_frame @ T)) for shape, T in self.shapes[i])
 
 
@@ -215,7 +216,7 @@ def _joint_names(names: Sequence[str]) -> list[str]:
         stem, count = name, 1
         while name in allowed:
             count += 1
-            name = f"{stem[: MAX_NAME_LENGTH - 4]}_{count}"
+            name = f"{stem[: BOUNDS.name_characters - 4]}_{count}"
         allowed.append(name)
     return allowed
 
@@ -225,5 +226,7 @@ def allowed_name(name: str, prefix: str) -> str:
 
     A name without a letter at its beginning gets the prefix.
     """
-    plain = re.sub(r"[^A-Za-z0-9_.\-]", "_", name)[:MAX_NAME_LENGTH]
-    return plain if re.match(r"[A-Za-z_]", plain) else f"{prefix}_{plain}"[:MAX_NAME_LENGTH].rstrip("_")
+    plain = re.sub(r"[^A-Za-z0-9_.\-]", "_", name)[: BOUNDS.name_characters]
+    if re.match(r"[A-Za-z_]", plain):
+        return plain
+    return f"{prefix}_{plain}"[: BOUNDS.name_characters].rstrip("_")

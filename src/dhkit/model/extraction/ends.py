@@ -16,13 +16,13 @@ import numpy as np
 from dhkit.description import Array, Convention
 from dhkit.model.extraction.axes import ZERO, Choice, EndRow, Normal, angle_costs, length_costs
 
-OUTSIDE_COST = 5.0
+_OUTSIDE_COST = 5.0
 """Extra cost of a number of the base or the tool: a number that the table can hold is put there."""
-IN_LAST_ROW_COST = 1.0
+_IN_LAST_ROW_COST = 1.0
 """Extra cost of theta and d in a modified table's last row: they belong to the tool (Craig, 2005, section 3.4)."""
-MIN_DIVISOR = 1e-6
+_MIN_DIVISOR = 1e-6
 """Smallest component, or determinant, by which a length is divided to make a coordinate zero."""
-MAX_OFFSET = 1e3
+_MAX_OFFSET = 1e3
 """Largest offset d that is tried, in units of about the arm's size."""
 
 
@@ -41,12 +41,12 @@ def frame(x: Array, z: Array, origin: Array) -> Array:
 def screw(axis: int, angle: float, length: float) -> Array:
     """Return a rotation about, rad, and a translation along, m, the x (0) or z (2) axis, shape (4, 4)."""
     T = np.eye(4)
-    T[:3, :3] = rotations(axis, np.array([angle]))[0]
+    T[:3, :3] = _rotations(axis, np.array([angle]))[0]
     T[axis, 3] = length
     return T
 
 
-def rotations(axis: int, angles: Array) -> Array:
+def _rotations(axis: int, angles: Array) -> Array:
     """Return rotations about the x (0) or z (2) axis by angles, shape (k,), rad; shape (k, 3, 3)."""
     R = np.zeros((len(angles), 3, 3))
     i, j = (axis + 1) % 3, (axis + 2) % 3
@@ -70,7 +70,7 @@ def first_row(convention: Convention, normal: Normal, z: Array) -> Choice:
     thetas += _and_opposite(np.arctan2(-R[2, 1], R[2, 0]))  # its roll
     if convention is Convention.STANDARD:
         angles, shifts = np.array(thetas), np.array([0.0, *_zeroing_shifts(t, z)])
-        turns = angle_costs(angles) + _outside_costs(angle_costs(_roll_pitch_yaw(R @ rotations(2, -angles))))
+        turns = angle_costs(angles) + _outside_costs(angle_costs(_roll_pitch_yaw(R @ _rotations(2, -angles))))
         lengths = length_costs(shifts) + _outside_costs(length_costs(t - shifts[:, None] * z))
         k, j = int(np.argmin(turns)), int(np.argmin(lengths))
         return float(turns[k] + lengths[j]), EndRow(float(angles[k]), float(shifts[j]))
@@ -81,7 +81,7 @@ def first_row(convention: Convention, normal: Normal, z: Array) -> Choice:
 
 def _modified_starts(R: Array, t: Array, z: Array, thetas: list[float]) -> Iterator[Choice]:
     for theta in thetas:
-        R_base = R @ rotations(2, np.array([-theta]))[0]
+        R_base = R @ _rotations(2, np.array([-theta]))[0]
         roll, pitch, yaw = _roll_pitch_yaw(R_base[None])[0]
         is_about_x = abs(pitch) <= ZERO and abs(yaw) <= ZERO
         alpha = float(roll) if is_about_x else 0.0
@@ -109,7 +109,7 @@ def _modified_ends(R: Array, t: Array, with_theta: bool) -> Iterator[Choice]:
     thetas = np.array([0.0])
     if with_theta:
         thetas = np.array([0.0, *_and_opposite(np.arctan2(R[1, 0], R[0, 0])), *_quarters(np.arctan2(t[1], t[0]))])
-    back = rotations(2, -thetas)
+    back = _rotations(2, -thetas)
     turns = _in_last_row(angle_costs(thetas)) + angle_costs(_roll_pitch_yaw(back @ R)).sum(axis=-1)
     for d in (0.0, float(t[2])) if with_theta else (0.0,):
         origin = back @ t - np.array([0.0, 0.0, d])
@@ -126,14 +126,14 @@ def _standard_ends(R: Array, t: Array, with_theta: bool) -> Iterator[Choice]:
         thetas += _and_opposite(np.arctan2(R[0, 2], -R[1, 2]))  # the tool rotates about x and then z
         thetas += _and_opposite(np.arctan2(-R[0, 1], R[1, 1]))  # the tool rotates about x and then y
     for theta in thetas:
-        back = rotations(2, np.array([-theta]))[0]
+        back = _rotations(2, np.array([-theta]))[0]
         P, p = back @ R, back @ t
         angles = [0.0]
         angles += _and_opposite(np.arctan2(-P[1, 0], P[2, 0]))  # the tool's yaw is 0
         angles += _and_opposite(np.arctan2(P[2, 0], P[1, 0]))  # its pitch
         angles += _and_opposite(np.arctan2(P[2, 1], P[1, 1]))  # its roll
         alphas = np.array([*angles, *_quarters(np.arctan2(p[2], p[1]))])
-        tool_turns = _roll_pitch_yaw(rotations(0, -alphas) @ P)
+        tool_turns = _roll_pitch_yaw(_rotations(0, -alphas) @ P)
         turns = float(angle_costs(np.array([theta]))[0]) + angle_costs(alphas) + _outside_costs(angle_costs(tool_turns))
         # x is the entry a; d and the tool share y and z.
         costs = turns + float(length_costs(p[:1])[0])
@@ -141,7 +141,7 @@ def _standard_ends(R: Array, t: Array, with_theta: bool) -> Iterator[Choice]:
         with np.errstate(divide="ignore", invalid="ignore"):
             offsets = [np.zeros_like(alphas), np.full_like(alphas, p[2]), p[2] - s / c * p[1], p[2] + c / s * p[1]]
         for d in offsets if with_theta else offsets[:1]:
-            d = np.where(np.isfinite(d) & (np.abs(d) < MAX_OFFSET), d, 0.0)
+            d = np.where(np.isfinite(d) & (np.abs(d) < _MAX_OFFSET), d, 0.0)
             y, z = c * p[1] + s * (p[2] - d), -s * p[1] + c * (p[2] - d)
             total = costs + length_costs(d) + _outside_costs(length_costs(np.stack([y, z], axis=-1)))
             k = int(np.argmin(total))
@@ -177,16 +177,16 @@ def _roll_pitch_yaw(R: Array) -> Array:
 
 def _outside_costs(costs: Array) -> Array:
     """Return the costs of numbers of the base or tool, summed over the last axis."""
-    return np.asarray((costs + OUTSIDE_COST * (costs > 0)).sum(axis=-1))
+    return np.asarray((costs + _OUTSIDE_COST * (costs > 0)).sum(axis=-1))
 
 
 def _in_last_row(costs: Array) -> Array:
-    return np.asarray(costs + IN_LAST_ROW_COST * (costs > 0))
+    return np.asarray(costs + _IN_LAST_ROW_COST * (costs > 0))
 
 
 def _zeroing_shifts(t: Array, z: Array) -> list[float]:
     """Return the shifts along z that make a coordinate of t zero, m."""
-    return [float(t[k] / z[k]) for k in range(3) if abs(z[k]) > MIN_DIVISOR]
+    return [float(t[k] / z[k]) for k in range(3) if abs(z[k]) > _MIN_DIVISOR]
 
 
 def _zeroing_pairs(t: Array, x: Array, z: Array) -> list[tuple[float, float]]:
@@ -195,7 +195,7 @@ def _zeroing_pairs(t: Array, x: Array, z: Array) -> list[tuple[float, float]]:
     pairs += [(0.0, d) for d in _zeroing_shifts(t, z)] + [(a, 0.0) for a in _zeroing_shifts(t, x)]
     for rows in ([0, 1], [0, 2], [1, 2]):
         A = np.stack([x[rows], z[rows]], axis=1)
-        if abs(np.linalg.det(A)) > MIN_DIVISOR:
+        if abs(np.linalg.det(A)) > _MIN_DIVISOR:
             a, d = np.linalg.solve(A, t[rows])
             pairs.append((float(a), float(d)))
     return pairs

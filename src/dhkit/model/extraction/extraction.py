@@ -11,11 +11,13 @@ import numpy as np
 
 from dhkit.description import Array, Convention, Description, Mesh, Shape
 from dhkit.description.assets import inside
+from dhkit.description.bounds import BOUNDS as ROBOT_BOUNDS
 from dhkit.description.mesh_files import check_mesh_file
 from dhkit.description.table import DHTable
-from dhkit.description.validation import MAX_JOINTS, MAX_SHAPES, SHAPE_LEFT_OUT
+from dhkit.description.validation import SHAPE_LEFT_OUT
 from dhkit.display import html_block, html_lines, html_table, repr_line
 from dhkit.errors import DhkitError, ModelError
+from dhkit.model.bounds import BOUNDS
 from dhkit.model.extraction.axes import Axes
 from dhkit.model.extraction.draft import UNROUNDED, Draft, Rounding, allowed_name
 from dhkit.model.extraction.residual import Original, Residual
@@ -24,21 +26,19 @@ from dhkit.model.mesh_paths import MeshFinder
 from dhkit.model.urdf_chain import Chain, Side, chain_of, only_tip, read_chain
 from dhkit.model.urdf_reader import read_urdf
 
-DECIMALS = (9, 10, 11, 12, 13)
+_DECIMALS = (9, 10, 11, 12, 13)
 """Decimals that numbers are rounded to, the coarsest first."""
-MAX_ROUNDING_ERROR = 5e-10
+_MAX_ROUNDING_ERROR = 5e-10
 """Largest relative difference of M and g from the URDF after rounding: half of the error that is asked of a table."""
-MAX_TOOL_ROUNDING_ERROR = 5e-11
+_MAX_TOOL_ROUNDING_ERROR = 5e-11
 """The same for the tool's pose, m and rotation entries."""
-MAX_LISTED_MESHES = 5
+_MAX_LISTED_MESHES = 5
 """Largest number of omitted meshes that are named one by one."""
-MAX_NOTES_LENGTH = 20_000
-"""Characters of notes that a robot file holds."""
-SAME_ERROR = 1.5
+_SAME_ERROR = 1.5
 """Factor up to which the errors of two tables count as equal."""
-LENGTH_RESOLUTION = 1e-9
+_LENGTH_RESOLUTION = 1e-9
 """Lengths of a table up to this, m, count as 0 where two tables are compared; tables are written to this decimal."""
-MAX_TABLE_ERROR = 1e-6
+_MAX_TABLE_ERROR = 1e-6
 """Largest error of a table, as a share of the arm's size: axis tilts below the resolution of doubles give 3e-8."""
 
 
@@ -148,8 +148,8 @@ def extracted(
     ModelError
         The chain makes no description.
     """
-    if not 1 <= len(chain.joints) <= MAX_JOINTS:
-        raise ModelError(f"{chain.path}: {len(chain.joints)} joints; expected 1 to {MAX_JOINTS}")
+    if not 1 <= len(chain.joints) <= ROBOT_BOUNDS.joints:
+        raise ModelError(f"{chain.path}: {len(chain.joints)} joints; expected 1 to {ROBOT_BOUNDS.joints}")
     notes = [*chain.notes]
     original, changes = Original(chain), chain.tree.changes
     if not changes:
@@ -170,7 +170,7 @@ def extracted(
         lengths = np.concatenate([description.numbers.a, description.numbers.d])
         if recommendation := _smaller_as_designed(chain, convention, int(np.count_nonzero(lengths))):
             notes.append(recommendation)
-    description = replace(description, notes="\n".join(notes)[:MAX_NOTES_LENGTH])
+    description = replace(description, notes="\n".join(notes)[: BOUNDS.notes_characters])
     return Extraction(description, residual, tuple(notes), changes, decimals, turned)
 
 
@@ -188,14 +188,14 @@ def _shapes(chain: Chain, meshes: MeshFinder, notes: list[str]) -> tuple[tuple[t
     groups = []
     for group in chain.groups:
         shapes = [shape for link in group for shape in _link_shapes(chain, link, meshes, left_out, has_visuals)]
-        if len(shapes) > MAX_SHAPES:
+        if len(shapes) > ROBOT_BOUNDS.shapes:
             notes.append(
-                f"link {group[0]!r}: shape {MAX_SHAPES + 1} of {len(shapes)} and all behind it{SHAPE_LEFT_OUT}"
+                f"link {group[0]!r}: shape {ROBOT_BOUNDS.shapes + 1} of {len(shapes)} and all behind it{SHAPE_LEFT_OUT}"
             )
-        groups.append(tuple(shapes[:MAX_SHAPES]))
-    notes += left_out[:MAX_LISTED_MESHES]
-    if len(left_out) > MAX_LISTED_MESHES:
-        notes.append(f"{len(left_out) - MAX_LISTED_MESHES} more meshes, as above{SHAPE_LEFT_OUT}")
+        groups.append(tuple(shapes[: ROBOT_BOUNDS.shapes]))
+    notes += left_out[:_MAX_LISTED_MESHES]
+    if len(left_out) > _MAX_LISTED_MESHES:
+        notes.append(f"{len(left_out) - _MAX_LISTED_MESHES} more meshes, as above{SHAPE_LEFT_OUT}")
     return tuple(groups)
 
 
@@ -254,7 +254,7 @@ def _best_table(
     least = min(error for error, _, _ in candidates)
     (error, parallel_below, table), second, *_ = sorted(
         candidates,
-        key=lambda one: (one[0] > SAME_ERROR * least, _longest(one[2]) if one[0] <= SAME_ERROR * least else one[0]),
+        key=lambda one: (one[0] > _SAME_ERROR * least, _longest(one[2]) if one[0] <= _SAME_ERROR * least else one[0]),
     )
     for i, sine in nearly:
         treatment = "as parallel" if sine <= parallel_below else "with their own common normal"
@@ -276,7 +276,7 @@ def _smaller_as_designed(chain: Chain, convention: Convention, lengths: int) -> 
     if not tree.changes:
         return None
     table = tidiest_table(_axes(chain_of(tree, chain.base, chain.tip)), convention)
-    designed = int(np.count_nonzero(np.abs(table.rows[:, 1:3]) > LENGTH_RESOLUTION))
+    designed = int(np.count_nonzero(np.abs(table.rows[:, 1:3]) > _LENGTH_RESOLUTION))
     if designed >= lengths:
         return None
     return (
@@ -312,18 +312,18 @@ def _rounded(draft: Draft, table: Table, original: Original, turned: float) -> t
     unrounded = draft.description(table, UNROUNDED)
     error = original.residual(unrounded)
     # A turn about an axis that is off by an angle is off by up to twice the angle, at a lever of up to twice the size.
-    allowed = (MAX_TABLE_ERROR + 4 * turned) * max(original.size, 1.0)
+    allowed = (_MAX_TABLE_ERROR + 4 * turned) * max(original.size, 1.0)
     if not original.chain.tree.changes and error.tool > allowed:
-        raise ModelError(f"no table within {MAX_TABLE_ERROR:g} of the file: the tool differs by {error.tool:.2g}")
+        raise ModelError(f"no table within {_MAX_TABLE_ERROR:g} of the file: the tool differs by {error.tool:.2g}")
     # With changes as designed or nearly parallel axes the error may exceed the bounds; rounding may then double it.
     max_tool_error, max_error = (
         bound + (before if before > bound else 0.0)
         for bound, before in (
-            (MAX_TOOL_ROUNDING_ERROR * min(original.size, 1.0), error.tool),
-            (MAX_ROUNDING_ERROR * max(original.size, 1.0), error.largest),
+            (_MAX_TOOL_ROUNDING_ERROR * min(original.size, 1.0), error.tool),
+            (_MAX_ROUNDING_ERROR * max(original.size, 1.0), error.largest),
         )
     )
-    for decimals in DECIMALS:
+    for decimals in _DECIMALS:
         description = draft.description(table, Rounding(decimals))
         residual = original.residual(description)
         if residual.tool <= max_tool_error and residual.largest <= max_error:

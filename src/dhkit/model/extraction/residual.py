@@ -13,13 +13,13 @@ from dhkit.errors import ModelError
 from dhkit.model.reference import NoPinocchioError, PinocchioModel, pinocchio_model
 from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_model, tip_in_base
 
-STATES = 100
+_STATES = 100
 """Number of random states of a residual."""
-DEFAULT_STROKE = 1.0
+_DEFAULT_STROKE = 1.0
 """m: a prismatic joint without limits moves this far in both directions."""
-MAX_READING_DIFFERENCE = 1e-9
+_MAX_READING_DIFFERENCE = 1e-9
 """Largest difference of our reading of the file from Pinocchio's, as a share of the arm's size."""
-MIN_GRAVITY_SHARE = 1e-6
+_MIN_GRAVITY_SHARE = 1e-6
 """Errors of gravity torques are relative to this share of weight times reach at least: rounding is 1e-16 of it."""
 
 
@@ -62,7 +62,7 @@ class Original:
     Without Pinocchio (there is no wheel of it for Windows) only the tool, by a product of the URDF's own transforms.
     """
 
-    def __init__(self, chain: Chain, states: int = STATES, seed: int = 0) -> None:
+    def __init__(self, chain: Chain, states: int = _STATES, seed: int = 0) -> None:
         self.chain = chain
         self.q = _random_states(chain, states, seed)
         try:
@@ -84,7 +84,7 @@ class Original:
         """
         difference = np.abs(np.array([tip_in_base(self.chain, q) for q in self.q]) - self.tool)
         difference[:, :3, 3] /= max(self.size, 1.0)
-        if (largest := difference.max()) > MAX_READING_DIFFERENCE:
+        if (largest := difference.max()) > _MAX_READING_DIFFERENCE:
             raise ModelError(f"{self.chain.path}: Pinocchio puts the tool {largest:.2g} away from where dhkit reads it")
 
     def residual(self, description: Description) -> Residual:
@@ -98,7 +98,7 @@ class Original:
         numbers = description.numbers
         weight = float(np.nansum(numbers.mass)) * float(np.linalg.norm(numbers.gravity))
         reach = max(description.reach, float(np.abs(self.tool[:, :3, 3]).max()))
-        scales = float(np.abs(self.M).max()), max(float(np.abs(self.g).max()), MIN_GRAVITY_SHARE * weight * reach)
+        scales = float(np.abs(self.M).max()), max(float(np.abs(self.g).max()), _MIN_GRAVITY_SHARE * weight * reach)
         M_error, g_error = float(np.abs(M - self.M).max()), float(np.abs(g - self.g).max())
         return Residual(tool, M_error / (scales[0] or 1.0), g_error / (scales[1] or 1.0), len(self.q))
 
@@ -119,7 +119,7 @@ def _random_states(chain: Chain, count: int, seed: int) -> Array:
     """Return the zero state and random ones, shape (count, n), rad and m: angles of a whole turn, strokes in limits."""
     rng = np.random.default_rng(seed)
     ends = [
-        (joint.limits or (-DEFAULT_STROKE, DEFAULT_STROKE)) if joint.is_prismatic else (-np.pi, np.pi)
+        (joint.limits or (-_DEFAULT_STROKE, _DEFAULT_STROKE)) if joint.is_prismatic else (-np.pi, np.pi)
         for joint in chain.joints
     ]
     low, high = np.array(ends).T

@@ -14,9 +14,9 @@ from dhkit.description import Array, Convention
 from dhkit.model.extraction.axes import Axes, Normal, Path, angle_about, nearest_points, tidiest_normals
 from dhkit.model.extraction.ends import first_row, frame, last_row, screw
 
-MIN_SKEW_SINE = 1e-6
+_MIN_SKEW_SINE = 1e-6
 """Smallest sine of the angle between axes whose common normal may serve other axes: other normals are far away."""
-NEARLY_PARALLEL_SINES = (1e-13, 1e-5)
+_NEARLY_PARALLEL_SINES = (1e-13, 1e-5)
 """Sines of the angle between two neighbouring axes for which both tables are tried: with parallel and skew axes.
 
 With smaller sines the axes are parallel."""
@@ -58,7 +58,7 @@ def chain_axes(poses: Array, directions: Array, prismatic: list[bool], T_base_ti
     for i in range(len(poses) - 1):
         cross = np.cross(directions[i], directions[i + 1])
         sine = float(np.linalg.norm(cross))
-        if sine > MIN_SKEW_SINE:
+        if sine > _MIN_SKEW_SINE:
             feet += nearest_points(origins[i], directions[i], origins[i + 1], directions[i + 1])
             normals.append(cross / sine)
     return Axes(
@@ -75,7 +75,7 @@ def chain_axes(poses: Array, directions: Array, prismatic: list[bool], T_base_ti
 def nearly_parallel(axes: Axes) -> list[tuple[int, float]]:
     """Return the neighbouring axes that are nearly parallel: the first one's joint, from 1, and the angle's sine."""
     sines = np.linalg.norm(np.cross(axes.directions[:-1], axes.directions[1:]), axis=1)
-    low, high = NEARLY_PARALLEL_SINES
+    low, high = _NEARLY_PARALLEL_SINES
     return [(i, float(sine)) for i, sine in enumerate(sines, start=1) if low < sine < high]
 
 
@@ -103,9 +103,9 @@ def with_parallel_axes(axes: Axes, roundings: Sequence[float]) -> tuple[Axes, tu
     for i, rounding in enumerate(roundings):
         sine = float(np.linalg.norm(np.cross(axes.directions[i], axes.directions[i + 1])))
         # An axis that is parallel in the file follows one that was turned.
-        if sine <= max(rounding, NEARLY_PARALLEL_SINES[0]):
+        if sine <= max(rounding, _NEARLY_PARALLEL_SINES[0]):
             directions[i + 1] = directions[i] * np.sign(axes.directions[i] @ axes.directions[i + 1])
-            if sine > NEARLY_PARALLEL_SINES[0]:
+            if sine > _NEARLY_PARALLEL_SINES[0]:
                 made.append(MadeParallel(i + 1, math.asin(sine)))
     return replace(axes, directions=directions), tuple(made)
 

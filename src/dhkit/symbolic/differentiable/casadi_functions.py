@@ -21,7 +21,7 @@ from dhkit.symbolic.differentiable.vectors import Vector3, dot, plus
 if TYPE_CHECKING:
     import casadi
 
-PAYLOAD = {"payload_mass": 1, "payload_com": 3, "payload_inertia": 6}
+_PAYLOAD = {"payload_mass": 1, "payload_com": 3, "payload_inertia": 6}
 """Inputs of the payload layer, with their lengths."""
 
 
@@ -168,7 +168,7 @@ class CasadiFunctions:
 
     @cached_property
     def _load_symbols(self) -> dict[str, casadi.SX]:
-        return {name: joint_symbols(name, size) for name, size in PAYLOAD.items()} if self._payload else {}
+        return {name: joint_symbols(name, size) for name, size in _PAYLOAD.items()} if self._payload else {}
 
     @cached_property
     def _wrench_input(self) -> dict[str, casadi.SX]:

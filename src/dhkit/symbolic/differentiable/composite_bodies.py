@@ -14,9 +14,9 @@ from dhkit.symbolic.differentiable.vectors import ZERO_VECTOR, Scalar, Vector3, 
 if TYPE_CHECKING:
     import casadi
 
-Wrench = tuple[Vector3, Vector3]
+_Wrench = tuple[Vector3, Vector3]
 """Force, N, and moment about a joint's origin, N m."""
-Matrix3 = tuple[Vector3, Vector3, Vector3]
+_Matrix3 = tuple[Vector3, Vector3, Vector3]
 
 
 def composite_mass_matrix(table: InertialTable, q: casadi.SX) -> casadi.SX:
@@ -43,10 +43,10 @@ def composite_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX)
     frames = equation_frames(table, q)
     velocities = link_velocities(frames, qd)
     entries: list[list[Scalar]] = [[0.0] * table.n for _ in frames]
-    rates = VelocityMoments.none()
+    rates = _VelocityMoments.none()
     for j, composite in _composites(frames):
         frame, (w, v) = frames[j], velocities[j]
-        rates = rates.joined(VelocityMoments.of_link(frame.moments, w, v))
+        rates = rates.joined(_VelocityMoments.of_link(frame.moments, w, v))
         column = _column_rate(frame, composite, rates, w, v)
         for i, (force, moment) in _wrench_at_each_joint(frames, j, column):
             entries[i][j] = (force if frames[i].prismatic else moment)[2]
@@ -59,30 +59,30 @@ def composite_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX)
 
 
 @dataclass(frozen=True)
-class VelocityMoments:
+class _VelocityMoments:
     """Integrals of V and of r V^T over the mass of some links; V is velocity, r position from a joint's origin."""
 
     momentum: Vector3
     """kg m/s."""
-    G: Matrix3
+    G: _Matrix3
     """Row i, column j: the integral of r_i V_j, kg m^2/s."""
 
     @classmethod
-    def none(cls) -> VelocityMoments:
+    def none(cls) -> _VelocityMoments:
         """Return the integrals over no mass."""
         return cls(ZERO_VECTOR, (ZERO_VECTOR, ZERO_VECTOR, ZERO_VECTOR))
 
     @classmethod
-    def of_link(cls, link: Moments, w: Vector3, v: Vector3) -> VelocityMoments:
+    def of_link(cls, link: Moments, w: Vector3, v: Vector3) -> _VelocityMoments:
         """Return the integrals over a link that turns with w, rad/s, and whose origin moves with v, m/s."""
         rows = zip(link.first, link.tensor, strict=True)
         x, y, z = (plus(times(first, v), cross(w, row)) for first, row in rows)
         return cls(plus(times(link.mass, v), cross(w, link.first)), (x, y, z))
 
-    def joined(self, other: VelocityMoments) -> VelocityMoments:
+    def joined(self, other: _VelocityMoments) -> _VelocityMoments:
         """Return the sum with the integrals over other links, given about the same origin and in the same axes."""
         x, y, z = (plus(a, b) for a, b in zip(self.G, other.G, strict=True))
-        return VelocityMoments(plus(self.momentum, other.momentum), (x, y, z))
+        return _VelocityMoments(plus(self.momentum, other.momentum), (x, y, z))
 
     def couple(self, prismatic: bool) -> Vector3:
         """Return the integral of V x J_j over the mass; J_j is z x r for a revolute joint and z for a prismatic one."""
@@ -90,14 +90,14 @@ class VelocityMoments:
             return self.momentum[1], -self.momentum[0], 0.0
         return -self.G[0][2], -self.G[1][2], self.G[0][0] + self.G[1][1]
 
-    def about_previous(self, frame: EquationFrame) -> VelocityMoments:
+    def about_previous(self, frame: EquationFrame) -> _VelocityMoments:
         """Return the integrals about the previous joint's origin, in the axes of its link's equations."""
         p = frame.to_previous(self.momentum)
         half = [frame.to_previous(row) for row in self.G]
         columns = [frame.to_previous((c[0], c[1], c[2])) for c in zip(*half, strict=True)]
         rows = [(r[0], r[1], r[2]) for r in zip(*columns, strict=True)]
         x, y, z = (plus(row, times(lever, p)) for row, lever in zip(rows, frame.lever, strict=True))
-        return VelocityMoments(p, (x, y, z))
+        return _VelocityMoments(p, (x, y, z))
 
 
 def _composites(frames: list[EquationFrame]) -> Iterator[tuple[int, Moments]]:
@@ -110,7 +110,7 @@ def _composites(frames: list[EquationFrame]) -> Iterator[tuple[int, Moments]]:
         composite = composite.about_z(*frame.rotation).about_x(frame.cos_alpha, frame.sin_alpha).moved(frame.lever)
 
 
-def _unit_acceleration_wrench(frame: EquationFrame, body: Moments) -> Wrench:
+def _unit_acceleration_wrench(frame: EquationFrame, body: Moments) -> _Wrench:
     """Return the wrench on a body at rest that a unit acceleration of the joint that carries it needs."""
     x, y, _ = body.first
     if frame.prismatic:
@@ -118,7 +118,7 @@ def _unit_acceleration_wrench(frame: EquationFrame, body: Moments) -> Wrench:
     return (-y, x, 0.0), (-body.xz, -body.yz, body.xx + body.yy)
 
 
-def _column_rate(frame: EquationFrame, body: Moments, rates: VelocityMoments, w: Vector3, v: Vector3) -> Wrench:
+def _column_rate(frame: EquationFrame, body: Moments, rates: _VelocityMoments, w: Vector3, v: Vector3) -> _Wrench:
     """Return the integral, over the mass that a joint carries, of the time derivative of its Jacobian column J_j(r)."""
     axis_rate = (w[1], -w[0], 0.0)  # w x z
     if frame.prismatic:
@@ -131,7 +131,7 @@ def _column_rate(frame: EquationFrame, body: Moments, rates: VelocityMoments, w:
     return force, plus(moment, _inertia_times(body, axis_rate))
 
 
-def _row_rate(frame: EquationFrame, wrench: Wrench, couple: Vector3, w: Vector3, v: Vector3) -> Scalar:
+def _row_rate(frame: EquationFrame, wrench: _Wrench, couple: Vector3, w: Vector3, v: Vector3) -> Scalar:
     """Return the power of a wrench along the time derivative of a joint's Jacobian column."""
     force, moment = wrench
     axis_rate = (w[1], -w[0], 0.0)
@@ -150,7 +150,7 @@ def _inertia_times(body: Moments, w: Vector3) -> Vector3:
     )
 
 
-def _wrench_at_each_joint(frames: list[EquationFrame], j: int, wrench: Wrench) -> Iterator[tuple[int, Wrench]]:
+def _wrench_at_each_joint(frames: list[EquationFrame], j: int, wrench: _Wrench) -> Iterator[tuple[int, _Wrench]]:
     """Yield joint j's wrench about the origin and in the equation axes of every joint from j down to the first."""
     force, moment = wrench
     for i in reversed(range(j + 1)):

@@ -14,7 +14,7 @@ from dhkit.description import Array, Numbers
 if TYPE_CHECKING:
     import casadi
 
-NARROWEST = 1e-9
+_NARROWEST = 1e-9
 """Smallest width, rad/s or m/s: its square neither underflows nor makes the quotient overflow."""
 
 
@@ -37,8 +37,10 @@ class Friction:
 
     def __post_init__(self) -> None:
         known = isinstance(self.width, Real) and math.isfinite(self.width)
-        if not known or (self.width != 0 and self.width < NARROWEST):
-            raise ValueError(f"friction: width is {self.width!r}; expected 0, or a finite number from {NARROWEST:g} on")
+        if not known or (self.width != 0 and self.width < _NARROWEST):
+            raise ValueError(
+                f"friction: width is {self.width!r}; expected 0, or a finite number from {_NARROWEST:g} on"
+            )
 
     @classmethod
     def chosen(cls, friction: bool | Friction | None) -> Friction | None:

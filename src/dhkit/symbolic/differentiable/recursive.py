@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class AngularMotion:
+class _AngularMotion:
     """A link's angular velocity w, rad/s, and the matrix U = [wd]x + [w]x [w]x of its angular acceleration wd, rad/s^2.
 
     A point at r from the link's origin accelerates by U r relative to it. Stored are w, wd_z and the last column of U,
@@ -51,19 +51,19 @@ class AngularMotion:
         a, b, c = (row[0] * r[0] + row[1] * r[1] + row[2] * r[2] for row in self.U)
         return a, b, c
 
-    def in_twisted_axes(self, frame: EquationFrame) -> AngularMotion:
+    def in_twisted_axes(self, frame: EquationFrame) -> _AngularMotion:
         """Return the same motion in the twisted axes of the next joint."""
         c, s = frame.cos_alpha, frame.sin_alpha
         axis = self.times((0.0, -s, c))
-        return AngularMotion(frame.to_twisted(self.w), c * self.wd_z - s * self.wd_y, frame.to_twisted(axis))
+        return _AngularMotion(frame.to_twisted(self.w), c * self.wd_z - s * self.wd_y, frame.to_twisted(axis))
 
-    def with_joint_motion(self, qd: Scalar, qdd: Scalar) -> AngularMotion:
+    def with_joint_motion(self, qd: Scalar, qdd: Scalar) -> _AngularMotion:
         """Return the motion with that of a revolute joint about z added: rates rad/s and rad/s^2."""
-        return AngularMotion((self.w[0], self.w[1], self.w[2] + qd), self.wd_z + qdd, self.column)
+        return _AngularMotion((self.w[0], self.w[1], self.w[2] + qd), self.wd_z + qdd, self.column)
 
-    def in_link_axes(self, frame: EquationFrame) -> AngularMotion:
+    def in_link_axes(self, frame: EquationFrame) -> _AngularMotion:
         """Return the same motion, given in twisted axes, in the axes of the link's equations."""
-        return AngularMotion(frame.from_twisted(self.w), self.wd_z, frame.from_twisted(self.column))
+        return _AngularMotion(frame.from_twisted(self.w), self.wd_z, frame.from_twisted(self.column))
 
     def moment(self, link: Moments) -> Vector3:
         """Return the integral of r x U r over a link's mass, N m: the moment that its rotation needs."""
@@ -88,7 +88,7 @@ def recursive_inverse_dynamics(
     import casadi
 
     frames = equation_frames(table, q)
-    motion = AngularMotion((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))
+    motion = _AngularMotion((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))
     a = times(-1.0, table.gravity)  # gravity acts like an acceleration of the base upwards
     wrenches = []
     for i, frame in enumerate(frames):

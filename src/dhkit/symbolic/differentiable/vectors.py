@@ -11,7 +11,7 @@ Scalar: TypeAlias = Any
 """A float, a Fraction, or an expression (1 x 1)."""
 Vector3: TypeAlias = tuple[Scalar, Scalar, Scalar]
 
-NUMBER = (float, int)
+_NUMBER = (float, int)
 ZERO_VECTOR: Vector3 = (0.0, 0.0, 0.0)
 
 
@@ -70,7 +70,7 @@ def _rotate(c: Scalar, s: Scalar, x: Scalar, y: Scalar) -> tuple[Scalar, Scalar]
 
 def _product(a: Scalar, b: Scalar) -> Scalar:
     for x, y in ((a, b), (b, a)):
-        if isinstance(x, NUMBER):
+        if isinstance(x, _NUMBER):
             if x == 0:
                 return x
             if x == 1:
@@ -79,15 +79,15 @@ def _product(a: Scalar, b: Scalar) -> Scalar:
 
 
 def _sum(a: Scalar, b: Scalar) -> Scalar:
-    if isinstance(a, NUMBER) and a == 0:
+    if isinstance(a, _NUMBER) and a == 0:
         return b
-    return a if isinstance(b, NUMBER) and b == 0 else a + b
+    return a if isinstance(b, _NUMBER) and b == 0 else a + b
 
 
 def _difference(a: Scalar, b: Scalar) -> Scalar:
-    if isinstance(b, NUMBER) and b == 0:
+    if isinstance(b, _NUMBER) and b == 0:
         return a
-    return -b if isinstance(a, NUMBER) and a == 0 else a - b
+    return -b if isinstance(a, _NUMBER) and a == 0 else a - b
 
 
 def is_zero(x: Scalar) -> bool:

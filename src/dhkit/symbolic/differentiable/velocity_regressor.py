@@ -22,7 +22,7 @@ from dhkit.symbolic.differentiable.vectors import (
 if TYPE_CHECKING:
     import casadi
 
-UNITS: tuple[Vector3, Vector3, Vector3] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+_UNITS: tuple[Vector3, Vector3, Vector3] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def velocity_regressor(
@@ -46,10 +46,10 @@ def velocity_regressor(
     import casadi
 
     Y = casadi.SX(table.n, 10 * table.n)
-    motion = BilinearMotion(ZERO_VECTOR, ZERO_VECTOR, ZERO_VECTOR, times(-1.0, gravity))
+    motion = _BilinearMotion(ZERO_VECTOR, ZERO_VECTOR, ZERO_VECTOR, times(-1.0, gravity))
     columns: list[tuple[Vector3, Vector3]] = []
     for i in range(table.n):
-        step = FrameStep.of(table, i, q[i])
+        step = _FrameStep.of(table, i, q[i])
         motion = step.carried(motion, qd[i], qd_r[i], qdd_r[i])
         columns = [step.carried_column(column) for column in columns] + [step.own_column]
         for j, (v, w) in enumerate(columns):
@@ -58,7 +58,7 @@ def velocity_regressor(
 
 
 @dataclass(frozen=True)
-class BilinearMotion:
+class _BilinearMotion:
     """A link's angular velocities by qd and qd_r, and accelerations bilinear in both, in its DH frame's axes."""
 
     w: Vector3
@@ -83,7 +83,7 @@ class BilinearMotion:
 
         Force m a + U (m c) and moment m c x a + I wd + (w x I w_r + w_r x I w) / 2 about the frame's origin.
         """
-        first = [dot(v, self.relative_acceleration(unit)) + dot(w, cross(unit, self.a)) for unit in UNITS]
+        first = [dot(v, self.relative_acceleration(unit)) + dot(w, cross(unit, self.a)) for unit in _UNITS]
         second = []
         turned, turned_r = cross(w, self.w), cross(w, self.w_r)  # w . (w_i x I w_r) = (w x w_i) . I w_r
         for i, j in INERTIA_PLACES.values():
@@ -98,7 +98,7 @@ def _entry(i: int, j: int, a: Vector3, b: Vector3) -> Scalar:
 
 
 @dataclass(frozen=True)
-class FrameStep:
+class _FrameStep:
     """The step from one DH frame to the next, in the axes of the next."""
 
     prismatic: bool
@@ -113,7 +113,7 @@ class FrameStep:
     """Unit vector along the joint's axis."""
 
     @classmethod
-    def of(cls, table: SymbolicTable, i: int, q: Scalar) -> FrameStep:
+    def of(cls, table: SymbolicTable, i: int, q: Scalar) -> _FrameStep:
         """Return the step over joint i, counted from 0, at its position q in rad or m."""
         import casadi
 
@@ -147,16 +147,16 @@ class FrameStep:
         v, w = self.to_own_axes(column[0]), self.to_own_axes(column[1])
         return plus(v, cross(w, self.lever)), w
 
-    def carried(self, before: BilinearMotion, v: Scalar, v_r: Scalar, dv_r: Scalar) -> BilinearMotion:
+    def carried(self, before: _BilinearMotion, v: Scalar, v_r: Scalar, dv_r: Scalar) -> _BilinearMotion:
         """Return this link's motion from the previous link's, the joint's rates v, v_r and acceleration dv_r."""
-        motion = BilinearMotion(*(self.to_own_axes(x) for x in (before.w, before.w_r, before.wd, before.a)))
+        motion = _BilinearMotion(*(self.to_own_axes(x) for x in (before.w, before.w_r, before.wd, before.a)))
         # v w_r x z + v_r w x z: twice the bilinear form of v w x z.
         turning = plus(times(v, cross(motion.w_r, self.axis)), times(v_r, cross(motion.w, self.axis)))
         driven = times(dv_r, self.axis)
         if self.prismatic:
             a = plus(plus(motion.a, motion.relative_acceleration(self.lever)), plus(turning, driven))
-            return BilinearMotion(motion.w, motion.w_r, motion.wd, a)
-        after = BilinearMotion(
+            return _BilinearMotion(motion.w, motion.w_r, motion.wd, a)
+        after = _BilinearMotion(
             plus(motion.w, times(v, self.axis)),
             plus(motion.w_r, times(v_r, self.axis)),
             plus(motion.wd, plus(times(0.5, turning), driven)),
@@ -164,4 +164,4 @@ class FrameStep:
         )
         # The lever turns with this link in the standard convention, with the link before in the modified one.
         swung = (after if self.standard else motion).relative_acceleration(self.lever)
-        return BilinearMotion(after.w, after.w_r, after.wd, plus(after.a, swung))
+        return _BilinearMotion(after.w, after.w_r, after.wd, plus(after.a, swung))

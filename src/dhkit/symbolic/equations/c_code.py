@@ -15,13 +15,13 @@ from dhkit.symbolic.kinematics import SymbolicKinematics
 from dhkit.symbolic.languages.layout import comment_block
 from dhkit.symbolic.languages.printing import C, c_lines
 
-C_ROOT = """/* The square root; 0 for a number that is negative by rounding. */
+_C_ROOT = """/* The square root; 0 for a number that is negative by rounding. */
 static double root(double square)
 {
     return square > 0.0 ? sqrt(square) : 0.0;
 }
 """
-C_POSE = """/* Whether T is a pose: finite, with columns of length 1 at right angles, to 1e-6. */
+_C_POSE = """/* Whether T is a pose: finite, with columns of length 1 at right angles, to 1e-6. */
 static int is_pose(const double T[16])
 {
     for (int i = 0; i < 3; i++) {
@@ -114,8 +114,8 @@ def inverse_c(derivation: InverseDerivation) -> dict[str, str]:
         "/* An angle turned into (-pi, pi]. */",
         "static double wrap(double angle)\n{",
         f"    return angle - 2.0*{C.pi}*ceil((angle - {C.pi})/(2.0*{C.pi}));\n}}\n",
-        *([C_ROOT] if program.has_roots else []),
-        C_POSE,
+        *([_C_ROOT] if program.has_roots else []),
+        _C_POSE,
         f"{signature}\n{{",
         *(f"    const double {name} = T[{4 * i + j}];" for name, i, j in program.pose),
         "    int found = 0;",

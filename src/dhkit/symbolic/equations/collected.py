@@ -18,7 +18,7 @@ from dhkit.symbolic.ring import Element, Generator, Ring
 Powers: TypeAlias = tuple[tuple[int, int], ...]
 """Indices of generators in the ring, with exponents, in the order in which a product is written."""
 
-INERTIAL = re.compile(r"[mIJ]|(XX|YY|ZZ|XY|YZ|XZ|MX|MY|MZ|r[xyz])\d")
+_INERTIAL = re.compile(r"[mIJ]|(XX|YY|ZZ|XY|YZ|XZ|MX|MY|MZ|r[xyz])\d")
 """Names that are written first in a product: masses, inertias and first moments. They decide only about the order."""
 
 
@@ -118,7 +118,7 @@ def _order(ring: Ring) -> _Order:
         g = ring.generators[place]
         if g.kind == "constant":
             derived = g.meaning is not None and g.meaning.text not in g.meaning.symbols
-            return (2 if derived else 0 if INERTIAL.match(g.text) else 1), (), place
+            return (2 if derived else 0 if _INERTIAL.match(g.text) else 1), (), place
         if g.kind in ("sine", "cosine"):
             return 4, g.joints, int(g.kind == "sine")
         return {"position": 3, "acceleration": 5, "rate": 6}[g.kind], (g.joint,), place

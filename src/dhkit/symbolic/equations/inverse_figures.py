@@ -14,21 +14,21 @@ from dhkit.symbolic.inverse.derivation import InverseDerivation, Values
 from dhkit.symbolic.inverse.forms import Circle, Form
 from dhkit.symbolic.inverse.steps import Step, View
 
-WIDTH, HEIGHT, MARGIN = 340, 250, 46
+_WIDTH, _HEIGHT, _MARGIN = 340, 250, 46
 """Of a figure, in pixels."""
-FIRST, SECOND, PLAIN, FAINT = "#0b5cad", "#c2570c", "#1b1f24", "#8c959f"
+_FIRST, _SECOND, _PLAIN, _FAINT = "#0b5cad", "#c2570c", "#1b1f24", "#8c959f"
 """Colours of the two solutions, of points, and of helping lines."""
-LETTER = 6.8
+_LETTER = 6.8
 """Mean width of a letter, in pixels."""
-SHORT = 1e-9
+_SHORT = 1e-9
 """Share of the figure's size below which a length is not drawn."""
 
 
-Pixel: TypeAlias = tuple[float, float]
+_Pixel: TypeAlias = tuple[float, float]
 
 
 @dataclass
-class Drawing:
+class _Drawing:
     """Lines, circles and labels in the arm's metres."""
 
     points: list[Array] = field(default_factory=list)
@@ -39,7 +39,7 @@ class Drawing:
         self.points += [a, b]
         self.items.append(("line", (a, b), colour, style))
 
-    def dot(self, at: Array, label: str, colour: str = PLAIN) -> None:
+    def dot(self, at: Array, label: str, colour: str = _PLAIN) -> None:
         """Add a point with its name."""
         self.points.append(at)
         self.items.append(("dot", (at,), colour, label))
@@ -55,23 +55,23 @@ class Drawing:
     def circle(self, centre: Array, radius: float) -> None:
         """Add a dashed circle."""
         self.points += [centre - radius, centre + radius]
-        self.items.append(("circle", (centre, np.array([radius, 0.0])), FAINT, ""))
+        self.items.append(("circle", (centre, np.array([radius, 0.0])), _FAINT, ""))
 
     def svg(self, title: str) -> str:
         """Return the picture."""
         low, high = np.min(self.points, axis=0), np.max(self.points, axis=0)
         size = np.maximum(high - low, max(float((high - low).max()), 1e-9) * 0.05)
-        scale = float(min((WIDTH - 2 * MARGIN) / size[0], (HEIGHT - 2 * MARGIN) / size[1]))
+        scale = float(min((_WIDTH - 2 * _MARGIN) / size[0], (_HEIGHT - 2 * _MARGIN) / size[1]))
         middle = (low + high) / 2
 
         def at(point: Array) -> tuple[float, float]:
             x, y = (point - middle) * scale
-            return round(WIDTH / 2 + x, 1), round(HEIGHT / 2 - y, 1)
+            return round(_WIDTH / 2 + x, 1), round(_HEIGHT / 2 - y, 1)
 
         lines = [[at(point) for point in points] for kind, points, *_ in self.items if kind == "line"]
         texts = []
         parts = [
-            f'<svg class="figure" role="img" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" '
+            f'<svg class="figure" role="img" viewBox="0 0 {_WIDTH} {_HEIGHT}" width="{_WIDTH}" height="{_HEIGHT}" '
             f'xmlns="http://www.w3.org/2000/svg"><title>{escape(title)}</title>'
         ]
         for kind, points, colour, text in self.items:
@@ -145,18 +145,18 @@ def _letters(form: Form, values: Values) -> dict[str, float]:
     return {letter: float(np.ravel(values.of(element))[0]) for letter, element in form.letters.items()}
 
 
-def _top(derivation: InverseDerivation, step: Step, form: Form, values: Values) -> Drawing:
-    drawing, letters, origin = Drawing(), _letters(form, values), np.zeros(2)
+def _top(derivation: InverseDerivation, step: Step, form: Form, values: Values) -> _Drawing:
+    drawing, letters, origin = _Drawing(), _letters(form, values), np.zeros(2)
     axis, who = _labels(step)
     is_beside = isinstance(form, Circle)
     point = np.array([letters["B"], -letters["A"]] if is_beside else [letters["X"], letters["Y"]])
     beside = abs(letters["C"]) if is_beside else 0.0
     for (angle, name, _), sign, colour in zip(
-        _named_roots(step, form, values), (1.0, -1.0), (FIRST, SECOND), strict=True
+        _named_roots(step, form, values), (1.0, -1.0), (_FIRST, _SECOND), strict=True
     ):
         ahead = np.array([np.cos(angle), np.sin(angle)])
         foot = point - (point @ ahead) * ahead
-        if beside > SHORT * float(np.linalg.norm(point)):
+        if beside > _SHORT * float(np.linalg.norm(point)):
             drawing.line(origin, foot, colour, "dashed")
             drawing.line(foot, point, colour)
         elif sign > 0:
@@ -179,8 +179,8 @@ def _place(derivation: InverseDerivation, values: Values) -> Array:
     return np.array([float(np.ravel(values.of(derivation.chain.symbol(name)))[0]) for name in "xy"])
 
 
-def _triangle(derivation: InverseDerivation, step: Step, form: Form, values: Values) -> Drawing:
-    drawing, letters, origin = Drawing(), _letters(form, values), np.zeros(2)
+def _triangle(derivation: InverseDerivation, step: Step, form: Form, values: Values) -> _Drawing:
+    drawing, letters, origin = _Drawing(), _letters(form, values), np.zeros(2)
     point = _place(derivation, values)
     R, N = float(np.linalg.norm(point)), float(np.hypot(letters["A"], letters["B"]))
     L1 = float(np.hypot(*(np.ravel(values.of(element))[0] for element in (step.figure.first if step.figure else ()))))
@@ -193,31 +193,31 @@ def _triangle(derivation: InverseDerivation, step: Step, form: Form, values: Val
     if "up" in elbows and "down" in elbows and elbows["up"][1] < elbows["down"][1]:
         # The plane's y axis points down: the figure is seen from the other side of y.
         point, elbows = point * [1, -1], {name: elbow * [1, -1] for name, elbow in elbows.items()}
-    for (name, elbow), colour in zip(elbows.items(), (FIRST, SECOND), strict=True):
+    for (name, elbow), colour in zip(elbows.items(), (_FIRST, _SECOND), strict=True):
         drawing.line(origin, elbow, colour)
         drawing.line(elbow, point, colour)
         drawing.dot(elbow, f"{second_axis}, {name}", colour)
-    drawing.line(origin, point, FAINT, "dashed")
-    drawing.label(origin, point, "sqrt(x^2 + y^2)", FAINT)
+    drawing.line(origin, point, _FAINT, "dashed")
+    drawing.label(origin, point, "sqrt(x^2 + y^2)", _FAINT)
     drawing.dot(origin, first_axis)
     drawing.dot(point, who)
     return drawing
 
 
-def _slide(derivation: InverseDerivation, step: Step, form: Form, values: Values) -> Drawing:
-    drawing, letters, origin = Drawing(), _letters(form, values), np.zeros(2)
+def _slide(derivation: InverseDerivation, step: Step, form: Form, values: Values) -> _Drawing:
+    drawing, letters, origin = _Drawing(), _letters(form, values), np.zeros(2)
     point = _place(derivation, values)
     R, near = float(np.linalg.norm(point)), float(np.sqrt(max(letters["Q"] - letters["S"], 0.0)))
     axis, who = _labels(step)
-    if near > SHORT * R:
-        for sign, colour in ((1.0, FIRST), (-1.0, SECOND)):
+    if near > _SHORT * R:
+        for sign, colour in ((1.0, _FIRST), (-1.0, _SECOND)):
             foot = _turned(point, sign * np.arccos(near / R)) * near / R
             drawing.line(origin, foot, colour, "dashed")
             drawing.line(foot, point, colour)
-        drawing.line(origin, point, FAINT, "dashed")
+        drawing.line(origin, point, _FAINT, "dashed")
     else:
-        drawing.line(origin, point, FIRST)
-    drawing.label(origin, point, "sqrt(x^2 + y^2)", FAINT)
+        drawing.line(origin, point, _FIRST)
+    drawing.label(origin, point, "sqrt(x^2 + y^2)", _FAINT)
     drawing.dot(origin, axis)
     drawing.dot(point, who)
     return drawing
@@ -228,18 +228,18 @@ def _turned(vector: Array, angle: float) -> Array:
     return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]])
 
 
-def _text(at: Pixel, text: str, colour: str, lines: Sequence[Sequence[Pixel]]) -> str:
+def _text(at: _Pixel, text: str, colour: str, lines: Sequence[Sequence[_Pixel]]) -> str:
     """Return a text above or below a point, where fewer of its lines lead, inside the figure."""
     x, y = at
     others = [other for a, b in lines for here, other in ((a, b), (b, a)) if here == at]
     downwards = sum((v - y) / max(float(np.hypot(u - x, v - y)), 1.0) for u, v in others)
-    half = LETTER * len(text) / 2
-    x = min(max(x, half), WIDTH - half)
+    half = _LETTER * len(text) / 2
+    x = min(max(x, half), _WIDTH - half)
     y += -10 if downwards > 0 else 18
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="middle" fill="{colour}">{escape(text)}</text>'
 
 
-def _beside(a: Pixel, b: Pixel, text: str, colour: str) -> str:
+def _beside(a: _Pixel, b: _Pixel, text: str, colour: str) -> str:
     """Return a text beside the middle of a line, on its right where it rises and on its left where it falls."""
     (x1, y1), (x2, y2) = a, b
     x, y = (x1 + x2) / 2, (y1 + y2) / 2

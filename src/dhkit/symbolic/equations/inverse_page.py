@@ -14,7 +14,7 @@ from dhkit.symbolic.equations.inverse_writing import Phrases, solved_before
 from dhkit.symbolic.inverse.derivation import InverseDerivation
 from dhkit.symbolic.inverse.steps import Step
 
-STYLE = """<style>
+_STYLE = """<style>
 .ik-step { display: flow-root; }
 .ik-step svg.figure { float: right; max-width: 100%; height: auto; margin: 0 0 .5rem 1.5rem; }
 svg.figure text { font: 13px sans-serif; paint-order: stroke; stroke: #fff; stroke-width: 4px; }
@@ -22,7 +22,7 @@ svg.figure text { font: 13px sans-serif; paint-order: stroke; stroke: #fff; stro
 .ik-step .display { padding-top: .25rem; padding-bottom: .25rem; } .ik-step p { margin: .35rem 0; }
 .ik-known { color: #57606a; }
 </style>"""
-ANGLE = re.compile(r"\b(theta)(\d+)\b|\bphi\b")
+_ANGLE = re.compile(r"\b(theta)(\d+)\b|\bphi\b")
 
 
 def inverse_page(derivation: InverseDerivation) -> str:
@@ -42,7 +42,7 @@ def _body(derivation: InverseDerivation) -> str:
     """Return a derivation as HTML to stand inside a page or a notebook."""
     write, T = Phrases(derivation, latex=True), sample_pose(derivation)
     first, given, angles = introduction(derivation)
-    parts = [STYLE, f"<p>{escape(first)} {escape(given or GIVEN)}</p>", f"<p>{_words(angles)}</p>"]
+    parts = [_STYLE, f"<p>{escape(first)} {escape(given or GIVEN)}</p>", f"<p>{_words(angles)}</p>"]
     for number, step in enumerate(derivation.steps, start=1):
         title = _words(step.unknown.name if step.unknown else step.title)
         parts.append(f'<section class="ik-step"><h2>{number}. {title}</h2>')
@@ -101,7 +101,7 @@ def _inline(latex: str) -> str:
 def _words(text: str) -> str:
     """Return words with the names of angles as MathML."""
     parts, at = [], 0
-    for match in ANGLE.finditer(text):
+    for match in _ANGLE.finditer(text):
         parts += [escape(text[at : match.start()]), _inline(rf"\theta_{{{match[2]}}}" if match[1] else r"\varphi")]
         at = match.end()
     return "".join([*parts, escape(text[at:])])

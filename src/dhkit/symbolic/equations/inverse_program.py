@@ -20,8 +20,8 @@ from dhkit.symbolic.languages.syntax import Syntax
 from dhkit.symbolic.ring import Element, Generator
 from dhkit.symbolic.ring.notation import constants_of, generators_of, symbols_of
 
-LETTER = re.compile(r"\b[A-Zk]\b")
-LOCAL = frozenset(["T", "q", "b", "k", "status", "wrap", "root", "branches", "found", "nargin", "true", "false"])
+_LETTER = re.compile(r"\b[A-Zk]\b")
+_LOCAL = frozenset(["T", "q", "b", "k", "status", "wrap", "root", "branches", "found", "nargin", "true", "false"])
 """Names that the code around the statements uses."""
 
 
@@ -81,37 +81,37 @@ ABOUT = (
 """What the generated functions' comments say."""
 
 
-class CodeWriter:
+class _CodeWriter:
     """Writes expressions with ``+ - * /`` and calls, which all languages share."""
 
     def __init__(self, syntax: Syntax, names: dict[str, str]) -> None:
         self._syntax, self._names = syntax, names
 
-    def symbol(self, name: str) -> str:  # noqa: D102 - see Writer
+    def symbol(self, name: str) -> str:
         return self._names[name]
 
-    def variable(self, generator: Generator) -> str:  # noqa: D102
+    def variable(self, generator: Generator) -> str:
         return generator.text
 
-    def pi(self) -> str:  # noqa: D102
+    def pi(self) -> str:
         return self._syntax.pi
 
-    def call(self, function: str, arguments: Sequence[str]) -> str:  # noqa: D102
+    def call(self, function: str, arguments: Sequence[str]) -> str:
         return self._syntax.call(function, arguments)
 
-    def power(self, base: str, exponent: int) -> str:  # noqa: D102
+    def power(self, base: str, exponent: int) -> str:
         return "*".join([base] * exponent)
 
-    def brackets(self, inner: str) -> str:  # noqa: D102
+    def brackets(self, inner: str) -> str:
         return f"({inner})"
 
-    def product(self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]) -> str:  # noqa: D102
+    def product(self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]) -> str:
         exact = Fraction(float(coefficient)) == coefficient
         number = repr(float(coefficient)) if exact else f"({coefficient.numerator}.0/{coefficient.denominator}.0)"
         factors = [*([number] if coefficient != 1 or not numerator else []), *numerator]
         return "*".join(factors) + "".join(f"/{divisor}" for divisor in denominator)
 
-    def total(self, terms: Sequence[tuple[bool, str]]) -> str:  # noqa: D102
+    def total(self, terms: Sequence[tuple[bool, str]]) -> str:
         signed = "".join(f" {'-' if negative else '+'} {term}" for negative, term in terms)
         return f"-{signed[3:]}" if signed.startswith(" - ") else signed[3:]
 
@@ -127,7 +127,7 @@ class _Statements:
         elements = self._elements()
         ring = self.chain.ring
         variables = {g.text for g in ring.generators if g.kind != "constant"}
-        taken = {*RESERVED, *LOCAL, *variables, *(f"theta{i + 1}" for i in range(derivation.n)), "phi"}
+        taken = {*RESERVED, *_LOCAL, *variables, *(f"theta{i + 1}" for i in range(derivation.n)), "phi"}
         taken |= {f"root{k + 1}" for k in range(derivation.n)}
         self.names: dict[str, str] = {}
         for name in sorted(symbols_of(constants_of(generators_of(elements)))):
@@ -136,7 +136,7 @@ class _Statements:
                 own += "_"
             self.names[name] = own
         self.used = {g.text for g in generators_of(elements)}
-        self.printer: Printer[str] = Printer(ring.generators, CodeWriter(syntax, self.names))
+        self.printer: Printer[str] = Printer(ring.generators, _CodeWriter(syntax, self.names))
         self.root = 0
 
     def program(self) -> InverseProgram:
@@ -210,7 +210,7 @@ class _Statements:
                 yield Let(letters[letter], text)
 
         def in_letters(text: str) -> str:
-            return LETTER.sub(lambda match: letters[match[0]], text)
+            return _LETTER.sub(lambda match: letters[match[0]], text)
 
         if "D" in words:
             yield Let(f"D_{name}", in_letters(words["D"]))
@@ -238,7 +238,7 @@ class _Statements:
         """Return the letters that the code of a form contains."""
         words = self._words(form)
         texts = [*words.values(), *(self._filled(text, words) for text in form.guard)]
-        return sorted({letter for text in texts for letter in LETTER.findall(text)} & set(form.letters))
+        return sorted({letter for text in texts for letter in _LETTER.findall(text)} & set(form.letters))
 
     @staticmethod
     def _placeholders(form: Form) -> list[str]:

@@ -15,7 +15,7 @@ from dhkit.symbolic.inverse.steps import Choice, Step
 GIVEN = "Given is the pose T of the tool in the world: its position px, py, pz and its rotation r11 ... r33."
 
 
-LONGEST_LINE = 200
+_LONGEST_LINE = 200
 """Largest length of an equation in a notebook's table, in characters."""
 
 
@@ -53,7 +53,7 @@ def inverse_table(derivation: InverseDerivation) -> str:
         for k, (solved, line) in enumerate(lines):
             rows.append([_title(write, step) if k == 0 else "", line, solved])
     caption = f"{derivation.description.name}: joint by joint"
-    return html_table(("what is found", "equations", "solution"), rows, caption, most=len(rows), longest=LONGEST_LINE)
+    return html_table(("what is found", "equations", "solution"), rows, caption, most=len(rows), longest=_LONGEST_LINE)
 
 
 def introduction(derivation: InverseDerivation) -> list[str]:

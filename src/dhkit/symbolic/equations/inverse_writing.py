@@ -17,10 +17,10 @@ from dhkit.symbolic.inverse.steps import Choice, Step
 from dhkit.symbolic.ring import Element
 from dhkit.symbolic.ring.notation import Notation, notation, symbols_of
 
-INLINE = 70
+_INLINE = 70
 """Longest text of what stands in a solution in place of its letters; longer ones are listed behind it."""
 PLACEHOLDER = re.compile(r"<(\w+)>")
-ANGLE = re.compile(r"\b(theta|phi)(\d*)\b")
+_ANGLE = re.compile(r"\b(theta|phi)(\d*)\b")
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Phrases:
         """Return a text with theta1, phi and q1 in this notation."""
         if not self.is_latex:
             return text
-        text = ANGLE.sub(lambda m: r"\varphi" if m[1] == "phi" else rf"\theta_{{{m[2]}}}", text)
+        text = _ANGLE.sub(lambda m: r"\varphi" if m[1] == "phi" else rf"\theta_{{{m[2]}}}", text)
         return re.sub(r"\bq(\d+)\b", r"q_{\1}", text)
 
     def equations(self, step: Step) -> list[tuple[str, str]]:
@@ -113,7 +113,7 @@ class Phrases:
         derived = form.derived
         inline = {k: derived[k][1] if k in derived else form.letters[k] for k in used}
         texts = {k: self.element(element) for k, element in inline.items()}
-        if sum(map(len, texts.values())) <= INLINE * (2 if self.is_latex else 1):
+        if sum(map(len, texts.values())) <= _INLINE * (2 if self.is_latex else 1):
             written = [_filled(template, texts).removeprefix("0 ") for template in templates]
             return Solution(name, tuple(written), ())
         zero = {k for k, element in form.letters.items() if element.is_zero}

@@ -11,7 +11,6 @@ from itertools import pairwise
 from dhkit.symbolic.equations.collected import collected
 from dhkit.symbolic.equations.latex_document import escaped
 from dhkit.symbolic.equations.latex_names import latex_names
-from dhkit.symbolic.equations.latex_width import latex_width
 from dhkit.symbolic.equations.quantities import Quantity, check_length
 from dhkit.symbolic.equations.writing import Printer, readable_decimal
 from dhkit.symbolic.ring import Element, Generator, Ring
@@ -26,16 +25,20 @@ from dhkit.symbolic.ring.notation import (
     variables,
 )
 
-LINE = 29.5
-"""Width of a line of an article, em, minus a margin for errors of the estimated widths."""
-INDENT = r"\qquad "
-BREAK = "\n"
+_LINE = 62
+"""Symbols of a line: one is 0.4 to 0.5 em wide, and a line of an article in 11 points is 32.8 em."""
+_SYMBOLS_PER_EM = 2
+_FRACTION = re.compile(r"\\t?frac\{((?:[^{}]|\{[^{}]*\})*)\}\{((?:[^{}]|\{[^{}]*\})*)\}")
+_INVISIBLE = re.compile(r"\\(?:d?dot|[bB]ig[lr]|left|right|mathrm|mathit|sqrt|,|(?=(?:arc)?(?:sin|cos|tan)))")
+"""Commands that print nothing beside other symbols; of a function's name, the backslash."""
+_INDENT = r"\qquad "
+_BREAK = "\n"
 """Marks a place in front of a sign where a line may be broken; doubled outside of brackets."""
 FUNCTIONS = {"asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan", "atan2": r"\mathrm{atan2}"}
-ZEROS = 6
+_ZEROS = 6
 """Names per line in the list of entries that are zero."""
-HEADS = {"tau": r"\tau"}
-WHOLE = {"T": "T(q)", "J": "J(q)", "M": "M(q)", "C": r"C(q,\dot{q})", "h": r"h(q,\dot{q})", "g": "g(q)"}
+_HEADS = {"tau": r"\tau"}
+_WHOLE = {"T": "T(q)", "J": "J(q)", "M": "M(q)", "C": r"C(q,\dot{q})", "h": r"h(q,\dot{q})", "g": "g(q)"}
 """Matrices and vectors with their arguments, which also distinguish the vector g from the constant."""
 
 
@@ -56,7 +59,7 @@ class LatexWriter:
         return r"\pi"
 
     def call(self, function: str, arguments: Sequence[str]) -> str:  # noqa: D102
-        inner = ", ".join(arguments).replace(BREAK, "")
+        inner = ", ".join(arguments).replace(_BREAK, "")
         if function == "sqrt":
             return rf"\sqrt{{{inner}}}"
         if function == "abs":
@@ -80,13 +83,13 @@ class LatexWriter:
             divisor = _without_brackets(denominator[0]) if len(denominator) == 1 else " ".join(denominator)
             dividend = factors.pop(0) if factors else number
             number = "" if dividend == number else number
-            factors[:0] = [rf"\frac{{{_without_brackets(dividend)}}}{{{divisor}}}".replace(BREAK, "")]
+            factors[:0] = [rf"\frac{{{_without_brackets(dividend)}}}{{{divisor}}}".replace(_BREAK, "")]
         if number and (number != "1" or not factors):
             factors[:0] = [number + r"\,"] if decimal and factors else [number]
         return _spaced(factors)
 
     def total(self, terms: Sequence[tuple[bool, str]]) -> str:  # noqa: D102
-        signed = BREAK.join(f" {'-' if negative else '+'} {term}" for negative, term in terms)
+        signed = _BREAK.join(f" {'-' if negative else '+'} {term}" for negative, term in terms)
         return f"-{signed[3:]}" if signed.startswith(" - ") else signed[3:]
 
 
@@ -107,12 +110,12 @@ def latex_text(element: Element) -> str:
     >>> print(latex_text(lagrangian(library_robot("planar2r")).M[1, 1]))
     \tfrac{1}{3} m_{2} l_{2}^{2}
     """
-    return _marked(element).replace(BREAK, "")
+    return _marked(element).replace(_BREAK, "")
 
 
 def latex_lines(element: Element, room: float) -> list[str]:
-    """Return an element in LaTeX as lines of at most ``room`` em, broken in front of terms."""
-    return _lines(_marked(element), room)
+    """Return an element in LaTeX as lines of about ``room`` em at most, broken in front of terms."""
+    return _lines(_marked(element), int(_SYMBOLS_PER_EM * room))
 
 
 def displays(quantities: Sequence[Quantity]) -> list[str]:
@@ -163,11 +166,12 @@ def _matrix(quantity: Quantity) -> str:
     if sum(len(element) for element in table.flat) > 40 * table.shape[1]:
         return ""
     rows = [[latex_text(element) for element in row] for row in table]
-    widths = [max(latex_width(row[k]) for row in rows) for k in range(table.shape[1])]
-    if sum(widths) + len(widths) + 6 > LINE:
+    head = _WHOLE.get(quantity.name) or _HEADS.get(quantity.name) or _head(quantity.name)
+    widths = [max(_symbols(row[k]) for row in rows) for k in range(table.shape[1])]
+    gaps = _SYMBOLS_PER_EM * (len(widths) + 1)  # an em between columns, and for each bracket
+    if _symbols(f"{head} =") + sum(widths) + gaps > _LINE:
         return ""
     body = " \\\\\n".join(" & ".join(row) for row in rows)
-    head = WHOLE.get(quantity.name) or HEADS.get(quantity.name) or _head(quantity.name)
     return f"\\begin{{equation*}}\n{head} = \\begin{{pmatrix}}\n{body}\n\\end{{pmatrix}}\n\\end{{equation*}}"
 
 
@@ -175,15 +179,15 @@ def _entries(quantity: Quantity) -> str:
     """Return the entries one after another, broken over lines."""
     lines: list[str] = []
     entries = [(" = ".join(_head(name) for name in names), element) for names, element in quantity.entries]
-    room = LINE - max((latex_width(head) for head, _ in entries), default=0.0) - 1.5
+    room = _LINE - max((_symbols(f"{head} =") for head, _ in entries), default=0)
     for head, element in entries:
         first, *more = _lines(_marked(element), room)
-        lines += [f"{head} &= {first}", *(f"&{INDENT}{line}" for line in more)]
+        lines += [f"{head} &= {first}", *(f"&{_INDENT}{line}" for line in more)]
     zeros = [_head(name) for name in quantity.zeros]
     if len(zeros) == 1:
         lines.append(f"{zeros[0]} &= 0")
     else:
-        rows = [" = ".join(zeros[k : k + ZEROS]) for k in range(0, len(zeros), ZEROS)]
+        rows = [" = ".join(zeros[k : k + _ZEROS]) for k in range(0, len(zeros), _ZEROS)]
         lines += ["&" + row + " = 0" for row in rows]
     body = " \\\\\n".join(lines)
     return f"\\begin{{align*}}\n{body}\n\\end{{align*}}"
@@ -193,24 +197,34 @@ def _head(name: str) -> str:
     if link := re.fullmatch(r"A(\d+)_(\d+)", name):
         return rf"(A_{{{link[1]}}})_{{{link[2]}}}"
     letters, number = re.fullmatch(r"([A-Za-z]+)([\d_]*)", name).groups()  # type: ignore[union-attr]
-    head = HEADS.get(letters, letters if len(letters) == 1 else rf"\mathit{{{letters}}}")
+    head = _HEADS.get(letters, letters if len(letters) == 1 else rf"\mathit{{{letters}}}")
     return head + (f"_{{{number.replace('_', ',')}}}" if number else "")
 
 
-def _lines(marked: str, room: float) -> list[str]:
+def _symbols(latex: str) -> int:
+    """Count the symbols side by side: a sign counts for three with its space, a fraction as its longer part."""
+    latex = _FRACTION.sub(lambda match: max(match.groups(), key=_symbols), latex)
+    latex = latex.replace(r"\qquad", "xxxx")
+    latex = _INVISIBLE.sub("", latex)
+    latex = re.sub(r"\\(?:[A-Za-z]+|.)", "x", latex)
+    latex = re.sub(r"[\s{}_^]", "", latex)
+    return len(latex) + 2 * len(re.findall(r"[-+=]", latex))
+
+
+def _lines(marked: str, room: int) -> list[str]:
     """Break a sum in front of terms, and inside those that are longer than a line."""
     lines, line = [], ""
     for term in _terms(marked):
-        whole = term.replace(BREAK, "")
-        if not line or latex_width(line + whole) <= room:
-            pieces = [whole] if latex_width(line + whole) <= room else term.split(BREAK)
-        elif latex_width(whole) <= room:
+        whole = term.replace(_BREAK, "")
+        if not line or _symbols(line + whole) <= room:
+            pieces = [whole] if _symbols(line + whole) <= room else term.split(_BREAK)
+        elif _symbols(whole) <= room:
             lines.append(line)
             line, pieces = "", [whole]
         else:
-            pieces = term.split(BREAK)
+            pieces = term.split(_BREAK)
         for piece in pieces:
-            if line and latex_width(line + piece) > room:
+            if line and _symbols(line + piece) > room:
                 lines.append(line)
                 line = ""
             line += piece
@@ -220,11 +234,11 @@ def _lines(marked: str, room: float) -> list[str]:
 def _terms(marked: str) -> list[str]:
     """Split a sum in front of the signs outside of brackets; breaks inside stay marked."""
     terms, depth = [], 0
-    for piece in marked.split(BREAK):
+    for piece in marked.split(_BREAK):
         if depth == 0:
             terms.append(piece)
         else:
-            terms[-1] += BREAK + piece
+            terms[-1] += _BREAK + piece
         depth += piece.count("(") - piece.count(")")
     return terms
 
@@ -239,8 +253,8 @@ def _where(angles: Sequence[Angle]) -> str:
     ]
     lines: list[str] = []
     for definition in own + sums:
-        if lines and latex_width(f"{lines[-1]},{INDENT}{definition}") <= LINE:
-            lines[-1] += f",{INDENT}{definition}"
+        if lines and _symbols(f"{lines[-1]},{_INDENT}{definition}") <= _LINE:
+            lines[-1] += f",{_INDENT}{definition}"
         else:
             lines.append(f"&{definition}")
     return "\\begin{align*}\n" + ", \\\\\n".join(lines) + "\n\\end{align*}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-PREAMBLE = r"""\documentclass[11pt]{article}
+_PREAMBLE = r"""\documentclass[11pt]{article}
 \usepackage{amsmath}
 \allowdisplaybreaks
 \setcounter{MaxMatrixCols}{40}
@@ -22,7 +22,7 @@ def latex_document(equations: str, title: str) -> str:
     title
         Plain text.
     """
-    return f"{PREAMBLE}\\section*{{{escaped(title)}}}\n{equations}\\end{{document}}\n"
+    return f"{_PREAMBLE}\\section*{{{escaped(title)}}}\n{equations}\\end{{document}}\n"
 
 
 def escaped(text: str) -> str:

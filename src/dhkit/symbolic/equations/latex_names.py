@@ -5,16 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-LETTERS = """
+_LETTERS = """
     alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon phi chi psi
     omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega
 """
-GREEK = frozenset(LETTERS.split())
-AXES = re.compile(r"([A-Za-z])([xyz]{2})(\d*)")
-MOMENT = re.compile(r"(r)([xyz])(\d+)")
-REGROUPED = re.compile(r"([MXYZ][XYZ]|Ia)(\d+)")
-HEAD = re.compile(r"([A-Za-z]*?)(\d*)")
-LETTER = re.compile(r"([A-Za-z])([a-z]?)(\d*)")
+GREEK = frozenset(_LETTERS.split())
+_AXES = re.compile(r"([A-Za-z])([xyz]{2})(\d*)")
+_MOMENT = re.compile(r"(r)([xyz])(\d+)")
+_REGROUPED = re.compile(r"([MXYZ][XYZ]|Ia)(\d+)")
+_HEAD = re.compile(r"([A-Za-z]*?)(\d*)")
+_LETTER = re.compile(r"([A-Za-z])([a-z]?)(\d*)")
 
 
 def latex_names(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
@@ -41,17 +41,17 @@ def latex_names(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, st
 
 def _nice(name: str) -> str:
     """Return a name as textbooks typeset it."""
-    if match := AXES.fullmatch(name):
+    if match := _AXES.fullmatch(name):
         letter, axes, number = match.groups()
         return f"{letter}_{{{axes}{',' + number if number else ''}}}"
-    if match := MOMENT.fullmatch(name):
+    if match := _MOMENT.fullmatch(name):
         return "{}_{{{}{}}}".format(*match.groups())
-    if match := REGROUPED.fullmatch(name):
+    if match := _REGROUPED.fullmatch(name):
         return r"\mathit{{{}}}_{{{}}}".format(*match.groups())
     head, *subscripts = name.split("_")
     if not head or not all(subscripts):
         return literal(name)
-    letters, number = HEAD.fullmatch(head).groups() if HEAD.fullmatch(head) else ("", "")  # type: ignore[union-attr]
+    letters, number = _HEAD.fullmatch(head).groups() if _HEAD.fullmatch(head) else ("", "")  # type: ignore[union-attr]
     if not letters:
         return literal(name)
     base, subscript = _base(letters)
@@ -76,13 +76,13 @@ def _base(letters: str) -> tuple[str, str]:
         return command, ""
     if len(letters) == 1:
         return letters, ""
-    if LETTER.fullmatch(letters):
+    if _LETTER.fullmatch(letters):
         return letters[0], letters[1]
     return rf"\mathrm{{{letters}}}", ""
 
 
 def _word(part: str) -> str:
-    match = HEAD.fullmatch(part)
+    match = _HEAD.fullmatch(part)
     if match and _greek(match[1]):
         return _greek(match[1]) + (f" {match[2]}" if match[2] else "")  # type: ignore[operator]
-    return part if len(part) == 1 or part.isdecimal() or LETTER.fullmatch(part) else rf"\mathrm{{{part}}}"
+    return part if len(part) == 1 or part.isdecimal() or _LETTER.fullmatch(part) else rf"\mathrm{{{part}}}"

@@ -13,12 +13,12 @@ from dhkit.symbolic.kinematics import SymbolicKinematics
 from dhkit.symbolic.languages.layout import comment_block
 from dhkit.symbolic.languages.printing import MATLAB, matlab_lines
 
-MATLAB_ROOT = """
+_MATLAB_ROOT = """
 function x = root(square)
 % The square root; 0 for a number that is negative by rounding.
 x = sqrt(max(square, 0));
 end"""
-MATLAB_POSE = """
+_MATLAB_POSE = """
 function ok = is_pose(T)
 % Whether T is a pose: finite, with columns of length 1 at right angles, to 1e-6.
 off = T(1:3, 1:3)'*T(1:3, 1:3) - eye(3);
@@ -96,7 +96,7 @@ def inverse_matlab(derivation: InverseDerivation) -> dict[str, str]:
         "end\nend\n",
         "function angle = wrap(angle)\n% An angle turned into (-pi, pi].",
         "angle = angle - 2*pi*ceil((angle - pi)/(2*pi));\nend",
-        *([MATLAB_ROOT] if program.has_roots else []),
-        MATLAB_POSE,
+        *([_MATLAB_ROOT] if program.has_roots else []),
+        _MATLAB_POSE,
     ]
     return {f"{program.name}_ik.m": "\n".join(source) + "\n"}

@@ -26,8 +26,8 @@ from dhkit.symbolic.ring.notation import angles_of, constants_of, generators_of,
 
 INPUTS = {"M": "q", "C": "q qd", "h": "q qd", "g": "q", "tau": "q qd qdd", "K": "q qd", "V": "q"}
 """Arguments of each quantity; quantities of kinematics depend on q alone."""
-STATES = {"position": "q", "rate": "qd", "acceleration": "qdd"}
-RESERVED_WORDS = """
+_STATES = {"position": "q", "rate": "qd", "acceleration": "qdd"}
+_RESERVED_WORDS = """
     auto break case char const continue default do double else enum extern float for goto if inline int long
     register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
     bool true false nullptr constexpr typeof alignas alignof thread_local static_assert asm linux unix i386
@@ -35,11 +35,11 @@ RESERVED_WORDS = """
     end function elseif otherwise catch global parfor persistent spmd try classdef endfunction endif endfor
     endwhile end_try_catch unwind_protect until
 """
-RESERVED = frozenset(RESERVED_WORDS.split()) | frozenset(keyword.kwlist)
+RESERVED = frozenset(_RESERVED_WORDS.split()) | frozenset(keyword.kwlist)
 """Words that C, Python, MATLAB or Octave reserve, as names of members too."""
-MAX_IDENTIFIER_LENGTH = 48
+_MAX_IDENTIFIER_LENGTH = 48
 """Longest identifier: MATLAB reads 63 letters, of which the quantity's name takes some."""
-MAX_TERMS = 40
+_MAX_TERMS = 40
 """Largest number of terms of one statement: compilers recurse once for each term of a sum."""
 
 
@@ -140,7 +140,7 @@ def harmless(text: str) -> str:
 
 def identifier(name: str) -> str:
     """Return a name as an identifier of ASCII letters, digits and underscores that begins with a letter."""
-    cleaned = re.sub(r"\W", "_", name, flags=re.ASCII)[:MAX_IDENTIFIER_LENGTH]
+    cleaned = re.sub(r"\W", "_", name, flags=re.ASCII)[:_MAX_IDENTIFIER_LENGTH]
     return cleaned if re.match(r"[A-Za-z]", cleaned) else f"x{cleaned}"
 
 
@@ -187,9 +187,9 @@ class _Code:
         short = {g.text: f"k{k}" for k, g in enumerate(derived, start=1)}
         listed = [Let(short[g.text], self._meaning(g), harmless(g.text)) for g in derived]
         states = sorted(
-            (g for g in generators if g.kind in STATES), key=lambda g: (list(STATES).index(g.kind), g.joint)
+            (g for g in generators if g.kind in _STATES), key=lambda g: (list(_STATES).index(g.kind), g.joint)
         )
-        listed += [Let(g.text, self.language.entry(STATES[g.kind], g.joint)) for g in states]
+        listed += [Let(g.text, self.language.entry(_STATES[g.kind], g.joint)) for g in states]
         for angle in angles_of(generators):
             total = " + ".join(self.language.entry("q", joint) for joint in angle.joints)
             listed.append(Let(angle.name, f"{angle.function}({total})"))
@@ -198,7 +198,7 @@ class _Code:
             for places, element in _upper(quantity)
             if element
         )
-        used = {STATES[g.kind] for g in states} | ({"q"} if angles_of(generators) else set())
+        used = {_STATES[g.kind] for g in states} | ({"q"} if angles_of(generators) else set())
         return Function(
             quantity,
             tuple(INPUTS.get(quantity.name, "q").split()),
@@ -210,8 +210,8 @@ class _Code:
     def _parts(self, element: Element, short: Mapping[str, str]) -> Iterator[str]:
         printer = Printer(element.ring.generators, self, lambda generator: short[generator.text])
         products = [piece for product in collected(element) for piece in _split(product)]
-        for k in range(0, len(products), MAX_TERMS):
-            yield printer.sum(products[k : k + MAX_TERMS])
+        for k in range(0, len(products), _MAX_TERMS):
+            yield printer.sum(products[k : k + _MAX_TERMS])
 
     def _meaning(self, generator: Generator) -> str:
         assert generator.meaning is not None  # noqa: S101 - derived constants have one
@@ -220,11 +220,11 @@ class _Code:
 
 def _split(product: Product) -> Iterator[Product]:
     """Split a product with a very long sum in brackets into several products."""
-    if len(product.factor) <= MAX_TERMS * 4:
+    if len(product.factor) <= _MAX_TERMS * 4:
         yield product
         return
-    for k in range(0, len(product.factor), MAX_TERMS):
-        yield replace(product, factor=product.factor[k : k + MAX_TERMS])
+    for k in range(0, len(product.factor), _MAX_TERMS):
+        yield replace(product, factor=product.factor[k : k + _MAX_TERMS])
 
 
 def _upper(quantity: Quantity) -> Iterator[tuple[tuple[tuple[int, ...], ...], Element]]:

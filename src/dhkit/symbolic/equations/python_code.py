@@ -24,12 +24,12 @@ FUNCTION_NAMES = {
     "T": "tool_pose",
     "J": "jacobian",
 }
-PYTHON_ROOT = '''
+_PYTHON_ROOT = '''
 
 def root(square):
     """Return the square root; 0 for a number that is negative by rounding."""
     return sqrt(square) if square > 0 else 0.0'''
-PYTHON_POSE = '''
+_PYTHON_POSE = '''
 
 def is_pose(T):
     """Return whether T is a pose: finite, with columns of length 1 at right angles, to 1e-6."""
@@ -97,8 +97,8 @@ def inverse_python(derivation: InverseDerivation) -> dict[str, str]:
         *(f"{name} = {value!r}" for name, value in program.constants),
         '\n\ndef wrap(angle):\n    """Return an angle turned into (-pi, pi]."""',
         "    return angle - 2*pi*ceil((angle - pi)/(2*pi))",
-        *([PYTHON_ROOT] if program.has_roots else []),
-        PYTHON_POSE,
+        *([_PYTHON_ROOT] if program.has_roots else []),
+        _PYTHON_POSE,
         "\n\ndef inverse_kinematics(T):",
         f'    """Return joint values ({B} lists of {n}) and status ({B} numbers) for a pose T: 4 rows of 4 numbers."""',
         *(f"    {name} = float(T[{i}][{j}])" for name, i, j in program.pose),

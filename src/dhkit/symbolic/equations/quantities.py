@@ -20,7 +20,7 @@ KINEMATIC_QUANTITIES = {
     "J": "Jacobian of the tool, in the world's axes",
 }
 """The quantities of kinematics that can be printed, with their names in words; A stands for A1 ... An."""
-LINK = re.compile(r"A([1-9][0-9]*)")
+_LINK = re.compile(r"A([1-9][0-9]*)")
 MAX_PRINTED_TERMS = 2_000
 """Largest number of terms of an entry that text and LaTeX print."""
 
@@ -46,7 +46,7 @@ class Quantity:
     @property
     def title(self) -> str:
         """The quantity in words."""
-        if link := LINK.fullmatch(self.name):
+        if link := _LINK.fullmatch(self.name):
             return f"transform of link {link[1]}"
         return (QUANTITIES | KINEMATIC_QUANTITIES).get(self.name, "base parameters")
 
@@ -73,7 +73,7 @@ class Quantity:
         if self.labels:
             return self.labels[place[0]]
         # A1_12, since A112 would be read as a number
-        return entry_name(f"{self.name}_" if LINK.fullmatch(self.name) else self.name, place)
+        return entry_name(f"{self.name}_" if _LINK.fullmatch(self.name) else self.name, place)
 
 
 def quantities(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
@@ -116,7 +116,7 @@ def kinematic_quantities(kinematics: SymbolicKinematics, what: str | Sequence[st
 def is_kinematic(what: str | Sequence[str]) -> bool:
     """Return whether all names are of kinematics: A, A1 ... An, T, J."""
     names = what.replace(",", " ").split() if isinstance(what, str) else list(what)
-    return bool(names) and all(name in KINEMATIC_QUANTITIES or LINK.fullmatch(name) for name in names)
+    return bool(names) and all(name in KINEMATIC_QUANTITIES or _LINK.fullmatch(name) for name in names)
 
 
 def readable(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:

@@ -14,10 +14,10 @@ from dhkit.symbolic.ring.notation import Notation, angles_of, generators_of, not
 
 WIDTH = 100
 """Columns of a line."""
-INDENT = "      "
-SHOWN_TERMS = 12
+_INDENT = "      "
+_SHOWN_TERMS = 12
 """Number of terms printed of an element that is too long to read."""
-READABLE = 2_000
+_READABLE = 2_000
 """Largest number of terms of an element that is collected for a message."""
 
 
@@ -72,9 +72,9 @@ def plain_text(element: Element) -> str:
     """
     ring = element.ring
     printer = Printer(ring.generators, TextWriter(notation(ring)))
-    if len(element) <= READABLE:
+    if len(element) <= _READABLE:
         return printer.sum(collected(element))
-    first = dict(list(element.terms.items())[:SHOWN_TERMS])
+    first = dict(list(element.terms.items())[:_SHOWN_TERMS])
     return f"{printer.sum(collected(ring.from_terms(first)))} + ... ({len(element)} terms)"
 
 
@@ -113,14 +113,14 @@ def broken_lines(head: str, text: str) -> list[str]:
         room = WIDTH - len(line)
         if len(term) <= room:
             line += term
-        elif len(INDENT) + len(term) <= WIDTH and line != head:
+        elif len(_INDENT) + len(term) <= WIDTH and line != head:
             lines.append(line)
-            line = INDENT + term.lstrip()
+            line = _INDENT + term.lstrip()
         else:
             for piece in re.split(r"(?= [+-] )", term):
                 if len(line) + len(piece) > WIDTH:
                     lines.append(line)
-                    line = INDENT + piece.lstrip()
+                    line = _INDENT + piece.lstrip()
                 else:
                     line += piece
     return [*lines, line]
@@ -143,7 +143,7 @@ def _filled_lines(head: str, words: Sequence[str], tail: str = "", separator: st
     for word in [*words[1:], *([tail] if tail else [])]:
         if len(line) + len(separator) + len(word) > WIDTH:
             lines.append(line + separator.rstrip())
-            line = INDENT + word
+            line = _INDENT + word
         else:
             line += separator + word
     return [*lines, line]

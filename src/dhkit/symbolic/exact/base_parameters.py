@@ -25,13 +25,12 @@ from dhkit.symbolic.exact.dependencies import MissingReciprocalError, independen
 from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow
 from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof, lagrangian
 from dhkit.symbolic.ring import Constant, Element, Elements, Ring, RingError, translated
+from dhkit.symbolic.ring.bounds import BOUNDS
 
-SECOND = {"XX": (0, 0), "XY": (0, 1), "XZ": (0, 2), "YY": (1, 1), "YZ": (1, 2), "ZZ": (2, 2)}
-MOMENT = {"MX": 0, "MY": 1, "MZ": 2}
-READABLE, LONGEST_DEFINITION = 30, 200
+_SECOND = {"XX": (0, 0), "XY": (0, 1), "XZ": (0, 2), "YY": (1, 1), "YZ": (1, 2), "ZZ": (2, 2)}
+_MOMENT = {"MX": 0, "MY": 1, "MZ": 2}
+_READABLE, _LONGEST_DEFINITION = 30, 200
 """Number of definitions, and characters of a definition, that a notebook shows."""
-MAX_TERMS = 60_000
-"""Largest number of terms of M in all inertial parameters: three times the Jaco's, a minute in sympy's rings."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,11 +70,11 @@ class BaseParameters:
     def _repr_html_(self) -> str:
         shown = {name: self.definitions[name] for name in self.names[:MOST_ROWS]}
         rows = [
-            (name, str(element) if len(element) <= READABLE else counted(len(element), "term"))
+            (name, str(element) if len(element) <= _READABLE else counted(len(element), "term"))
             for name, element in shown.items()
         ]
         caption = f"Base parameters of {self.full.description.name}"
-        return html_table(("parameter", "stands for"), rows, caption, count=len(self), longest=LONGEST_DEFINITION)
+        return html_table(("parameter", "stands for"), rows, caption, count=len(self), longest=_LONGEST_DEFINITION)
 
     def prove(self) -> Proof:
         """Decide whether the equations in base parameters equal the full ones, by substituting the definitions.
@@ -113,9 +112,10 @@ def base_parameters(description: Description) -> BaseParameters:
     needed: tuple[Expression, ...] = ()
     for _ in range(description.n):
         full = lagrangian(description, "inertial", needed)
-        if (terms := sum(len(element) for element in full.M.flat)) > MAX_TERMS:
+        if (terms := sum(len(element) for element in full.M.flat)) > BOUNDS.inertial_terms:
             raise RingError(
-                f"{description.name}: M of {terms} terms is too long for base parameters; at most {MAX_TERMS}"
+                f"{description.name}: M of {terms} terms is too long for base parameters; "
+                f"at most {BOUNDS.inertial_terms}"
             )
         definitions = _regroup(full.arm)
         try:
@@ -136,8 +136,8 @@ def _regroup(arm: ExactArm) -> dict[str, Element]:
     definitions: dict[str, Element] = {}
     end = _ending(arm)
     for j, body in enumerate(bodies, start=1):
-        definitions |= {f"{key}{j}{end}": body.second[place] for key, place in SECOND.items()}
-        definitions |= {f"{key}{j}{end}": body.moment[k] for key, k in MOMENT.items()}
+        definitions |= {f"{key}{j}{end}": body.second[place] for key, place in _SECOND.items()}
+        definitions |= {f"{key}{j}{end}": body.moment[k] for key, k in _MOMENT.items()}
         definitions |= {f"M{j}{end}": body.mass, f"Ia{j}{end}": arm.armature[j - 1]}
     definitions |= {f"Ic{i + 1}{j + 1}{end}": inertia for i, j, inertia in arm.couplings}
     return {name: element for name, element in definitions.items() if element}
@@ -145,7 +145,7 @@ def _regroup(arm: ExactArm) -> dict[str, Element]:
 
 def _ending(arm: ExactArm) -> str:
     """Return the ending of base parameters' names: an underscore where a parameter of the file has such a name."""
-    names = {f"{key}{j}" for key in (*SECOND, *MOMENT, "M", "Ia") for j in range(1, arm.n + 1)}
+    names = {f"{key}{j}" for key in (*_SECOND, *_MOMENT, "M", "Ia") for j in range(1, arm.n + 1)}
     names |= {f"Ic{i + 1}{j + 1}" for i, j, _ in arm.couplings}
     return "" if names.isdisjoint(arm.ring.constants) else "_"
 
@@ -189,9 +189,9 @@ def _equations(arm: ExactArm, definitions: Mapping[str, Element]) -> Lagrangian:
 
     def body(j: int) -> RigidBody:
         second = np.empty((3, 3), dtype=object)
-        for key, (row, column) in SECOND.items():
+        for key, (row, column) in _SECOND.items():
             second[row, column] = second[column, row] = named(f"{key}{j}")
-        return RigidBody(named(f"M{j}"), np.array([named(f"{key}{j}") for key in MOMENT], dtype=object), second)
+        return RigidBody(named(f"M{j}"), np.array([named(f"{key}{j}") for key in _MOMENT], dtype=object), second)
 
     numbers = arm.ring.values(arm.values, np.zeros(arm.n))
     short = replace(

@@ -15,10 +15,8 @@ import numpy as np
 
 from dhkit.symbolic.exact.exact_arm import ExactArm
 from dhkit.symbolic.ring import Element, Elements, Ring, translated
+from dhkit.symbolic.ring.bounds import BOUNDS
 from dhkit.symbolic.ring.polynomials import Monomial
-
-MAX_CHOICES = 24
-"""Largest number of choices of angles that are tried for an entry."""
 
 
 def parallel_runs(arm: ExactArm) -> list[tuple[int, ...]]:
@@ -70,7 +68,9 @@ def shortened_alike(arm: ExactArm, elements: Sequence[Element]) -> list[Element]
 def _rings_in_other_angles(ring: Ring, runs: tuple[tuple[int, ...], ...]) -> list[tuple[Ring, dict[int, Element]]]:
     """Return rings in other angles, each with the sines and cosines of the given ring's joints in its own."""
     sums = [run[a:b] for run in runs for a in range(len(run)) for b in range(a + 1, len(run) + 1)]
-    rings = [Ring(ring.kinds, ring.given, angles, sums) for angles in islice(_choices_of_angles(runs), MAX_CHOICES)]
+    rings = [
+        Ring(ring.kinds, ring.given, angles, sums) for angles in islice(_choices_of_angles(runs), BOUNDS.angle_choices)
+    ]
     return [(other, _sines_and_cosines(ring, other)) for other in rings]
 
 
@@ -113,25 +113,25 @@ def _merge_angles(element: Element) -> Element:
     return ring.from_terms(terms)
 
 
-Places = tuple[int, int]
+_Places = tuple[int, int]
 """Indices of an angle's sine and cosine in a monomial."""
 
 
-def _add(terms: dict[Monomial, Fraction], a: Places, b: Places, total: Places) -> bool:
+def _add(terms: dict[Monomial, Fraction], a: _Places, b: _Places, total: _Places) -> bool:
     """Write cos a cos b - sin a sin b as cos(a + b), and sin a cos b + cos a sin b as sin(a + b)."""
     (sa, ca), (sb, cb), (s, c) = a, b, total
     one = _paired(terms, (ca, cb), (sa, sb), c, -1)
     return _paired(terms, (sa, cb), (ca, sb), s, 1) or one
 
 
-def _subtract(terms: dict[Monomial, Fraction], a: Places, b: Places, difference: Places) -> bool:
+def _subtract(terms: dict[Monomial, Fraction], a: _Places, b: _Places, difference: _Places) -> bool:
     """Write cos a cos b + sin a sin b as cos(a - b), and sin a cos b - cos a sin b as sin(a - b)."""
     (sa, ca), (sb, cb), (s, c) = a, b, difference
     one = _paired(terms, (ca, cb), (sa, sb), c, 1)
     return _paired(terms, (sa, cb), (ca, sb), s, -1) or one
 
 
-def _paired(terms: dict[Monomial, Fraction], first: Places, second: Places, merged: int, sign: int) -> bool:
+def _paired(terms: dict[Monomial, Fraction], first: _Places, second: _Places, merged: int, sign: int) -> bool:
     """Replace x first + sign x second by x merged for every monomial x; return whether any was replaced."""
     found = False
     for monomial in [m for m in terms if m[first[0]] and m[first[1]]]:

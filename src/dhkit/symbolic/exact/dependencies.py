@@ -18,11 +18,11 @@ from dhkit.symbolic.exact.lagrangian import Lagrangian
 from dhkit.symbolic.ring import Element, Ring, RingError, translated
 from dhkit.symbolic.ring.polynomials import Monomial
 
-MAX_SUPPORT = 3
+_MAX_SUPPORT = 3
 """Largest number of parameters that one depends on: a prismatic link's moment, on two moments of the link before and
 a mass."""
-TRIES = 200
-DEPENDENT = 1e-9
+_TRIES = 200
+_DEPENDENT = 1e-9
 """A column of unit length depends on others where less than this remains of it; rounding leaves 1e-14."""
 
 
@@ -46,7 +46,7 @@ def independent(trial: Lagrangian, definitions: Mapping[str, Element]) -> dict[s
         rest = column / np.linalg.norm(column)
         for _ in range(2):  # the second pass removes what rounding left
             rest = rest - basis @ (basis.T @ rest)
-        if np.linalg.norm(rest) > DEPENDENT:
+        if np.linalg.norm(rest) > _DEPENDENT:
             merged[name] = definitions[name]
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
             continue
@@ -106,14 +106,14 @@ class _Regressor:
         exact entries (Cramer's rule), taken from the rows with the shortest entries.
         """
         column = self.column(name)
-        for size in range(1, MAX_SUPPORT + 1):
+        for size in range(1, _MAX_SUPPORT + 1):
             for support in combinations(kept, size):
                 A = np.column_stack([self.column(other) for other in support])
                 factors, *_ = np.linalg.lstsq(A, column, rcond=None)
-                if np.linalg.norm(A @ factors - column) <= DEPENDENT * np.linalg.norm(column):
+                if np.linalg.norm(A @ factors - column) <= _DEPENDENT * np.linalg.norm(column):
                     return self._factors(name, support)
         raise RingError(
-            f"{name} depends on more than {MAX_SUPPORT} parameters before it; base parameters were not found"
+            f"{name} depends on more than {_MAX_SUPPORT} parameters before it; base parameters were not found"
         )
 
     def _factors(self, name: str, support: Sequence[str]) -> dict[str, Element]:
@@ -122,8 +122,8 @@ class _Regressor:
         touching = [k for k, row in enumerate(self.rows) if not row.keys().isdisjoint(support)]
         touching.sort(key=lambda k: sum(len(entry) for entry in self.rows[k].values()))
         fractions: tuple[list[Element], Element] | None = None
-        for chosen in islice(combinations(touching, len(support)), TRIES):
-            if abs(np.linalg.det(self.numbers[np.ix_(chosen, places)])) < DEPENDENT:
+        for chosen in islice(combinations(touching, len(support)), _TRIES):
+            if abs(np.linalg.det(self.numbers[np.ix_(chosen, places)])) < _DEPENDENT:
                 continue
             A = [[ring.from_terms(self.rows[k].get(other, {})) for other in support] for k in chosen]
             right = [ring.from_terms(self.rows[k].get(name, {})) for k in chosen]

@@ -13,7 +13,7 @@ from dhkit.expressions import Expression, exact, exact_angle, substitute
 Symbols: TypeAlias = Literal["none", "file", "inertial"]
 """Which numbers are symbols: none, the file's parameters, or every inertial parameter with lengths and gravity."""
 
-ONE = exact(1)
+_ONE = exact(1)
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class Naming:
             self.inertial_symbol(f"I{key}{number}", entry) for key, entry in zip(INERTIA_PLACES, second, strict=True)
         )
         if not rotor.is_zero:
-            gear = gear if gear == ONE else self.symbol(f"G{number}", substitute(drive.gear, self.values))
+            gear = gear if gear == _ONE else self.symbol(f"G{number}", substitute(drive.gear, self.values))
             rotor = self.inertial_symbol(f"Jm{number}", substitute(drive.rotor_inertia, self.values))
         whole = BodyNumbers("", mass, tuple(r / mass for r in moments), None, tensor)
         return LinkNumbers(row, (whole,), gear, rotor)

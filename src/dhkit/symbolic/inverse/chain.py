@@ -24,13 +24,13 @@ from dhkit.symbolic.ring.constants import Constants, value_of
 from dhkit.symbolic.ring.notation import distinct
 from dhkit.symbolic.ring.ring import Constant
 
-POSITION = ("px", "py", "pz")
-ROTATION = tuple(f"r{i}{j}" for i in "123" for j in "123")
-POSE = (*POSITION, *ROTATION)
+_POSITION = ("px", "py", "pz")
+_ROTATION = tuple(f"r{i}{j}" for i in "123" for j in "123")
+POSE = (*_POSITION, *_ROTATION)
 """Names of the entries of the tool's pose in the world."""
 INNER = tuple(name.replace("p", "h").replace("r", "h") for name in POSE)
 """Names of the entries of the pose without base and tool."""
-DEFINED = (
+_DEFINED = (
     *INNER,
     *(f"{letter}{axis}" for letter in "wano" for axis in "xyz"),
     *("x", "y", "u", "v", "cphi", "sphi"),
@@ -101,7 +101,7 @@ class Chain:
             [*(x for row in angles for x in row), *(x for rpy in turned for x in rpy)],
         )
         taken = {name for constant in constants.found.values() for name in constant.symbols}
-        names = distinct([*POSE, *DEFINED], taken)
+        names = distinct([*POSE, *_DEFINED], taken)
         # The pose and defined quantities come first, so that they are written first.
         ring = Ring(description.kinds, [*map(Constant, names.values()), *constants.found.values()])
         base, tool = (
@@ -187,8 +187,8 @@ class Chain:
     def given_pose(self) -> Elements:
         """The pose that is given, shape (4, 4), of symbols."""
         T = identity(self.ring)
-        T[:3, 3] = [self.symbol(name) for name in POSITION]
-        T[:3, :3] = np.array([self.symbol(name) for name in ROTATION], dtype=object).reshape(3, 3)
+        T[:3, 3] = [self.symbol(name) for name in _POSITION]
+        T[:3, :3] = np.array([self.symbol(name) for name in _ROTATION], dtype=object).reshape(3, 3)
         return T
 
     def named(self, names: Iterable[str]) -> Elements:

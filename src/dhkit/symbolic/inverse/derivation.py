@@ -26,13 +26,13 @@ from dhkit.symbolic.inverse.wrists import FLIPS
 from dhkit.symbolic.ring import Element
 from dhkit.symbolic.ring.elements import element_array
 
-LANGUAGES = ("c", "python", "matlab")
-CLOSES, FOUND = 1e-9, 1e-6
+_LANGUAGES = ("c", "python", "matlab")
+_CLOSES, _FOUND = 1e-9, 1e-6
 """Largest error, rad and share of the reach, with which a branch closes forward kinematics, and with which joint values
 are those that a pose was computed from: near singular poses joints are less certain than poses."""
 IN_PLANE = 1e-9
 """Share of the reach by which a pose may be off the plane of an arm that moves in one."""
-SAMPLES = 200
+_SAMPLES = 200
 """Number of random poses at which a proof looks whether branches close and none is missing."""
 
 
@@ -180,8 +180,8 @@ class InverseDerivation:
         ValueError
             Another language.
         """
-        if language not in LANGUAGES:
-            raise ValueError(f"language is {language!r}; expected one of {', '.join(LANGUAGES)}")
+        if language not in _LANGUAGES:
+            raise ValueError(f"language is {language!r}; expected one of {', '.join(_LANGUAGES)}")
         files: dict[str, str] = format_function(f"inverse_{language}")(self)
         return files
 
@@ -225,7 +225,7 @@ class InverseDerivation:
         for condition in self.conditions:
             yield _proof(bench, condition.look, [(condition.left, condition.right)])
 
-    def prove(self, samples: int = SAMPLES, seed: int = 0) -> InverseProof:
+    def prove(self, samples: int = _SAMPLES, seed: int = 0) -> InverseProof:
         """Prove the derivation: each equation an identity, each solution a lemma; and try it at random poses.
 
         Parameters
@@ -257,13 +257,13 @@ class InverseDerivation:
         if self.family.aims:
             return True
         error = gap[..., 3].max(axis=-1) if not self.family.undoes_tool else gap.max(axis=(-1, -2))
-        return bool(np.all(error[valid] < CLOSES)) and bool(valid.any(axis=1).all())
+        return bool(np.all(error[valid] < _CLOSES)) and bool(valid.any(axis=1).all())
 
     def _contains(self, found: Array, q: Array) -> bool:
         slides = self.description.numbers.prismatic
         away = np.abs(found - q[:, None])
         away = np.where(slides, away / (self.description.reach or 1.0), np.abs((away + np.pi) % (2 * np.pi) - np.pi))
-        return bool(np.all(np.nanmin(np.where(np.isnan(away), np.inf, away).max(axis=-1), axis=1) < FOUND))
+        return bool(np.all(np.nanmin(np.where(np.isnan(away), np.inf, away).max(axis=-1), axis=1) < _FOUND))
 
     # Numbers
 
@@ -378,12 +378,12 @@ class Values:
         return np.asarray(element.value(self._values))
 
 
-SHOULDERS = {frozenset(("left", "right")): ("left", "right")}
+_SHOULDERS = {frozenset(("left", "right")): ("left", "right")}
 
 
 def in_branch_order(choice: Choice) -> tuple[str, str]:
     """Return the names of a choice in the order of branches: left before right."""
-    return SHOULDERS.get(frozenset(choice.names), choice.names)
+    return _SHOULDERS.get(frozenset(choice.names), choice.names)
 
 
 def _proof(bench: Workbench, what: str, sides: Sequence[tuple[Element, Element]]) -> Proof:

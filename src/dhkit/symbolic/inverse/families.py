@@ -27,7 +27,7 @@ from dhkit.symbolic.inverse.turning_planes import (
     yaw_two,
 )
 
-CHAINS = ("RR", "RRR", "RRPR", "RRRP", "PRRR", "RPRR", "RRP", "RPR", "PRR")
+_CHAINS = ("RR", "RRR", "RRPR", "RRRP", "PRRR", "RPRR", "RRP", "RPR", "PRR")
 """Kinds of joints of arms in parallel planes: two or three revolute joints and at most one slide."""
 
 
@@ -91,7 +91,7 @@ FAMILIES = (
     Derivable("yaw_three", ("RRRR",), "a turntable, axes 2, 3 and 4 parallel", turntable_fits, yaw_three),
     Derivable("yaw_two", ("RRR",), "a turntable, axes 2 and 3 parallel", turntable_fits, yaw_two),
     Derivable("pan_tilt", ("RR",), "pan and tilt: axes 1 and 2 at right angles", pan_tilt_fits, pan_tilt, aims=True),
-    Derivable("parallel_chain", CHAINS, "parallel axes", chain_fits, parallel_chain),
+    Derivable("parallel_chain", _CHAINS, "parallel axes", chain_fits, parallel_chain),
     Derivable(
         "polar",
         ("RP",),

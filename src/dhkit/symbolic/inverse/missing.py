@@ -7,14 +7,14 @@ import numpy as np
 from dhkit.symbolic.inverse.chain import Chain
 from dhkit.symbolic.ring import Element
 
-INSTEAD = "use arm.ik_numeric, or arm.ik with the package ssik (pip install 'dhkit-robotics[ik]')"
+_INSTEAD = "use arm.ik_numeric, or arm.ik with the package ssik (pip install 'dhkit-robotics[ik]')"
 
 
 def why_not(chain: Chain) -> str:
     """Return one sentence that says what is missing for a closed form, and what to use instead."""
     n, kinds = chain.n, chain.description.kinds
     count = f"{n}R" if set(kinds) == {"R"} else kinds
-    return f"no closed form is known for these {count} axes: {_missing(chain)}; {INSTEAD}"
+    return f"no closed form is known for these {count} axes: {_missing(chain)}; {_INSTEAD}"
 
 
 def _missing(chain: Chain) -> str:

@@ -44,7 +44,7 @@ def number(chain: Chain, element: Element) -> float:
     return float(element.value([chain.values.get(g.text, np.nan) for g in ring.generators]))
 
 
-def vertical(chain: Chain) -> Elements:
+def _vertical(chain: Chain) -> Elements:
     """Return the direction that is up in the frame before joint 1, shape (3,).
 
     It only gives branches their names; a base that is upright or level but for UPRIGHT counts as upright or level.
@@ -100,7 +100,7 @@ def turn_the_plane(bench: Workbench, point: Elements, inside: Elements, who: str
         )
     names = ("front", "back")
     if offset:
-        swapped = (-1.0 if number(chain, vertical(chain)[2]) < 0 else 1.0) * offset > 0
+        swapped = (-1.0 if number(chain, _vertical(chain)[2]) < 0 else 1.0) * offset > 0
         names = ("right", "left") if swapped else ("left", "right")
     bench.add(
         Step(
@@ -115,7 +115,7 @@ def turn_the_plane(bench: Workbench, point: Elements, inside: Elements, who: str
         )
     )
     x, y = c * px + s * py - chain.a[0], tilt * (pz - chain.d[0])
-    up = into_axis_2(bench, vertical(chain))
+    up = into_axis_2(bench, _vertical(chain))
     return Plane(tilt, x, y, (up[0], up[1]))
 
 

@@ -6,8 +6,8 @@ import re
 import textwrap
 from collections.abc import Sequence
 
-WIDTH = 112
-COMMENT_WIDTH = 96
+_WIDTH = 112
+_COMMENT_WIDTH = 96
 
 
 def wrapped(text: str, first: str, following: str, ending: str = "") -> str:
@@ -27,7 +27,7 @@ def wrapped(text: str, first: str, following: str, ending: str = "") -> str:
     lines: list[str] = []
     line = first
     for piece in re.split(r"(?= [+-] )", text):
-        if len(line) + len(piece) > WIDTH and line != first:
+        if len(line) + len(piece) > _WIDTH and line != first:
             lines.append(line + ending)
             line = following + piece.lstrip()
         else:
@@ -47,6 +47,6 @@ def comment_block(sentences: Sequence[str], first: str, following: str, end: str
     end
         Ending of the last line.
     """
-    lines = textwrap.wrap(" ".join(sentences), COMMENT_WIDTH)
+    lines = textwrap.wrap(" ".join(sentences), _COMMENT_WIDTH)
     begun = [f"{first if k == 0 else following}{line}" for k, line in enumerate(lines)]
     return [*begun[:-1], begun[-1] + end]

@@ -56,12 +56,12 @@ def _offset(place: Sequence[int], shape: Sequence[int]) -> int:
 
 # Python
 
-NUMPY_NAMES = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2"}
+_NUMPY_NAMES = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2"}
 NUMPY = Syntax(
     item="{array}[..., {k}]",
     first_index=0,
     pi="np.pi",
-    functions={name: f"np.{NUMPY_NAMES.get(name, name)}" for name in (*NUMPY_NAMES, "tan", "sqrt", "abs")},
+    functions={name: f"np.{_NUMPY_NAMES.get(name, name)}" for name in (*_NUMPY_NAMES, "tan", "sqrt", "abs")},
     nan="1e999 - 1e999",  # so that generated modules import nothing for it
     infinity="1e999",
 )

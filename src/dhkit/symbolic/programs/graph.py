@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import casadi
 
 
-COUNTED_AS = {
+_COUNTED_AS = {
     "add": "additions",
     "subtract": "additions",
     "multiply": "multiplications",
@@ -56,7 +56,7 @@ class Node:
     value: float = 0.0
 
 
-FOLDING: Mapping[str, Callable[..., float]] = {
+_FOLDING: Mapping[str, Callable[..., float]] = {
     "add": lambda a, b: a + b,
     "subtract": lambda a, b: a - b,
     "multiply": lambda a, b: a * b,
@@ -73,10 +73,10 @@ FOLDING: Mapping[str, Callable[..., float]] = {
 }
 """Operations that are evaluated while a program is built when all arguments are constants."""
 
-SIGNED = {"add", "subtract", "multiply", "divide", "negate"}
+_SIGNED = {"add", "subtract", "multiply", "divide", "negate"}
 """Operations from which a negative sign can be taken out."""
-LOGICAL = {"select", "logical_and", "logical_or", "logical_not"}
-COMMUTATIVE = {"add", "multiply", "minimum", "maximum", "equal", "unequal", "logical_and", "logical_or"}
+_LOGICAL = {"select", "logical_and", "logical_or", "logical_not"}
+_COMMUTATIVE = {"add", "multiply", "minimum", "maximum", "equal", "unequal", "logical_and", "logical_or"}
 
 
 @cache
@@ -241,16 +241,16 @@ class _Builder:
             return self.apply("select", (*arguments, self.constant(0.0)))
         if operation == ":sign":
             return self._sign(first)
-        if operation in SIGNED and (signed := self._signed(operation, arguments)) is not None:
+        if operation in _SIGNED and (signed := self._signed(operation, arguments)) is not None:
             return signed
         operands = [self.nodes[k] for k in arguments]
-        if operation in FOLDING and all(node.operation == "constant" for node in operands):
-            return self.constant(FOLDING[operation](*(node.value for node in operands)))
-        if operation in LOGICAL and (known := self._decided(operation, arguments)) is not None:
+        if operation in _FOLDING and all(node.operation == "constant" for node in operands):
+            return self.constant(_FOLDING[operation](*(node.value for node in operands)))
+        if operation in _LOGICAL and (known := self._decided(operation, arguments)) is not None:
             return known
         if operation == "add" and (chosen := self._selected(arguments)) is not None:
             return chosen
-        if operation in COMMUTATIVE:
+        if operation in _COMMUTATIVE:
             arguments = sorted(arguments)
         return self.add(Node(operation, tuple(arguments)))
 
@@ -351,6 +351,6 @@ def operation_count(graph: Graph) -> dict[str, int]:
     {'additions': 1, 'multiplications': 1, 'sines and cosines': 1}
     """
     counts = Counter(
-        COUNTED_AS.get(x.operation, "others") for x in graph.nodes if x.operation not in ("input", "constant")
+        _COUNTED_AS.get(x.operation, "others") for x in graph.nodes if x.operation not in ("input", "constant")
     )
     return dict(sorted(counts.items()))

@@ -11,7 +11,7 @@ from dhkit.symbolic.languages.printing import C, c_lines
 from dhkit.symbolic.languages.statements import Let, Store
 from dhkit.symbolic.programs.graph import Graph, Node
 
-OPERATORS = {
+_OPERATORS = {
     "add": "{} + {}",
     "subtract": "{} - {}",
     "multiply": "{} * {}",
@@ -87,8 +87,8 @@ def _c_expression(graph: Graph, node: Node) -> str:
     if node.operation == "input":
         return C.entry(graph.inputs[node.arguments[0]].name, node.arguments[1])
     arguments = [f"v{k}" for k in node.arguments]
-    if node.operation in OPERATORS:
-        return OPERATORS[node.operation].format(*arguments)
+    if node.operation in _OPERATORS:
+        return _OPERATORS[node.operation].format(*arguments)
     return C.call(node.operation, arguments)
 
 

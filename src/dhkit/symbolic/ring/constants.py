@@ -10,11 +10,9 @@ from fractions import Fraction
 from dhkit.errors import ExpressionError
 from dhkit.expressions import PI, Atom, Expression, cos, sin, substitute
 from dhkit.expressions.exact import Monomial
+from dhkit.symbolic.ring.bounds import BOUNDS
 from dhkit.symbolic.ring.reading import is_exact, reciprocal_text
 from dhkit.symbolic.ring.ring import Constant
-
-MAX_MULTIPLE = 8
-"""Largest multiple of an angle that is expanded into powers of the angle's own cosine and sine."""
 
 
 @dataclass
@@ -78,7 +76,9 @@ class Constants:
                 self._scan(sin(PI * coefficient))
                 continue
             unit = self._units[monomial]
-            one = Expression(((monomial, unit if abs(coefficient) / unit <= MAX_MULTIPLE else abs(coefficient)),))
+            one = Expression(
+                ((monomial, unit if abs(coefficient) / unit <= BOUNDS.angle_multiple else abs(coefficient)),)
+            )
             cosine, sine = (Expression.of_atom(Atom(name, (one,))) for name in ("cos", "sin"))
             if cosine.text in self.found:
                 continue

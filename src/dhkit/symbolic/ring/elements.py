@@ -18,15 +18,12 @@ from dhkit.display import LONGEST_LINE, plain, repr_line
 from dhkit.errors import DhkitError
 from dhkit.expressions import Expression, exact
 from dhkit.formats import format_function
+from dhkit.symbolic.ring.bounds import BOUNDS
 from dhkit.symbolic.ring.polynomials import Monomial, Polynomials, Relation
 
 READABLE = 200
 """Longest element, in terms, that is printed without being asked for."""
-MAX_TERMS = 300_000
-"""Largest number of terms of a product: ten times the longest of the library's robots (Jaco, symbols="inertial")."""
-TOO_LONG = "too long to be derived exactly; numbers in place of symbols, or fewer joints (lock), make it shorter"
-MAX_PAIRS = 500_000
-"""Largest number of pairs of terms that one product multiplies: six times the Jaco's, some seconds in sympy's rings."""
+_TOO_LONG = "too long to be derived exactly; numbers in place of symbols, or fewer joints (lock), make it shorter"
 
 
 class RingError(DhkitError):
@@ -72,7 +69,7 @@ class Element:
 
     # Arithmetic
 
-    def __add__(self, other: Scalar) -> Element:
+    def __add__(self, other: _Scalar) -> Element:
         if not isinstance(other, Element | Real):
             return NotImplemented
         return Element(self.ring, self.polynomial + self._coerced(other))
@@ -82,17 +79,17 @@ class Element:
     def __neg__(self) -> Element:
         return Element(self.ring, -self.polynomial)
 
-    def __sub__(self, other: Scalar) -> Element:
+    def __sub__(self, other: _Scalar) -> Element:
         if not isinstance(other, Element | Real):
             return NotImplemented
         return Element(self.ring, self.polynomial - self._coerced(other))
 
-    def __rsub__(self, other: Scalar) -> Element:
+    def __rsub__(self, other: _Scalar) -> Element:
         if not isinstance(other, Element | Real):
             return NotImplemented
         return Element(self.ring, self._coerced(other) - self.polynomial)
 
-    def __mul__(self, other: Scalar) -> Element:
+    def __mul__(self, other: _Scalar) -> Element:
         if not isinstance(other, Element | Real):
             return NotImplemented
         if len(self.polynomial) == 0:
@@ -100,11 +97,11 @@ class Element:
         factor = self._coerced(other)
         if len(factor) == 0:
             return Element(self.ring, factor)
-        if len(self.polynomial) * len(factor) > MAX_PAIRS:
-            raise RingError(f"a product of {len(self.polynomial)} by {len(factor)} terms: {TOO_LONG}")
+        if len(self.polynomial) * len(factor) > BOUNDS.pairs:
+            raise RingError(f"a product of {len(self.polynomial)} by {len(factor)} terms: {_TOO_LONG}")
         product = Element(self.ring, self.polynomial * factor).reduced()
-        if len(product.polynomial) > MAX_TERMS:
-            raise RingError(f"an expression of {len(product.polynomial)} terms, beyond {MAX_TERMS}: {TOO_LONG}")
+        if len(product.polynomial) > BOUNDS.terms:
+            raise RingError(f"an expression of {len(product.polynomial)} terms, beyond {BOUNDS.terms}: {_TOO_LONG}")
         return product
 
     __rmul__ = __mul__
@@ -115,14 +112,14 @@ class Element:
             result = result * self
         return result
 
-    def _coerced(self, other: Scalar) -> Any:
+    def _coerced(self, other: _Scalar) -> Any:
         if isinstance(other, Element):
             if other.ring != self.ring:
                 raise RingError("elements of two rings; derive both from one description and with equal symbols")
             return other.polynomial
         return self.ring.polynomials.constant(_rational(other))
 
-    def __truediv__(self, other: Scalar) -> Element:
+    def __truediv__(self, other: _Scalar) -> Element:
         if isinstance(other, Element) or not isinstance(other, Real):
             return NotImplemented
         return self * (1 / _rational(other))
@@ -369,7 +366,7 @@ def element_array(value: Any) -> Elements:
     return array
 
 
-Scalar: TypeAlias = "Element | int | float | Fraction"
+_Scalar: TypeAlias = "Element | int | float | Fraction"
 
 
 def _without(element: Element, place: int, divisor: Any) -> Element:

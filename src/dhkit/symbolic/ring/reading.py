@@ -14,7 +14,7 @@ from dhkit.symbolic.ring.elements import Element, PolynomialRing
 Direction: TypeAlias = tuple[Element, Element]
 """Cosine and sine of an angle."""
 
-EXACT_STEP = Fraction(1, 12)
+_EXACT_STEP = Fraction(1, 12)
 """15 degrees in half turns: cosines of multiples of 15 degrees are in Q(sqrt 2, sqrt 3)."""
 
 
@@ -90,7 +90,7 @@ class Reader:
 
 def is_exact(monomial: Monomial, coefficient: Fraction) -> bool:
     """Return whether a term of an angle is a multiple of 15 degrees."""
-    return monomial == ((Atom("pi"), 1),) and (coefficient / EXACT_STEP).denominator == 1
+    return monomial == ((Atom("pi"), 1),) and (coefficient / _EXACT_STEP).denominator == 1
 
 
 def reciprocal_text(atom: Atom) -> str:

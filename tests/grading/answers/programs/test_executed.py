@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from dhkit.cli import main
 from dhkit.description import library_robot
 from dhkit.errors import AnswerError
 from dhkit.execution import Isolation, Kind, find_isolation
+from dhkit.execution.bounds import BOUNDS
 from dhkit.grading import grade
 from dhkit.grading.answers.sheet import read_task
 from dhkit.grading.report import Verdict
@@ -164,7 +166,7 @@ def test_sampled_parameters_vary(judged):
     ],
 )
 def test_what_is_no_answer_is_refused(judged, text, reason, monkeypatch):
-    monkeypatch.setattr("dhkit.execution.child.MAX_START_TIME", 1.5)
+    monkeypatch.setattr("dhkit.execution.child.BOUNDS", replace(BOUNDS, start_time=1.5))
     try:
         report = judged(text)
     except AnswerError as error:

@@ -9,14 +9,14 @@ from dhkit.grading.answers.documents.latex_statements import latex_statements
 from dhkit.grading.answers.documents.statements import Statement, statement_of
 from dhkit.grading.answers.latex import is_latex
 
-LATEX_COMMENT = re.compile(r"(?<!\\)%(?!(?:pi|e|i)(?![A-Za-z0-9_]))[^\n]*")
-PLAIN_COMMENT = re.compile(r"#.*|%(?!(?:pi|e|i|gamma|phi)(?![A-Za-z0-9_])).*")
+_LATEX_COMMENT = re.compile(r"(?<!\\)%(?!(?:pi|e|i)(?![A-Za-z0-9_]))[^\n]*")
+_PLAIN_COMMENT = re.compile(r"#.*|%(?!(?:pi|e|i|gamma|phi)(?![A-Za-z0-9_])).*")
 """Comments of Python, MATLAB and LaTeX; %pi, %e and %i are Maxima's numbers."""
 
-CONTINUATION = re.compile(r"\s*(?:[-+*/^=)\].]|\*\*)")
+_CONTINUATION = re.compile(r"\s*(?:[-+*/^=)\].]|\*\*)")
 """How a line begins that continues the one before."""
 
-UNFINISHED = re.compile(r"(?:[-+*/^=(\[,]|\.\.\.|\\)\s*$")
+_UNFINISHED = re.compile(r"(?:[-+*/^=(\[,]|\.\.\.|\\)\s*$")
 """How a line ends that the next one continues."""
 
 
@@ -36,7 +36,7 @@ def statements_of(text: str, suffix: str = ".tex") -> list[Statement]:
         One without targets where the text is a formula alone.
     """
     if is_latex(text) or (suffix == ".tex" and "&" in text):
-        return list(latex_statements(LATEX_COMMENT.sub("", text), 1))
+        return list(latex_statements(_LATEX_COMMENT.sub("", text), 1))
     return list(_plain_statements(text))
 
 
@@ -45,12 +45,12 @@ def _plain_statements(text: str) -> Iterator[Statement]:
     held: list[str] = []
     start, depth = 1, 0
     for number, typed in enumerate(text.splitlines(), start=1):
-        line = PLAIN_COMMENT.sub("", typed)
+        line = _PLAIN_COMMENT.sub("", typed)
         if typed.strip() and not line.strip():
             continue
         goes_on = depth > 0
         if line.strip() and held and not re.search(r";\s*$", held[-1]):
-            goes_on = goes_on or CONTINUATION.match(line) is not None or UNFINISHED.search(held[-1][-20:]) is not None
+            goes_on = goes_on or _CONTINUATION.match(line) is not None or _UNFINISHED.search(held[-1][-20:]) is not None
         if not goes_on:
             yield from _statements_of_lines(held, start)
             held, start, depth = [], number, 0

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from dhkit.description import Description
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.documents.latex_rows import MATRIX_BEGINNING, has_symmetry_marks, marked_places, matrix_rows
 from dhkit.grading.answers.documents.latex_source import document_statements
 from dhkit.grading.answers.documents.statements import Statement, left_hand_name
@@ -18,21 +19,18 @@ from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Chain, Ent
 from dhkit.grading.answers.tokens import to_ascii
 from dhkit.grading.answers.vocabulary import plain_name
 
-MAX_DEFINITIONS = 2_000
-"""Largest number of names, times 10, that one formula is made of."""
-
-VALUE_WORDS = re.compile(r"\\(?:pi|circ|[td]?frac|deg)(?![A-Za-z])|\\(?:mathrm|text|textrm|si)\s*\{[^{}]*\}")
+_VALUE_WORDS = re.compile(r"\\(?:pi|circ|[td]?frac|deg)(?![A-Za-z])|\\(?:mathrm|text|textrm|si)\s*\{[^{}]*\}")
 """What the value of a joint variable may be made of besides numbers."""
 
-NUMBER_WITH_UNIT = re.compile(
+_NUMBER_WITH_UNIT = re.compile(
     r"([-+]?\s*(?:\d+\.?\d*|\.\d+))(?:\\[,;: ]|~|\s)*"
     r"(?:\\(?:mathrm|text|textrm|si|unit)\s*\{[^{}]*\}(?:\^(?:\d|\{-?\d\}))?/?)*",
     re.ASCII,
 )
 
-ENERGIES = ("K", "V", "L")
+_ENERGIES = ("K", "V", "L")
 
-ADVICE = "write it out in one formula, or on a sheet"
+_ADVICE = "write it out in one formula, or on a sheet"
 """What the author of a document may do that is not read."""
 
 
@@ -131,12 +129,12 @@ class _DocumentAnswers:
         for statement in self.by_name[name]:
             formula = statement.formulas[-1]
             is_matrix = MATRIX_BEGINNING.search(formula) is not None
-            is_number = NUMBER_WITH_UNIT.fullmatch(formula) is not None
+            is_number = _NUMBER_WITH_UNIT.fullmatch(formula) is not None
             if self.quantities.is_scalar(quantity) and not is_matrix:
                 is_other_number = is_number and (quantity in ("K", "L") or self.quantities.is_alias(name))
                 fits = not self.quantities.is_parameter(name) and not is_other_number
             else:
-                fits = is_matrix and quantity not in ENERGIES
+                fits = is_matrix and quantity not in _ENERGIES
             if fits:
                 fitting.append(statement)
             elif not is_number:
@@ -151,7 +149,7 @@ class _DocumentAnswers:
             return _refused(f"{name} is assigned twice, in {self._line(first)} and in {self._line(other)}")
         self._note_relations(first)
         formulas = first.formulas
-        if quantity not in ENERGIES:
+        if quantity not in _ENERGIES:
             formulas = self._matrices(quantity, first)
             entries = self._by_names(quantity, formulas[0]) if len(formulas) == 1 else None
             if entries is not None:
@@ -319,8 +317,8 @@ class _DocumentAnswers:
             open_names.add(name)
             waiting.append((name, definition))
             waiting += [(other, None) for other in reversed(self._names_in(definition)) if other != name]
-            if len(self.parameters) + len(waiting) > MAX_DEFINITIONS * 10:
-                return f"made of more than {MAX_DEFINITIONS} names"
+            if len(self.parameters) + len(waiting) > BOUNDS.definitions * 10:
+                return f"made of more than {BOUNDS.definitions} names"
         return ""
 
     def _shorthand_problem(self, name: str) -> str:
@@ -337,7 +335,7 @@ class _DocumentAnswers:
             formula = statement.formulas[-1]
             if MATRIX_BEGINNING.search(formula) and self.quantities.quantity(name):
                 continue
-            if self.names.vocabulary.is_state(name) and not re.search(r"[A-Za-z]", VALUE_WORDS.sub("", formula)):
+            if self.names.vocabulary.is_state(name) and not re.search(r"[A-Za-z]", _VALUE_WORDS.sub("", formula)):
                 self._add(self.left_out, self._quote(statement))
             else:
                 defining.append(statement)
@@ -351,7 +349,7 @@ class _DocumentAnswers:
         formula = statement.formulas[-1]
         if len(statement.formulas) > 1 or statement.problem:
             return False
-        if self.quantities.is_parameter(name) and (number := NUMBER_WITH_UNIT.fullmatch(formula)):
+        if self.quantities.is_parameter(name) and (number := _NUMBER_WITH_UNIT.fullmatch(formula)):
             is_same = is_same_number(self.names.parameter_value(name), float(number[1].replace(" ", "")))
             if is_same:
                 self._add(self.notes, f"{self._line(statement)}: {name} = {formula[:40]} is the file's own number")
@@ -378,4 +376,4 @@ class _DocumentAnswers:
 
 
 def _refused(reason: str) -> Refusal:
-    return Refusal(reason, ADVICE)
+    return Refusal(reason, _ADVICE)

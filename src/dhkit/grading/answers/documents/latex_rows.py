@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.tokens import word_set
 
 ROWS = word_set(
@@ -18,11 +19,13 @@ ROWS = word_set(
     """
 )
 """Environments whose rows are equations, or parts of them."""
-JOINED = frozenset(("eqnarray", "IEEEeqnarray"))
+_JOINED = frozenset(("eqnarray", "IEEEeqnarray"))
 """Environments with an & on either side of the relation."""
-OPTIONED = frozenset(("alignat", "alignedat", "xalignat", "IEEEeqnarray", "empheq", "multlined", "gathered", "aligned"))
+_OPTIONED = frozenset(
+    ("alignat", "alignedat", "xalignat", "IEEEeqnarray", "empheq", "multlined", "gathered", "aligned")
+)
 """Environments whose name options or columns may follow."""
-MARK = re.compile(
+_MARK = re.compile(
     r"\\begin\s*\{(?P<begin>\w+)\*?\}(?P<options>\s*(?:\[[^\]\n]*\]|\{[clrCLR|\d ]*\})*)?"
     r"|\\end\s*\{(?P<end>\w+)\*?\}"
     r"|\\(?:\\\*?|cr(?![A-Za-z])|newline(?![A-Za-z]))(?:\s*\[-?\d*\.?\d+\s*(?:pt|em|ex|mm|cm)\])?"
@@ -30,10 +33,8 @@ MARK = re.compile(
     re.DOTALL,
 )
 
-MAX_BLANK_PIECES = 8
-"""Largest number of pieces in front of a row that may all be blank: labels and line breaks."""
 
-SYSTEM = re.compile(
+_SYSTEM = re.compile(
     r"\\left\s*\\\{\s*\\begin\s*\{(array|aligned|matrix)\}(?:\s*\{[clr@{}|]*\})?((?:(?!\\begin|\\end).)*)"
     r"\\end\s*\{\1\}\s*\\right\s*\.",
     re.DOTALL,
@@ -81,7 +82,7 @@ def rows_of(text: str, line: int) -> Iterator[Row]:
     line
         Its first line, from 1.
     """
-    text = SYSTEM.sub(lambda m: rf"\begin{{cases}}{m[2]}\end{{cases}}" if "=" in m[2] else m[0], text)
+    text = _SYSTEM.sub(lambda m: rf"\begin{{cases}}{m[2]}\end{{cases}}" if "=" in m[2] else m[0], text)
     matrices: list[str] = []  # open environments whose rows are no equations
     environments = [""]  # open environments of rows
     braces = 0
@@ -90,14 +91,14 @@ def rows_of(text: str, line: int) -> Iterator[Row]:
     start, at = line, 0
 
     def end_row() -> Iterator[Row]:
-        yield from _equations([*columns, "".join(pieces)], start, environments[-1] in JOINED)
+        yield from _equations([*columns, "".join(pieces)], start, environments[-1] in _JOINED)
         columns.clear()
         pieces.clear()
 
-    for mark in MARK.finditer(text):
+    for mark in _MARK.finditer(text):
         pieces.append(text[at : mark.start()])
         line += text.count("\n", at, mark.start())
-        if len(pieces) <= MAX_BLANK_PIECES and not columns and not "".join(pieces).strip():
+        if len(pieces) <= BOUNDS.blank_pieces and not columns and not "".join(pieces).strip():
             start = line
         at = mark.end()
         word, begins, ends = mark[0], mark["begin"], mark["end"]
@@ -111,7 +112,7 @@ def rows_of(text: str, line: int) -> Iterator[Row]:
             yield from end_row()
             if begins:
                 environments.append(begins)
-                pieces.append("" if begins in OPTIONED else mark["options"] or "")
+                pieces.append("" if begins in _OPTIONED else mark["options"] or "")
             elif len(environments) > 1:
                 environments.pop()
             start = line
@@ -150,12 +151,12 @@ def _equations(columns: list[str], line: int, is_joined: bool) -> Iterator[Row]:
 
 MATRIX_BEGINNING = re.compile(r"\\begin\s*\{(?:[bpvBV]?|small)?(?:matrix|array)\*?\}")
 
-WHOLE_MATRIX = re.compile(
+_WHOLE_MATRIX = re.compile(
     r"\s*(?:\\left\s*[\[(]\s*)?\\begin\s*\{(\w+\*?)\}(?:\{[clr|]*\})?(.*)\\end\s*\{\1\}\s*(?:\\right\s*[\])])?\s*",
     re.DOTALL,
 )
 
-SYMMETRY_MARK = re.compile(
+_SYMMETRY_MARK = re.compile(
     r"(?:\*|\\(?:ast|star|cdot|bullet)(?![A-Za-z])"
     r"|\\(?:text|textrm|mbox|mathrm|textit|rm)\s*\{\s*(?:[Ss]ymm?\.?|[Ss]ymmetric|SYM\.?)\s*\}|[Ss]ymm?\.?)"
 )
@@ -164,7 +165,7 @@ SYMMETRY_MARK = re.compile(
 
 def matrix_rows(formula: str) -> list[list[str]] | None:
     r"""Return the rows of a matrix that is all of a formula, entries as typed; None of another formula."""
-    match = WHOLE_MATRIX.fullmatch(formula)
+    match = _WHOLE_MATRIX.fullmatch(formula)
     if match is None or "\\begin" in match[2]:
         return None
     rows: list[list[str]] = [[""]]
@@ -197,4 +198,4 @@ def marked_places(rows: list[list[str]]) -> set[tuple[int, int]]:
 def _is_mark(entry: str) -> bool:
     while entry.startswith("{") and entry.endswith("}"):
         entry = entry[1:-1].strip()
-    return SYMMETRY_MARK.fullmatch(entry) is not None
+    return _SYMMETRY_MARK.fullmatch(entry) is not None

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.documents.latex_rows import ROWS
 from dhkit.grading.answers.documents.latex_statements import (
     STARTS,
@@ -19,13 +20,7 @@ from dhkit.grading.answers.documents.statements import Statement
 from dhkit.grading.answers.latex import DOT_MACROS, FRACTIONS, GREEK, SIZES, SPACE_NAMES, STYLE_MACROS, SYMBOL_MACROS
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 
-MAX_STATEMENTS = 5_000
-"""Largest number of statements of a document."""
-
-MAX_MACROS = 300
-"""Largest number of macros that a document defines."""
-
-MACRO = re.compile(
+_MACRO = re.compile(
     r"\\(?:(?:re)?newcommand|providecommand|DeclareMathOperator|DeclareRobustCommand"
     r"|(?:New|Renew|Declare|Provide)DocumentCommand|DeclareMathSymbol|DeclareMathAccent"
     r"|(?:New|Renew|Declare)CommandCopy)(?![A-Za-z])\*?"
@@ -33,7 +28,7 @@ MACRO = re.compile(
 )
 """The definition of a macro of letters, up to its name."""
 
-CHANGES = re.compile(
+_CHANGES = re.compile(
     r"\\(?:catcode|mathcode|lccode|uccode|csname|endcsname|expandafter|scantokens|lowercase|uppercase|aftergroup)"
     r"(?![A-Za-z])|\\renewenvironment\s*\{(?:"
     + "|".join(sorted(ROWS))
@@ -42,30 +37,30 @@ CHANGES = re.compile(
 )
 """Commands that may change the meaning of anything behind them, and definitions, also of macros that are no letters."""
 
-READ_MACROS = frozenset(
+_READ_MACROS = frozenset(
     {*GREEK, *FUNCTION_NAMES, *FRACTIONS, *SYMBOL_MACROS, *DOT_MACROS, *STYLE_MACROS, *SIZES, *SPACE_NAMES}
     | {"sqrt", "over", "partial", "top", "begin", "end", "label", "tag", "equiv", "approx", "pm", "mp", "mbox"}
 )
 """Macros that have a meaning, which no document should change."""
 
-SYMBOL = re.compile(
+_SYMBOL = re.compile(
     r"(?:\\[A-Za-z]+|[A-Za-z])(?:\s*\{\s*\\?[A-Za-z]+(?:_(?:\w|\{\w+\}))?\s*\})?(?:_(?:[A-Za-z0-9]|\{[A-Za-z0-9,]+\}))?",
     re.ASCII,
 )
 """One symbol, perhaps with an accent and an index: a macro that stands for it is replaced by it."""
 
-HIDDEN = re.compile(r"\\begin\s*\{(verbatim\*?|comment|lstlisting|minted|filecontents\*?)\}|\\iffalse(?![A-Za-z])")
+_HIDDEN = re.compile(r"\\begin\s*\{(verbatim\*?|comment|lstlisting|minted|filecontents\*?)\}|\\iffalse(?![A-Za-z])")
 
-INNER_ROWS = frozenset(["cases", "dcases", "rcases", "split", "aligned", "gathered", "multlined", "alignedat"])
+_INNER_ROWS = frozenset(["cases", "dcases", "rcases", "split", "aligned", "gathered", "multlined", "alignedat"])
 """Environments that stand inside displays."""
 
-OPENING = re.compile(
-    r"(?<!\\)\$\$?|(?<!\\)\\\[|\\\(|\\begin\{(?P<name>(?:" + "|".join(sorted(ROWS - INNER_ROWS)) + r")\*?)\}"
+_OPENING = re.compile(
+    r"(?<!\\)\$\$?|(?<!\\)\\\[|\\\(|\\begin\{(?P<name>(?:" + "|".join(sorted(ROWS - _INNER_ROWS)) + r")\*?)\}"
 )
-CLOSERS = {"$": "$", "$$": "$$", "\\[": "\\]", "\\(": "\\)"}
+_CLOSERS = {"$": "$", "$$": "$$", "\\[": "\\]", "\\(": "\\)"}
 
 
-class Display(NamedTuple):
+class _Display(NamedTuple):
     """A display, or a formula in the text."""
 
     line: int
@@ -75,7 +70,7 @@ class Display(NamedTuple):
     """Whether it stands in the text."""
 
 
-class Macro(NamedTuple):
+class _Macro(NamedTuple):
     """A macro that a document defines."""
 
     line: int
@@ -93,21 +88,21 @@ def document_statements(text: str) -> Iterator[Statement]:
         More statements than are read, or a command that may change the meaning of anything behind it.
     """
     for count, statement in enumerate(_statements(text)):
-        if count >= MAX_STATEMENTS:
-            raise AnswerError(f"more than {MAX_STATEMENTS} equations")
+        if count >= BOUNDS.statements:
+            raise AnswerError(f"more than {BOUNDS.statements} equations")
         yield statement
 
 
 def _statements(text: str) -> Iterator[Statement]:
     text = text.replace("\r\n", "\n").replace("\r", "\n").replace("\f", " ")
     text = re.sub(r"(?<!\\)((?:\\\\)*)%[^\n]*", r"\1", text)
-    text = _blank(text, HIDDEN, _end_of_hidden)
+    text = _blank(text, _HIDDEN, _end_of_hidden)
     _refuse_changes(text)
     macros = _macros(text)
     preamble, begins, body = text.partition("\\begin{document}")
     if begins:
         text = re.sub(r"[^\n]", "", preamble) + body.partition("\\end{document}")[0]
-    text = _blank(text, MACRO, _end_of_definition)
+    text = _blank(text, _MACRO, _end_of_definition)
     last: Statement | None = None
     for display in _displays(text):
         inside, problems = _expand(display.inside, macros)
@@ -160,13 +155,13 @@ def _end_of_definition(match: re.Match[str]) -> int:
     return end
 
 
-def _displays(text: str) -> Iterator[Display]:
+def _displays(text: str) -> Iterator[_Display]:
     """Yield displays and formulas in the text; paragraphs where there are none."""
     line, counted, at, has_math = 1, 0, 0, False
     absent: set[str] = set()
-    while match := OPENING.search(text, at):
+    while match := _OPENING.search(text, at):
         name = match["name"]
-        closer = f"\\end{{{name}}}" if name else CLOSERS[match[0]]
+        closer = f"\\end{{{name}}}" if name else _CLOSERS[match[0]]
         end = -1 if closer in absent else text.find(closer, match.end())
         while match[0] in ("$", "$$") and end > 0 and text[end - 1] == "\\":
             end = text.find(closer, end + 1)
@@ -183,13 +178,13 @@ def _displays(text: str) -> Iterator[Display]:
             inside = re.sub(r"\A\s*(?:\[[^\]\n]*\])?\s*\{[^{}]*\}", "", inside)
         if environment in ("eqnarray", "IEEEeqnarray"):
             inside = rf"\begin{{eqnarray}}{inside}\end{{eqnarray}}"
-        yield Display(line, inside, match[0] in ("$", "\\("))
+        yield _Display(line, inside, match[0] in ("$", "\\("))
         at = end + len(closer)
     if has_math:
         return
     line = 1
     for paragraph in re.split(r"(\n[ \t]*\n)", text):
-        yield Display(line, paragraph, False)
+        yield _Display(line, paragraph, False)
         line += paragraph.count("\n")
 
 
@@ -204,36 +199,36 @@ def _refuse_changes(text: str) -> None:
     AnswerError
         Such a command, with its line.
     """
-    definitions = {match.start() for match in MACRO.finditer(text)}
-    for match in CHANGES.finditer(text):
+    definitions = {match.start() for match in _MACRO.finditer(text)}
+    for match in _CHANGES.finditer(text):
         if match.start() not in definitions:
             line = text.count("\n", 0, match.start()) + 1
             raise AnswerError(f"line {line}: {match[0]} may change what formulas mean, and is not read")
 
 
-def _macros(text: str) -> dict[str, Macro]:
+def _macros(text: str) -> dict[str, _Macro]:
     """Return the macros that a document defines, by name.
 
     Raises
     ------
     AnswerError
-        More than :data:`MAX_MACROS`.
+        More than ``BOUNDS.macros``.
     """
-    macros: dict[str, Macro] = {}
+    macros: dict[str, _Macro] = {}
     line, at = 1, 0
-    for match in MACRO.finditer(text):
+    for match in _MACRO.finditer(text):
         line += text.count("\n", at, match.start())
         at = match.start()
         name = match[1] or match[2]
         body = re.compile(r"\s*\{([^{}]*(?:\{[^{}]*\}[^{}]*)*)\}").match(text, match.end())
         symbol = body[1].strip() if body else ""
         is_command = text.startswith(("\\newcommand", "\\renewcommand", "\\providecommand", "\\def"), match.start())
-        is_symbol = SYMBOL.fullmatch(symbol) is not None and is_command
-        if name in READ_MACROS and symbol not in (f"\\var{name}", f"\\{name.removeprefix('var')}"):
+        is_symbol = _SYMBOL.fullmatch(symbol) is not None and is_command
+        if name in _READ_MACROS and symbol not in (f"\\var{name}", f"\\{name.removeprefix('var')}"):
             is_symbol = False
-        if len(macros) > MAX_MACROS:
-            raise AnswerError(f"more than {MAX_MACROS} macros")
-        macros[name] = Macro(line, symbol if is_symbol and name not in macros else None)
+        if len(macros) > BOUNDS.macros:
+            raise AnswerError(f"more than {BOUNDS.macros} macros")
+        macros[name] = _Macro(line, symbol if is_symbol and name not in macros else None)
     return macros
 
 
@@ -241,7 +236,7 @@ def _uses(text: str, macro: str) -> bool:
     return re.search(rf"\\{macro}(?![A-Za-z])", text) is not None
 
 
-def _expand(text: str, macros: Mapping[str, Macro]) -> tuple[str, dict[str, str]]:
+def _expand(text: str, macros: Mapping[str, _Macro]) -> tuple[str, dict[str, str]]:
     """Return a display with macros for one symbol put in, and why those that are used otherwise are not read."""
     problems: dict[str, str] = {}
     for name, (line, symbol) in macros.items():

@@ -6,37 +6,38 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.documents.latex_rows import Row, rows_of
 from dhkit.grading.answers.documents.statements import SPACE, Statement, left_hand_name, statement_of
 from dhkit.grading.answers.tokens import word_set
 
-EQUAL = re.compile(
+_EQUAL = re.compile(
     r":=|=:|=(?!=)|\\(?:equiv|approx|coloneqq|triangleq|doteq|simeq|cong|eqqcolon|colonequals)(?![A-Za-z])"
     r"|\\(?:stackrel|overset)\{[^{}]*\}\{=\}"
 )
-OTHER_RELATIONS = re.compile(
+_OTHER_RELATIONS = re.compile(
     r"\\(?:neq|ne|leq|le|geq|ge|ll|gg|in|subset|propto|sim|to|rightarrow|mapsto|succ|prec|perp|mid|pm|mp)(?![A-Za-z])"
     r"|[<>]"
 )
 """Other relations, and signs with two values: a statement with one outside all brackets is not graded."""
-TWO_VALUED = re.compile(r"\\(?:pm|mp)(?![A-Za-z])")
-CONNECTIVES = re.compile(
+_TWO_VALUED = re.compile(r"\\(?:pm|mp)(?![A-Za-z])")
+_CONNECTIVES = re.compile(
     r"\\(?:Rightarrow|implies|iff|Leftrightarrow|therefore|Longrightarrow|because|land|wedge|and)(?![A-Za-z])"
 )
 """Logical signs between two statements: implication, equivalence, therefore, because, and."""
-WORDS = re.compile(
+_WORDS = re.compile(
     r"\\(?:text|textrm|mbox|textit|textbf|intertext|shortintertext|textnormal)\s*\{((?:[^{}]|\{[^{}]*\})*)\}"
 )
-DROPPED = re.compile(
+_DROPPED = re.compile(
     r"\\(?:label|tag\*?|ref|eqref|cite|vspace\*?|hspace\*?|phantom|vphantom|hphantom|color|textcolor)\s*\{[^{}]*\}"
     r"|\\(?:nonumber|notag|IEEEnonumber|IEEEyesnumber|yesnumber|displaystyle|textstyle|allowbreak|centering|noindent|hfill|smallskip|medskip|bigskip)(?![A-Za-z])"
 )
 """Macros that say nothing about a formula."""
 
-LEADING = re.compile(rf"(?:{SPACE}|\\therefore(?![A-Za-z])|[,;]|\.(?!\d))")
+_LEADING = re.compile(rf"(?:{SPACE}|\\therefore(?![A-Za-z])|[,;]|\.(?!\d))")
 """What stands in front of a formula and is no part of it."""
 
-TRAILING = (
+_TRAILING = (
     *("\\,", "\\;", "\\:", "\\!", "\\>", "\\ ", "\\quad", "\\qquad", "\\enspace", "\\thinspace", "\\space"),
     *("\\therefore", "{}", " ", "\t", "\n", "~", ",", ";", "."),
 )
@@ -44,27 +45,27 @@ TRAILING = (
 
 STARTS = re.compile(
     rf"(?:{SPACE}|\\left\.)*(?:[-+/*)\]^_']|\\(?:cdot|times|div|right|over|rVert|pm|mp|ast)(?![A-Za-z])"
-    rf"|\\bigr|\\Bigr|\\biggr|\\Biggr|{EQUAL.pattern})"
+    rf"|\\bigr|\\Bigr|\\biggr|\\Biggr|{_EQUAL.pattern})"
 )
 """Beginning of a row that continues the formula of the row before."""
 
-STARTS_WITH_RELATION = re.compile(rf"(?:{SPACE}|\\left\.)*(?:{EQUAL.pattern})")
-ENDS = re.compile(rf"(?:[-+/*=(\[]|\\(?:cdot|times|div|equiv|approx|coloneqq|pm)){SPACE}*(?:\\right\.{SPACE}*)?$")
+STARTS_WITH_RELATION = re.compile(rf"(?:{SPACE}|\\left\.)*(?:{_EQUAL.pattern})")
+_ENDS = re.compile(rf"(?:[-+/*=(\[]|\\(?:cdot|times|div|equiv|approx|coloneqq|pm)){SPACE}*(?:\\right\.{SPACE}*)?$")
 """End of a row whose formula the next row continues."""
 
-BRACKET = re.compile(
+_BRACKET = re.compile(
     r"\\begin\s*\{(?P<begin>\w+)\*?\}|\\end\s*\{(?P<end>\w+)\*?\}"
     r"|\\(?P<side>left|right)(?![A-Za-z])\s*(?:\\?.)?|\\[{}]|\\.|[(){}\[\]]",
     re.DOTALL,
 )
-OPENING, CLOSING = ("(", "[", "{", r"\{"), (")", "]", "}", r"\}")
+_OPENING, _CLOSING = ("(", "[", "{", r"\{"), (")", "]", "}", r"\}")
 
-SYMMETRIC = re.compile(r"\\(?:text|textrm|mbox|mathrm|textit)\s*\{\s*(?:[Ss]ymm?\.?|[Ss]ymmetric|SYM\.?)\s*\}")
-UNIT = re.compile(r"(?:[/ .*]*+(?>kg|mm|cm|Nm|rad|deg|[msNJWg])(?:\^?-?\d)?+)++", re.ASCII)
+_SYMMETRIC = re.compile(r"\\(?:text|textrm|mbox|mathrm|textit)\s*\{\s*(?:[Ss]ymm?\.?|[Ss]ymmetric|SYM\.?)\s*\}")
+_UNIT = re.compile(r"(?:[/ .*]*+(?>kg|mm|cm|Nm|rad|deg|[msNJWg])(?:\^?-?\d)?+)++", re.ASCII)
 """A unit such as kg m^2 or N m/rad. Groups are atomic: "mm" reads two ways, and all of them take exponential time."""
-PROSE_WORDS = word_set("and or for if as so let we now is at on in by of to the not all are")
+_PROSE_WORDS = word_set("and or for if as so let we now is at on in by of to the not all are")
 
-DOUBTFUL = re.compile(
+_DOUBTFUL = re.compile(
     r"if|iff|when|whenever|unless|otherwise|else|provided|assuming|assume|except|only|not|near|at|small|large"
     r"|plus|minus|times|divided|over|multiplied|squared|cubed|square|cube|root|twice|thrice|half|double"
     r"|negative|without|add|added|subtract|subtracted|reduced|increased|sine?|cosine?|cos"
@@ -73,10 +74,7 @@ DOUBTFUL = re.compile(
 )
 """Words that may change what a formula in front of them states."""
 
-PROSE = re.compile(r"(?:[A-Za-z~\s.,:;()'`?!]|\\[ ,]|(?<=[A-Za-z])-(?=[A-Za-z]))*", re.ASCII)
-
-MAX_ENDING = 200
-"""Number of characters at the end of a row that are searched for an operator or punctuation: bounds the time."""
+_PROSE = re.compile(r"(?:[A-Za-z~\s.,:;()'`?!]|\\[ ,]|(?<=[A-Za-z])-(?=[A-Za-z]))*", re.ASCII)
 
 
 def latex_statements(text: str, line: int) -> Iterator[Statement]:
@@ -107,7 +105,7 @@ def latex_statements(text: str, line: int) -> Iterator[Statement]:
             problem = "a row that may go on with either of two equations"
             row_statements = [replace(statement, problem=statement.problem or problem) for statement in row_statements]
         if held and not goes_on:
-            is_aside = _ends_statement(held[-1].text) and bool(_places(plain, OTHER_RELATIONS))
+            is_aside = _ends_statement(held[-1].text) and bool(_places(plain, _OTHER_RELATIONS))
             if not has_relation(plain) and not is_aside:
                 problem = problem or "a row that neither begins with an operator nor has an ="
             else:
@@ -120,7 +118,7 @@ def latex_statements(text: str, line: int) -> Iterator[Statement]:
                     row_statements += statements
                 held, problem, depth = [], "", 0
         held.append(row)
-        depth += sum(map(_nesting, BRACKET.finditer(plain)))
+        depth += sum(map(_nesting, _BRACKET.finditer(plain)))
         is_new_row = False
     if held:
         yield from row_statements
@@ -132,26 +130,26 @@ def latex_statements(text: str, line: int) -> Iterator[Statement]:
 
 def _without_words(text: str) -> str:
     """Take labels and words away; words between formulas separate them."""
-    text = DROPPED.sub(" ", text)
-    if WORDS.search(text) is None:
+    text = _DROPPED.sub(" ", text)
+    if _WORDS.search(text) is None:
         return text
-    outside = {start for start, _ in _places(text, WORDS)}
+    outside = {start for start, _ in _places(text, _WORDS)}
 
     def separator(match: re.Match[str]) -> str:
         is_outside = match.start() in outside
-        is_kept = _is_part(match, text) or (_is_doubtful(match, text) if is_outside else SYMMETRIC.match(match[0]))
+        is_kept = _is_part(match, text) or (_is_doubtful(match, text) if is_outside else _SYMMETRIC.match(match[0]))
         return match[0] if is_kept else r" \quad\therefore "
 
-    return WORDS.sub(separator, text)
+    return _WORDS.sub(separator, text)
 
 
 def _is_part(match: re.Match[str], text: str) -> bool:
     """Whether words are part of a formula: a name, or a unit behind a number."""
     inside = match[1].strip()
     if re.fullmatch(r"[A-Za-z]{1,3}\d*", inside, re.ASCII):
-        return inside.lower() not in PROSE_WORDS
+        return inside.lower() not in _PROSE_WORDS
     is_behind_number = re.search(r"\d(?:[~\s]|\\[,;: ])*$", text[max(0, match.start() - 20) : match.start()])
-    return UNIT.fullmatch(inside) is not None and is_behind_number is not None
+    return _UNIT.fullmatch(inside) is not None and is_behind_number is not None
 
 
 def _is_doubtful(match: re.Match[str], text: str) -> bool:
@@ -162,7 +160,7 @@ def _is_doubtful(match: re.Match[str], text: str) -> bool:
     if "intertext" in match[0][:20]:
         return False
     words = re.findall("[A-Za-z]+", inside)
-    if PROSE.fullmatch(inside) is None or any(DOUBTFUL.fullmatch(word) for word in words):
+    if _PROSE.fullmatch(inside) is None or any(_DOUBTFUL.fullmatch(word) for word in words):
         return True
     return bool(words) and words[-1].lower() in ("for", "as") and _is_condition(text[match.end() :])
 
@@ -170,7 +168,7 @@ def _is_doubtful(match: re.Match[str], text: str) -> bool:
 def _is_condition(text: str) -> bool:
     """Whether a text begins with a condition, q_1 > 0, rather than with an equation."""
     text = re.split(r"\\therefore|\\text|,", text, maxsplit=1)[0]
-    return not has_relation(text) and bool(_places(text, OTHER_RELATIONS))
+    return not has_relation(text) and bool(_places(text, _OTHER_RELATIONS))
 
 
 # Rows
@@ -179,10 +177,10 @@ def _is_condition(text: str) -> bool:
 def _bare(text: str) -> str:
     """Return text without the spaces and punctuation at its ends."""
     start, end = 0, len(text)
-    while match := LEADING.match(text, start, end):
+    while match := _LEADING.match(text, start, end):
         start = match.end()
     while end > start:
-        mark = next((mark for mark in TRAILING if text.endswith(mark, start, end)), "")
+        mark = next((mark for mark in _TRAILING if text.endswith(mark, start, end)), "")
         is_delimiter = mark in (",", ";", ".") and text.endswith(("\\left.", "\\right."), start, end)
         if not mark or is_delimiter:
             break
@@ -198,7 +196,7 @@ def _goes_on(last: str, depth: int, row: Row) -> bool:
         return True
     if STARTS.match(row.text) and not (has_own_left_side and has_relation(row.text)):
         return True
-    return depth > 0 or ENDS.search(last[-MAX_ENDING:]) is not None
+    return depth > 0 or _ENDS.search(last[-BOUNDS.row_ending_characters :]) is not None
 
 
 def _is_ambiguous(row: Row) -> bool:
@@ -213,14 +211,14 @@ def _is_ambiguous(row: Row) -> bool:
 
 
 def _ends_statement(text: str) -> bool:
-    return re.search(rf"(?:[,;.]|\\therefore){SPACE}*$", text[-MAX_ENDING:]) is not None
+    return re.search(rf"(?:[,;.]|\\therefore){SPACE}*$", text[-BOUNDS.row_ending_characters :]) is not None
 
 
 def _nesting(bracket: re.Match[str]) -> int:
     """Return by how much a bracket changes the depth of brackets and environments: 1, -1 or 0."""
-    if bracket["begin"] or bracket["side"] == "left" or bracket[0] in OPENING:
+    if bracket["begin"] or bracket["side"] == "left" or bracket[0] in _OPENING:
         return 1
-    return -bool(bracket["end"] or bracket["side"] == "right" or bracket[0] in CLOSING)
+    return -bool(bracket["end"] or bracket["side"] == "right" or bracket[0] in _CLOSING)
 
 
 def _places(text: str, pattern: re.Pattern[str]) -> list[tuple[int, int]]:
@@ -229,7 +227,7 @@ def _places(text: str, pattern: re.Pattern[str]) -> list[tuple[int, int]]:
         return []
     depth = 0
     places: list[tuple[int, int]] = []
-    brackets = BRACKET.finditer(text)
+    brackets = _BRACKET.finditer(text)
     bracket = next(brackets, None)
     for match in pattern.finditer(text):
         while bracket is not None and bracket.start() < match.start():
@@ -242,7 +240,7 @@ def _places(text: str, pattern: re.Pattern[str]) -> list[tuple[int, int]]:
 
 def has_relation(text: str) -> bool:
     r"""Whether a sign of equality (=, :=, \equiv, \approx ...) stands outside all brackets of a text."""
-    return bool(_places(text, EQUAL))
+    return bool(_places(text, _EQUAL))
 
 
 # Statements
@@ -255,12 +253,12 @@ def _statements_of_rows(rows: Sequence[Row], problem: str) -> list[Statement]:
     words = "words or an arrow next to a part of a formula that is no equation: "
     refused = 0  # number of statements already refused because a part that is no equation follows them
     alone = ""  # the part before a connective if it is no equation: the next statement is refused because of it
-    for part in _split(text, _places(text, CONNECTIVES)):
+    for part in _split(text, _places(text, _CONNECTIVES)):
         bare_part = _bare(part)
         if not bare_part:
             continue
         is_whole = has_relation(part) and not STARTS_WITH_RELATION.match(bare_part)
-        if not is_whole and statements and not _places(part, OTHER_RELATIONS):
+        if not is_whole and statements and not _places(part, _OTHER_RELATIONS):
             why = words + bare_part[:60]
             statements[refused:] = [replace(s, problem=s.problem or why) for s in statements[refused:]]
             refused = len(statements)
@@ -288,15 +286,15 @@ def _split(text: str, places: Sequence[tuple[int, int]]) -> list[str]:
 
 
 def _statement(text: str, line: int, problem: str) -> Statement:
-    sides = [_bare(side) for side in _split(text, _places(text, EQUAL))]
-    doubtful = [match[0] for match in WORDS.finditer(text) if _is_doubtful(match, text) and not _is_part(match, text)]
-    if not problem and sum(map(_nesting, BRACKET.finditer(text))) != 0:
+    sides = [_bare(side) for side in _split(text, _places(text, _EQUAL))]
+    doubtful = [match[0] for match in _WORDS.finditer(text) if _is_doubtful(match, text) and not _is_part(match, text)]
+    if not problem and sum(map(_nesting, _BRACKET.finditer(text))) != 0:
         problem = "brackets that do not close"
     if not problem and doubtful:
         problem = f"text that may change what is stated: {doubtful[0][:60]}"
-    if len(sides) > 1 and not problem and (signs := _places(text, TWO_VALUED)):
+    if len(sides) > 1 and not problem and (signs := _places(text, _TWO_VALUED)):
         problem = f"a sign {text[slice(*signs[0])]}, which stands for two values"
-    if len(sides) > 1 and not problem and _places(text, OTHER_RELATIONS):
+    if len(sides) > 1 and not problem and _places(text, _OTHER_RELATIONS):
         problem = "another relation than ="
     if len(sides) > 1 and not problem and not all(sides):
         problem = "an = with nothing on one side"

@@ -7,28 +7,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.latex import GREEK
 from dhkit.grading.answers.sheet import ALIASES
 from dhkit.grading.answers.vocabulary import plain_name
-
-MAX_NAME = 200
-"""Largest length of a side that may be a name, in characters."""
 
 QUANTITIES = frozenset(("M", "C", "h", "g", "tau", "K", "V", "L", "T", "J", *ALIASES))
 
 SPACE = r"(?:\s|~|\\[,;:!> ]|\\q?quad(?![A-Za-z])|\\(?:enspace|thinspace|space)(?![A-Za-z])|\{\})"
 """Pattern of one space of LaTeX's."""
 
-STYLES = re.compile(
+_STYLES = re.compile(
     r"\\(?:mathbf|mathrm|mathit|mathsf|mathcal|mathscr|boldsymbol|bm|textbf|textrm|text|vec|operatorname|mathnormal|pmb|bf|rm)(?![A-Za-z])"
 )
-LETTERS = GREEK | {"ell", "Tau", "mathbf"}
+_LETTERS = GREEK | {"ell", "Tau", "mathbf"}
 """Macros that a name may be."""
 
 NAME = re.compile(
     r"\[?(?P<letters>\\?[A-Za-z]+)\]?(?:_(?:(?P<one>[A-Za-z0-9])|\{(?P<below>[\\A-Za-z0-9, ]*)\}))?", re.ASCII
 )
-ARGUMENT = re.compile(
+_ARGUMENT = re.compile(
     r"(?:\\d?dot|dot)?\{?(?:q|\\theta|\\vartheta|\\phi|\\varphi|\\Theta|theta|phi|x|y|z|t|d|r|qd|dq|qdd|th|qdot)\}?"
     r"(?:_\{?\d*\}?|\d*)(?:\(t\))?",
     re.ASCII,
@@ -96,13 +94,13 @@ def left_hand_name(side: str) -> str:
 
     ``M_{12}(q)`` is M12, ``\mathbf{g}(\theta)`` g, ``M_{10,2}`` M10_2; ``\dot V``, ``V'`` and ``M^{-1}`` are no names.
     """
-    if len(side) > MAX_NAME:
+    if len(side) > BOUNDS.side_characters:
         return ""
     text = re.sub(rf"{SPACE}+", " ", re.sub(r"\\(?:left|right|bigl?|bigr|Bigl?|Bigr)(?![A-Za-z])", "", side))
     styled = ""
     while styled != text:
         styled = text
-        text = STYLES.sub("", text).strip()
+        text = _STYLES.sub("", text).strip()
         text = re.sub(r"^\{\s*([^{}]*?)\s*\}", r"\1", text)
         text = re.sub(r"\{\s*\{([^{}]*)\}\s*\}", r"{\1}", text)  # \dot{\mathbf{q}}
     text = re.sub(r"\s+", "", re.sub(r"\{\s*(\\?[A-Za-z]+)\s*\}", r"{\1}", text))
@@ -110,7 +108,7 @@ def left_hand_name(side: str) -> str:
     if match is None or (text.startswith("[") != text[: match.end()].count("]")):
         return ""
     letters = match["letters"]
-    if letters.startswith("\\") and plain_name(letters) not in LETTERS:
+    if letters.startswith("\\") and plain_name(letters) not in _LETTERS:
         return ""
     below = match["one"] or match["below"] or ""
     rest = text[match.end() :]
@@ -122,7 +120,7 @@ def left_hand_name(side: str) -> str:
             return ""
         if all(argument.isdecimal() for argument in arguments) and not below:
             below = ",".join(arguments)
-        elif not all(ARGUMENT.fullmatch(argument) for argument in arguments):
+        elif not all(_ARGUMENT.fullmatch(argument) for argument in arguments):
             return ""
         rest = rest[end + 1 :]
     if rest and not below and (under := re.fullmatch(r"_(?:(\w)|\{([\w,]*)\})", rest)):

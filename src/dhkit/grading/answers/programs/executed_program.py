@@ -18,6 +18,7 @@ from dhkit.errors import AnswerError
 from dhkit.execution.child import Child
 from dhkit.execution.isolation import Isolation
 from dhkit.execution.process import Failure, Limits, ProgramError, printable
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.programs.program_answers import answers_of, called_name
 from dhkit.grading.answers.programs.robot_names import RobotNames, is_same_number
 from dhkit.grading.answers.programs.scope import Bound, Record, Scope
@@ -40,25 +41,21 @@ from dhkit.grading.answers.source_code import SourceCode
 from dhkit.grading.answers.vocabulary import plain_name
 
 RUNNERS = {".py": "answers_runner.py", ".m": "answers_runner.m"}
-LIMITS = Limits(seconds=20.0, memory=2 << 30)
+_LIMITS = Limits(seconds=20.0, memory=2 << 30)
 """Limits of one request: derivations by Lagrange in sympy take seconds."""
-SAMPLING_TIME = 60.0
+_SAMPLING_TIME = 60.0
 """Processor time for calling a function at all states, s."""
-MAX_FILE_NAME = 60
-MAX_NAMES = 2_000
-MAX_TREE_DEPTH = 6
-MAX_ROWS = 1_000
-SAME_VALUES = 1e-9
+_SAME_VALUES = 1e-9
 """Relative and absolute difference up to which two functions give the same numbers."""
-KINDS = ("numpy", "sympy", "casadi")
+_KINDS = ("numpy", "sympy", "casadi")
 """How symbols are made, in the order in which they are tried."""
-PARAMETER_SETS = frozenset(("p", "par", "params", "param", "parameters", "robot", "P", "prm", "constants"))
+_PARAMETER_SETS = frozenset(("p", "par", "params", "param", "parameters", "robot", "P", "prm", "constants"))
 """Names of an argument with the robot's parameters as fields."""
-STATES = frozenset(("x", "y", "s", "state", "z", "X", "Y"))
+_STATES = frozenset(("x", "y", "s", "state", "z", "X", "Y"))
 """Names of an argument with the joint variables and their rates, in the order that the task gives."""
-TORQUES = frozenset(("tau", "u", "U", "torque", "torques", "F", "Q"))
+_TORQUES = frozenset(("tau", "u", "U", "torque", "torques", "F", "Q"))
 """Names of an argument with the motors' torques, on which no quantity depends."""
-NUMBER = re.compile(r"-?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?", re.ASCII)
+_NUMBER = re.compile(r"-?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?", re.ASCII)
 
 
 @contextmanager
@@ -99,13 +96,13 @@ def executed_answers(
         raise AnswerError(f"{path}: {code.suffix} files are not executed; expected {', '.join(RUNNERS)} or .ipynb")
     if code.suffix == ".m":
         code = _functions_first(code)
-    name = re.sub(r"\W", "_", path.stem, flags=re.ASCII)[:MAX_FILE_NAME] + code.suffix
+    name = re.sub(r"\W", "_", path.stem, flags=re.ASCII)[: BOUNDS.file_name_characters] + code.suffix
     with tempfile.TemporaryDirectory(prefix="dhkit-answers-") as folder:
         source = Path(folder) / name
         source.write_text(code.text, "utf-8")
-        child = Child(source, RUNNERS, LIMITS, isolation)
+        child = Child(source, RUNNERS, _LIMITS, isolation)
         try:
-            program = ExecutedProgram(
+            program = _ExecutedProgram(
                 child, Record(RobotNames(description, names), "**"), str(path), code.line_name, names
             )
             yield program.sheet()
@@ -129,7 +126,7 @@ def _functions_first(code: SourceCode) -> SourceCode:
     return replace(code, text="\n".join(["1;", *(lines[k] for k in order)]), line_name=line_name)
 
 
-class ExecutedProgram:
+class _ExecutedProgram:
     """An executed program, with its names and functions as the readers of programs have them.
 
     Parameters
@@ -248,7 +245,7 @@ class ExecutedProgram:
             raise UnreadError(f"{function.name}(...) has no quantity in it")
         meaning = {name: self.symbols(name, function) for name in function.parameters}
         problem = self._ended
-        for kind in KINDS if self.child.name.endswith(".py") and not self._ended else ():
+        for kind in _KINDS if self.child.name.endswith(".py") and not self._ended else ():
             try:
                 answer = self.child.ask(
                     {"call": function.name, "arguments": meaning, "as": kind, "locals": self._local_names(function)}
@@ -321,17 +318,17 @@ class ExecutedProgram:
         robot, plain = self.record.robot, plain_name(name)
         if name in ("t", "time"):
             return "t"
-        if name in STATES and self.state:
+        if name in _STATES and self.state:
             return list(self._state_names())
         if robot.vocabulary.is_state(plain) or robot.quantities.is_parameter(name):
             return name
         if robot.is_vector(plain):
             return [f"{plain}{k + 1}" for k in range(robot.n)]
-        if name in PARAMETER_SETS:
+        if name in _PARAMETER_SETS:
             return {}
-        if name in TORQUES:
+        if name in _TORQUES:
             return [f"torque{k + 1}" for k in range(robot.n)]
-        more = ', or a state whose order the task gives ([names] state = "q, qd")' if name in STATES else ""
+        more = ', or a state whose order the task gives ([names] state = "q, qd")' if name in _STATES else ""
         found = f"the argument {name[:40]} of {function.name}"
         self.problems.append(f"{found} is not known; expected joint variables, parameters{more}")
         raise UnreadError(self.problems[-1])
@@ -413,7 +410,7 @@ class ExecutedProgram:
 class _SampledFunction(SampledAnswer):
     """A function that is called with numbers; ``local`` is the local name that is the answer, empty for its value."""
 
-    program: ExecutedProgram
+    program: _ExecutedProgram
     function: Function
     local: str
     others: tuple[_SampledFunction, ...] = ()
@@ -428,7 +425,7 @@ class _SampledFunction(SampledAnswer):
         """The robot's parameters that are arguments."""
         robot = self.program.record.robot
         names = self.function.parameters
-        if any(name in PARAMETER_SETS for name in names):
+        if any(name in _PARAMETER_SETS for name in names):
             return frozenset(robot.quantities.parameters.values())
         plain = map(plain_name, names)
         return frozenset(robot.quantities.parameters[x] for x in plain if x in robot.quantities.parameters)
@@ -466,7 +463,7 @@ class _SampledFunction(SampledAnswer):
             samples.append({name: _numbers_of(key, numbers) for name, key in keys.items()})
         try:
             answer = self.program.child.ask(
-                {"call": self.function.name, "samples": samples, "local": self.local}, SAMPLING_TIME
+                {"call": self.function.name, "samples": samples, "local": self.local}, _SAMPLING_TIME
             )
         except ProgramError as error:
             raise AnswerError(f"{self.name}: {self.program.error_text(error)}") from None
@@ -515,7 +512,7 @@ def _numbers_of(keys: object, numbers: Mapping[str, float]) -> object:
 
 
 def _are_same(values: Array, others: Array) -> bool:
-    return bool(np.allclose(values, others, rtol=SAME_VALUES, atol=SAME_VALUES, equal_nan=True))
+    return bool(np.allclose(values, others, rtol=_SAME_VALUES, atol=_SAME_VALUES, equal_nan=True))
 
 
 # What a process says, which is not trusted
@@ -526,12 +523,14 @@ def _fields(value: object) -> list[tuple[str, Any]]:
     if not isinstance(value, dict):
         return []
     return [
-        (name, one) for name, one in list(value.items())[:MAX_NAMES] if isinstance(name, str) and name.isidentifier()
+        (name, one)
+        for name, one in list(value.items())[: BOUNDS.executed_names]
+        if isinstance(name, str) and name.isidentifier()
     ]
 
 
 def _listed(value: object) -> list[dict[str, Any]]:
-    return [one for one in value[:MAX_NAMES] if isinstance(one, dict)] if isinstance(value, list) else []
+    return [one for one in value[: BOUNDS.executed_names] if isinstance(one, dict)] if isinstance(value, list) else []
 
 
 def _texts(value: object) -> tuple[str, ...]:
@@ -575,18 +574,18 @@ def _is_constant(value: Scalar) -> bool:
 
 
 def _value_of_tree(tree: object, names: Mapping[str, str], depth: int = 0) -> Value:
-    if depth > MAX_TREE_DEPTH:
+    if depth > BOUNDS.value_nesting:
         return Unread("nested too deep")
     match tree:
         case str(text):
             text = _renamed(text, names)
-            if NUMBER.fullmatch(text) and not text.startswith("-"):
+            if _NUMBER.fullmatch(text) and not text.startswith("-"):
                 return number(text)
             with suppress(ValueError):
-                return Scalar(text, Level.SUM, float(text) if NUMBER.fullmatch(text) else None)
+                return Scalar(text, Level.SUM, float(text) if _NUMBER.fullmatch(text) else None)
         case list(rows):
-            if len(rows) > MAX_ROWS:
-                return Unread(f"a list of more than {MAX_ROWS} values")
+            if len(rows) > BOUNDS.list_values:
+                return Unread(f"a list of more than {BOUNDS.list_values} values")
             return _value_of_list([_value_of_tree(row, names, depth + 1) for row in rows])
         case {"fields": dict(fields)}:
             return Structure({name: _value_of_tree(one, names, depth + 1) for name, one in _fields(fields)})

@@ -35,10 +35,10 @@ UNCHANGED = word_set(
 )
 """Functions and methods that write an expression in another way, or copy it."""
 
-FLAT = word_set("flatten ravel squeeze")
+_FLAT = word_set("flatten ravel squeeze")
 """Functions and methods that make a vector with one index."""
 
-EXACT = frozenset(("Integer", "int", "round", "floor", "ceil", "trunc"))
+_EXACT = frozenset(("Integer", "int", "round", "floor", "ceil", "trunc"))
 """Functions that make another number of a quotient: Integer(1/3) is 0."""
 
 SCALAR = frozenset(FUNCTION_NAMES) - {"Rational", "Integer", "Float", "S", "number", "sympify"}
@@ -70,7 +70,7 @@ def called(scope: Scope, function: str, arguments: Sequence[Value], of_numpy: bo
         case ("zeros", [Scalar() as n]) if not of_numpy and n.text.isdecimal():  # sympy's and MATLAB's are square
             return zeros(int(n.text[:6]), int(n.text[:6]))
         case ("zeros", _) if arguments:
-            return zeros(*shape_of(arguments), multiplies_entries=of_numpy)
+            return zeros(*_shape_of(arguments), multiplies_entries=of_numpy)
         case ("zeros_like", [Matrix() as matrix]):
             return matrix.mapped(lambda x: zeros(1).entries[(0,)])
         case ("eye" | "identity", [Scalar() as n]):
@@ -98,11 +98,11 @@ def called(scope: Scope, function: str, arguments: Sequence[Value], of_numpy: bo
             return x
         case ("S" | "sympify", [Scalar() as x]):
             return x
-    if function in EXACT:
+    if function in _EXACT:
         raise UnreadError(f"{function}(...) of anything but whole numbers is not read")
     if function in UNCHANGED and arguments:
         return unchanged(arguments[0])
-    if function in FLAT and len(arguments) == 1:
+    if function in _FLAT and len(arguments) == 1:
         return flat(arguments[0])
     if function in SCALAR and arguments:
         return applied(function, [scope.scalar(argument) for argument in arguments])
@@ -134,7 +134,7 @@ def as_matrix(value: Value, of_numpy: bool) -> Matrix:
     raise UnreadError("a matrix of something else than rows of numbers is not read")
 
 
-def shape_of(arguments: Sequence[Value]) -> tuple[int, ...]:
+def _shape_of(arguments: Sequence[Value]) -> tuple[int, ...]:
     """Return the numbers of rows and columns in zeros(2, 2), zeros(2) and zeros((2, 2))."""
     numbers: list[int] = []
     for argument in arguments:

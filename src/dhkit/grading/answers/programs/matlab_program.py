@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import accumulate
 
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.programs.library import called
 from dhkit.grading.answers.programs.matlab_tokens import (
     CHANGING,
@@ -22,7 +23,6 @@ from dhkit.grading.answers.programs.matlab_tokens import (
 )
 from dhkit.grading.answers.programs.scope import Record, Scope
 from dhkit.grading.answers.programs.values import (
-    MAX_INDEX,
     Function,
     Given,
     Index,
@@ -45,20 +45,15 @@ from dhkit.grading.answers.programs.values import (
 from dhkit.grading.answers.tokens import rate_name, word_set
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, plain_name
 
-MAX_STATEMENTS = 5_000
-"""Largest number of statements that are read, those of functions each time that they are applied."""
-MAX_DEPTH = 20
-"""Largest depth of calls of the program's own functions."""
-
-BLOCK_BEGINNINGS = word_set(
+_BLOCK_BEGINNINGS = word_set(
     "if for while switch try parfor spmd unwind_protect do classdef methods properties events enumeration"
 )
-BLOCK_BRANCHES = frozenset(["else", "elseif", "case", "otherwise", "catch", "unwind_protect_cleanup"])
-BLOCK_ENDS = word_set(
+_BLOCK_BRANCHES = frozenset(["else", "elseif", "case", "otherwise", "catch", "unwind_protect_cleanup"])
+_BLOCK_ENDS = word_set(
     "end endif endfor endwhile endswitch end_try_catch endfunction endparfor end_unwind_protect until"
 )
 
-UNBOUNDED = word_set(
+_UNBOUNDED = word_set(
     """
     eval evalc evalin assignin load run source feval builtin str2func inputname import cellfun arrayfun evalAt
     rehash dbstop keyboard inline matlabFunction_eval script
@@ -76,10 +71,10 @@ COMMANDS = word_set(
 """Commands, and functions without a value, that assign nothing."""
 
 FUNCTIONS = frozenset(FUNCTION_NAMES) - {"square", "pow", "S", "Float", "Integer", "Rational", "number"}
-KNOWN_WORDS = COMMANDS | FUNCTIONS | {"ans", "break", "continue", "pi"}
+_KNOWN_WORDS = COMMANDS | FUNCTIONS | {"ans", "break", "continue", "pi"}
 """Words that, as a statement of their own, run no other file."""
 
-SYNTAX = word_set(
+_SYNTAX = word_set(
     """
     syms sym vpa str2sym symfun plus minus times mtimes rdivide mrdivide power mpower uminus uplus ctranspose
     transpose horzcat vertcat subsref subsasgn colon subsindex end nargin
@@ -87,12 +82,12 @@ SYNTAX = word_set(
 )
 """Functions that signs and brackets of formulas stand for, and those that make symbols."""
 
-ASSUMPTIONS = frozenset(["real", "positive", "integer", "rational", "clear", "nonnegative", "matrix"])
+_ASSUMPTIONS = frozenset(["real", "positive", "integer", "rational", "clear", "nonnegative", "matrix"])
 """Words behind the names of ``syms``."""
 
-PLAIN_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
-SUMS, PRODUCTS = ("+", "-", ".+", ".-"), ("*", "/", ".*", "./")
-POWERS = {"^": "^", "**": "^", ".^": ".^", ".**": ".^"}
+_PLAIN_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_SUMS, _PRODUCTS = ("+", "-", ".+", ".-"), ("*", "/", ".*", "./")
+_POWERS = {"^": "^", "**": "^", ".^": ".^", ".**": ".^"}
 
 
 @dataclass(frozen=True)
@@ -143,8 +138,8 @@ class MatlabProgram:
         statements = []
         for statement in matlab_statements(text, file, line_name):
             statements.append(statement)
-            if len(statements) > MAX_STATEMENTS:
-                raise AnswerError(f"{file}: more than {MAX_STATEMENTS} statements")
+            if len(statements) > BOUNDS.statements:
+                raise AnswerError(f"{file}: more than {BOUNDS.statements} statements")
         self.statements = statements
         for statement in statements:
             self.bound |= statement.assigned_names()
@@ -165,12 +160,12 @@ class MatlabProgram:
     def _refuse_unbounded(self, statement: MatlabStatement) -> None:
         for k, token in enumerate(statement.tokens):
             is_field = k > 0 and statement.tokens[k - 1].text == "."
-            if token.kind == "name" and token.text in UNBOUNDED and not is_field and token.text not in self.bound:
+            if token.kind == "name" and token.text in _UNBOUNDED and not is_field and token.text not in self.bound:
                 raise self._refuse(
                     statement,
                     f"found {token.text!r}, which may change any name; a program is read, not run (--execute)",
                 )
-        if statement.keyword in UNBOUNDED:
+        if statement.keyword in _UNBOUNDED:
             raise self._refuse(statement, f"found {statement.keyword!r}, which may change any name")
 
     # Functions
@@ -197,11 +192,11 @@ class MatlabProgram:
                             statements[end], "found a function inside a function or a block", "functions side by side"
                         )
                     break
-                if word in BLOCK_ENDS:
+                if word in _BLOCK_ENDS:
                     if depth == 0:
                         break
                     depth -= 1
-                depth += word in BLOCK_BEGINNINGS
+                depth += word in _BLOCK_BEGINNINGS
                 end += 1
             self._define(statement, statements[k + 1 : end])
             k = end + has_ends
@@ -211,8 +206,8 @@ class MatlabProgram:
         """Whether functions close with an end of their own, as all or none of a file do."""
         words = [statement.tokens[0].text for statement in statements]
         functions = words.count("function")
-        openers = sum(word in BLOCK_BEGINNINGS for word in words)
-        closers = sum(word in BLOCK_ENDS for word in words)
+        openers = sum(word in _BLOCK_BEGINNINGS for word in words)
+        closers = sum(word in _BLOCK_ENDS for word in words)
         if functions and closers == openers + functions:
             return True
         if closers == openers:
@@ -227,7 +222,7 @@ class MatlabProgram:
         if not right or right[0].kind != "name":
             raise self._refuse(statement, "found a function without a name")
         name = right[0].text
-        if name in SYNTAX:
+        if name in _SYNTAX:
             raise self._refuse(statement, f"found a function {name!r}, which changes what formulas mean")
         if any(token.text == "=" for token in right[1:]):
             raise self._refuse(statement, "found a default of an argument", "arguments by name alone")
@@ -257,7 +252,7 @@ class MatlabProgram:
         """
         if function.name in function.definition.results:
             raise UnreadError(f"{function.name} is the name of a function and of its result, in {function.line}")
-        if self.depth >= MAX_DEPTH:
+        if self.depth >= BOUNDS.call_depth:
             raise UnreadError(f"{function.name} calls itself, or functions nested too deep")
         definition: _Definition = function.definition
         local = set(function.parameters)
@@ -327,18 +322,18 @@ class MatlabProgram:
         has_returned = False
         for statement in statements:
             self.count += 1
-            if self.count > MAX_STATEMENTS:
-                raise AnswerError(f"{self.file}: more than {MAX_STATEMENTS} statements")
+            if self.count > BOUNDS.statements:
+                raise AnswerError(f"{self.file}: more than {BOUNDS.statements} statements")
             word = statement.keyword
             line = self.line_name(statement.line)
-            if word in BLOCK_BEGINNINGS:
+            if word in _BLOCK_BEGINNINGS:
                 blocks.append(word)
                 self._change(statement, scope, repr(word), line)
-            elif word in BLOCK_ENDS:
+            elif word in _BLOCK_ENDS:
                 if not blocks:
                     raise self._refuse(statement, f"found {word!r}, which closes nothing")
                 blocks.pop()
-            elif word in BLOCK_BRANCHES and blocks:
+            elif word in _BLOCK_BRANCHES and blocks:
                 self._change(statement, scope, repr(word), line)
             elif word == "return":
                 if scope is self.main:
@@ -360,7 +355,7 @@ class MatlabProgram:
             scope.change(name, f"{name[:40]} is changed by {what} in {line}", only_matrices=False)
 
     def _refuse_script(self, statement: MatlabStatement, word: str) -> None:
-        known = {*KNOWN_WORDS, *self.bound, *self.signature_names}
+        known = {*_KNOWN_WORDS, *self.bound, *self.signature_names}
         if len(statement.tokens) == 1 and word and word not in known:
             raise self._refuse(statement, f"found {word!r}, which may be a script that changes any name", "assignments")
 
@@ -407,7 +402,7 @@ class MatlabProgram:
         words = re.sub(r"['\",]", " ", words)
         for match in re.finditer(r"([A-Za-z]\w*)(\s*\([^)]*\))?(\s*\[[^\]]*\])?", words, re.ASCII):
             name, arguments, shape = match.groups()
-            if name in ASSUMPTIONS:
+            if name in _ASSUMPTIONS:
                 continue
             if shape:
                 lengths = [int(k) for k in re.findall(r"\d{1,3}", shape)]
@@ -625,13 +620,13 @@ class _Expression:
     def sum(self) -> Value:
         """Read a sum, or one operand as it is."""
         value = self.product()
-        while sign := self._next(*SUMS):
+        while sign := self._next(*_SUMS):
             value = calculated(self._operand(value), sign[-1], self._operand(self.product()), "^")
         return value
 
     def product(self) -> Value:
         value = self.signed()
-        while sign := self._next(*PRODUCTS):
+        while sign := self._next(*_PRODUCTS):
             value = calculated(self._operand(value), sign, self._operand(self.signed()), "^")
         return value
 
@@ -645,7 +640,7 @@ class _Expression:
     def power(self) -> Value:
         value = self.postfix()
         has_power = False
-        while sign := self._next(*POWERS):
+        while sign := self._next(*_POWERS):
             if has_power:
                 raise UnreadError("a power of a power without brackets is not read")
             has_power = True
@@ -653,7 +648,7 @@ class _Expression:
             exponent = self._operand(self.primary())
             exponent = opposite(exponent) if minus == "-" else exponent
             # Powers and transposes bind alike, from the left: B^2' is (B^2)'.
-            value = self._transposed(calculated(self._operand(value), POWERS[sign], exponent, "^"))
+            value = self._transposed(calculated(self._operand(value), _POWERS[sign], exponent, "^"))
         return value
 
     def postfix(self) -> Value:
@@ -673,7 +668,7 @@ class _Expression:
         self.at += 1
         match token.kind, token.text:
             case "number", text:
-                if PLAIN_NUMBER.fullmatch(text) is None:
+                if _PLAIN_NUMBER.fullmatch(text) is None:
                     raise UnreadError(f"the number {text[:20]!r} is not read")
                 return number(text)
             case "string", text:
@@ -732,7 +727,7 @@ class _Expression:
 
     def _called(self, name: str) -> Value:
         """Return what a name in front of brackets stands for: a function of a library, or a value."""
-        is_library = name in FUNCTIONS or name in OTHER_FUNCTIONS
+        is_library = name in FUNCTIONS or name in _OTHER_FUNCTIONS
         if is_library and name not in self.program.bound and self.scope.owner(name) is None:
             self.scope.value(name)
             return Library(name)
@@ -757,7 +752,7 @@ class _Expression:
         return self._entry(value, inside, name)
 
     def _entry(self, value: Value, inside: Tokens, name: str) -> Value:
-        index = constant_index(inside)
+        index = _constant_index(inside)
         if index is None:
             index = self._index_by_names(inside)
         if index is not None:
@@ -789,7 +784,11 @@ class _Expression:
                 value = self.program.value(part, self.scope)
             except UnreadError:
                 return None
-            if not isinstance(value, Scalar) or not value.text.isdecimal() or not 0 < int(value.text[:5]) <= MAX_INDEX:
+            if (
+                not isinstance(value, Scalar)
+                or not value.text.isdecimal()
+                or not 0 < int(value.text[:5]) <= BOUNDS.index
+            ):
                 return None
             numbers.append(int(value.text) - 1)
         return tuple(numbers) if numbers else None
@@ -853,7 +852,7 @@ class _Expression:
         return calculated(number(match[1]), "/", number(match[2])) if match[2] else number(match[1])
 
 
-OTHER_FUNCTIONS = word_set(
+_OTHER_FUNCTIONS = word_set(
     "zeros eye diff sym vpa simplify expand collect combine simplifyFraction transpose ctranspose"
 )
 """Functions of MATLAB's, besides those of numbers, that are read."""
@@ -886,26 +885,26 @@ def _target(tokens: Tokens) -> tuple[str, Index | None]:
         return name, None
     if len(tokens) == 3 and tokens[1].text == "." and tokens[2].kind == "name":
         return f"{name}.{tokens[2].text}", None
-    index = constant_index(tokens[2:-1]) if is_call(tokens, name) else None
+    index = _constant_index(tokens[2:-1]) if is_call(tokens, name) else None
     return ("", None) if index is None else (name, index)
 
 
 def _row_or_column(left: Tokens) -> tuple[int | None, int | None] | None:
     """Return the row or the column, from 0, of the left-hand side M(1, :) or M(:, 2); None of another one."""
     match [token.text for token in left]:
-        case [_, "(", number, ",", ":", ")"] if number.isdecimal() and 0 < int(number[:5]) <= MAX_INDEX:
+        case [_, "(", number, ",", ":", ")"] if number.isdecimal() and 0 < int(number[:5]) <= BOUNDS.index:
             return int(number) - 1, None
-        case [_, "(", ":", ",", number, ")"] if number.isdecimal() and 0 < int(number[:5]) <= MAX_INDEX:
+        case [_, "(", ":", ",", number, ")"] if number.isdecimal() and 0 < int(number[:5]) <= BOUNDS.index:
             return None, int(number) - 1
     return None
 
 
-def constant_index(inside: Tokens) -> Index | None:
+def _constant_index(inside: Tokens) -> Index | None:
     """Return the index, from 0, between brackets; None where it is not made of whole numbers."""
     numbers, commas = inside[::2], inside[1::2]
     if len(inside) % 2 == 0 or any(token.text != "," for token in commas):
         return None
-    if not all(t.kind == "number" and t.text.isdecimal() and 0 < int(t.text[:5]) <= MAX_INDEX for t in numbers):
+    if not all(t.kind == "number" and t.text.isdecimal() and 0 < int(t.text[:5]) <= BOUNDS.index for t in numbers):
         return None
     return tuple(int(token.text) - 1 for token in numbers)
 
@@ -916,10 +915,10 @@ def _places(tokens: Tokens) -> range | str:
         case [":"]:
             return "all"
         case [low, ":", high] if (
-            low.isdecimal() and high.isdecimal() and 0 < int(low[:5]) <= int(high[:5]) <= MAX_INDEX
+            low.isdecimal() and high.isdecimal() and 0 < int(low[:5]) <= int(high[:5]) <= BOUNDS.index
         ):
             return range(int(low) - 1, int(high))
-        case [one] if one.isdecimal() and 0 < int(one[:5]) <= MAX_INDEX:
+        case [one] if one.isdecimal() and 0 < int(one[:5]) <= BOUNDS.index:
             return range(int(one) - 1, int(one))
     raise UnreadError(f"{_text(tokens)[:40]!r} as an index is not read")
 
@@ -945,7 +944,7 @@ def _added_part(
 ) -> tuple[Scalar, bool]:
     """Return what M(1,1) = M(1,1) + rest adds to the entry, and True; another right-hand side as it is."""
     end = closing(right, 1) if is_call(right[:1], name) or (len(right) > 2 and right[1].is_sign("(")) else 0
-    is_own = right[0].text == name and end and constant_index(right[2:end]) == index
+    is_own = right[0].text == name and end and _constant_index(right[2:end]) == index
     if not is_own or end + 1 >= len(right) or not right[end + 1].is_sign("+", "-"):
         return scalar, False
     rest = right[end + 2 :] if right[end + 1].text == "+" else right[end + 1 :]

@@ -9,25 +9,24 @@ from itertools import accumulate
 from typing import TypeAlias
 
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.tokens import word_set
 
-TOKEN = re.compile(
+_TOKEN = re.compile(
     r"(?P<number>0[xXbB][0-9A-Fa-f]+\w*|(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?[ij]?(?![\w]))"
     r"|(?P<name>[A-Za-z_]\w*)"
     r"|(?P<sign>\.\^'|\.\*\*|\.\^|\.\*|\./|\.\\|\.'|\+\+|--|\*\*|\+=|-=|\*=|/=|\^=|\|=|&=|==|~=|!=|<=|>=|&&|\|\|"
     r"|[-+*/\\^()\[\]{},;:=<>&|~!@.'?])",
     re.ASCII,
 )
-STRING = re.compile(r"""(?P<string>'(?:[^']|'')*'|"(?:[^"\\]|""|\\.)*")""")
-SPACE = re.compile(r"[ \t\f\v\r\u00a0]+")
+_STRING = re.compile(r"""(?P<string>'(?:[^']|'')*'|"(?:[^"\\]|""|\\.)*")""")
+_SPACE = re.compile(r"[ \t\f\v\r\u00a0]+")
 
-MAX_TOKENS = 200_000
-"""Largest number of tokens of one statement."""
 
-OPENING, CLOSING = "([{", ")]}"
+_OPENING, _CLOSING = "([{", ")]}"
 CHANGING = ("+=", "-=", "*=", "/=", "^=", "|=", "&=")
 STEPPING = ("++", "--")
-ASSIGNING = ("=", *CHANGING, *STEPPING)
+_ASSIGNING = ("=", *CHANGING, *STEPPING)
 
 COMMANDS = word_set(
     """
@@ -65,7 +64,7 @@ class MatlabToken:
     @property
     def nesting(self) -> int:
         """Change of the depth of brackets: 1, -1 or 0."""
-        return (self.text in OPENING) - (self.text in CLOSING) if self.kind == "sign" else 0
+        return (self.text in _OPENING) - (self.text in _CLOSING) if self.kind == "sign" else 0
 
     def is_sign(self, *texts: str) -> bool:
         """Whether it is one of some signs, and no string or name."""
@@ -121,7 +120,7 @@ class MatlabStatement:
         if keyword in ("for", "parfor", "catch"):
             names |= set([token.text for token in tokens[1:] if token.kind == "name"][:1])
         for k, token in enumerate(tokens):
-            if token.is_sign(*ASSIGNING):
+            if token.is_sign(*_ASSIGNING):
                 names |= _names_assigned_before(tokens, k)
             if token.is_sign(*STEPPING):
                 names |= {after.text for after in tokens[k + 1 : k + 2] if after.kind == "name"}
@@ -132,7 +131,7 @@ class MatlabStatement:
         tokens = self.tokens
         fields: set[str] = set()
         for before, token, after in zip(tokens, tokens[1:], tokens[2:], strict=False):
-            if before.text == "." and token.kind == "name" and after.is_sign(*ASSIGNING):
+            if before.text == "." and token.kind == "name" and after.is_sign(*_ASSIGNING):
                 fields.add(token.text)
         return fields
 
@@ -238,8 +237,8 @@ class _Tokenizer:
                 tokens = []
                 continue
             tokens.append(token)
-            if len(tokens) > MAX_TOKENS:
-                raise self._error(tokens[0].line, f"a statement of more than {MAX_TOKENS} signs")
+            if len(tokens) > BOUNDS.matlab_tokens:
+                raise self._error(tokens[0].line, f"a statement of more than {BOUNDS.matlab_tokens} signs")
         if self.brackets:
             sign, line = self.brackets[-1]
             raise self._error(line, f"{sign!r} does not close")
@@ -264,7 +263,7 @@ class _Tokenizer:
         """Yield a line's tokens, and its end where it ends a statement or a row of a matrix."""
         at, is_spaced = 0, True
         while at < len(line):
-            if match := SPACE.match(line, at):
+            if match := _SPACE.match(line, at):
                 at, is_spaced = match.end(), True
                 continue
             is_at_row = self.previous.kind == "row" and not self.brackets
@@ -294,9 +293,9 @@ class _Tokenizer:
         """Match the token that begins in a column of a line."""
         is_in_matrix = bool(self.brackets) and self.brackets[-1][0] in "[{"
         is_transpose = self.previous.ends_operand and not (is_spaced and is_in_matrix)
-        pattern, problem = TOKEN, f"found {line[at]!r}, which no statement has"
+        pattern, problem = _TOKEN, f"found {line[at]!r}, which no statement has"
         if line[at] == '"' or (line[at] == "'" and not is_transpose):
-            pattern, problem = STRING, "a string that does not end"
+            pattern, problem = _STRING, "a string that does not end"
         match = pattern.match(line, at)
         if match is None:
             raise self._error(number, problem)
@@ -306,7 +305,7 @@ class _Tokenizer:
         if token.nesting > 0:
             self.brackets.append((token.text, token.line))
         elif token.nesting < 0:
-            if not self.brackets or OPENING.index(self.brackets[-1][0]) != CLOSING.index(token.text):
+            if not self.brackets or _OPENING.index(self.brackets[-1][0]) != _CLOSING.index(token.text):
                 raise self._error(token.line, f"{token.text!r} without its opening bracket")
             self.brackets.pop()
 
@@ -319,6 +318,6 @@ def _takes_words(rest: str) -> bool:
 
 def _behind_words(rest: str) -> str:
     """Return what follows a command's words in its line."""
-    depths = accumulate((character in OPENING) - (character in CLOSING) for character in rest)
+    depths = accumulate((character in _OPENING) - (character in _CLOSING) for character in rest)
     ends = (k for k, depth in enumerate(depths) if rest[k] in "%#" or (rest[k] in ";," and depth <= 0))
     return rest[next(ends, len(rest)) :]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.tokens import word_set
 
-HARMLESS_MAGICS = word_set(
+_HARMLESS_MAGICS = word_set(
     """
     matplotlib config pip conda ls pwd who whos precision load_ext autoreload cd lsmagic autosave pdb xmode colors
     history env display
@@ -21,7 +21,7 @@ HARMLESS_MAGICS = word_set(
 )
 """Magics of a line that execute nothing of the program and assign nothing."""
 
-CELLS_WITHOUT_PYTHON = word_set("latex markdown html HTML javascript js svg SVG bash sh writefile")
+_CELLS_WITHOUT_PYTHON = word_set("latex markdown html HTML javascript js svg SVG bash sh writefile")
 """Magics of cells that hold another language, or text."""
 
 
@@ -121,7 +121,7 @@ def _without_magics(cell: str, where: str) -> str:
         lines = cell.split("\n")
         first = next((k for k, line in enumerate(lines) if line.strip()), 0)
         if magic := re.match(r"%%\s*(\w+)(.*)", lines[first]):
-            if magic[1] in CELLS_WITHOUT_PYTHON:
+            if magic[1] in _CELLS_WITHOUT_PYTHON:
                 return "\n".join("" for _ in lines)
             lines = _timed_or_captured(lines, first, magic[1], magic[2].split(), where)
         cell = "\n".join(_executed(line, f"{where}, line {k}") for k, line in enumerate(lines, start=1))
@@ -176,7 +176,7 @@ def _executed(line: str, where: str) -> str:
         statement = re.sub(r"^(?:-\w+\s*\d*\s+)*", "", rest)
         if word == "time" or not statement or _is_expression(statement):
             return f"{indentation}{statement or 'pass'}"
-    elif word in HARMLESS_MAGICS and not (word == "env" and "=" in stripped):
+    elif word in _HARMLESS_MAGICS and not (word == "env" and "=" in stripped):
         return f"{indentation}pass"
     raise AnswerError(f"{where}: found %{word[:20]}, which may assign any name")
 

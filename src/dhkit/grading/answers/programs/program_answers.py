@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from dhkit.errors import AnswerError
-from dhkit.grading.answers.programs.scope import MAX_DEFINITIONS, Record, Scope
+from dhkit.grading.answers.bounds import BOUNDS
+from dhkit.grading.answers.programs.scope import Record, Scope
 from dhkit.grading.answers.programs.values import (
     Function,
     Given,
@@ -24,7 +25,7 @@ from dhkit.grading.answers.quantity_names import Target
 from dhkit.grading.answers.sheet import source_sheet
 from dhkit.grading.answers.sheet_values import AnswerSheet, Chain, Entries, Refusal
 
-WRITTEN_BY_DHKIT = {
+_WRITTEN_BY_DHKIT = {
     "mass_matrix": "M",
     "coriolis_matrix": "C",
     "coriolis_torque": "h",
@@ -34,7 +35,7 @@ WRITTEN_BY_DHKIT = {
     "potential_energy": "V",
 }
 """Functions of `dhkit equations --format python`, and what they return."""
-ENERGIES = ("K", "V", "L")
+_ENERGIES = ("K", "V", "L")
 
 
 class Program(Protocol):
@@ -91,7 +92,7 @@ class _Candidate:
 
 def called_name(function: Function) -> str:
     """Return what a function is called: dhkit's own names of functions stand for the quantities."""
-    return WRITTEN_BY_DHKIT.get(function.name, function.name)
+    return _WRITTEN_BY_DHKIT.get(function.name, function.name)
 
 
 def answers_of(program: Program, file: str) -> AnswerSheet:
@@ -231,7 +232,7 @@ class _ProgramAnswers:
                 return False
             is_other_number = value.number is not None and (is_alias or quantity in ("K", "L"))
             return not self.record.robot.is_reserved(called) and not is_other_number
-        if quantity in ENERGIES:
+        if quantity in _ENERGIES:
             return len(value.entries) == 1
         return True
 
@@ -495,8 +496,8 @@ class _ProgramAnswers:
             if used in self.record.definitions and used not in keys:
                 name, definition = self.record.definitions[used]
                 self.parameters[name] = definition.text
-        if len(self.parameters) > MAX_DEFINITIONS:
-            raise AnswerError(f"answers are made of more than {MAX_DEFINITIONS} names")
+        if len(self.parameters) > BOUNDS.definitions:
+            raise AnswerError(f"answers are made of more than {BOUNDS.definitions} names")
         return value.text
 
     def _whole_answer(self, whole: Sequence[_Candidate], entries: Sequence[_Candidate]) -> str | Refusal:
@@ -541,7 +542,7 @@ class _ProgramAnswers:
         """Whether a name is rather a height or a transform that an energy is made of than an entry of h, T, J or A."""
         if not one.is_named_entry or one.target.quantity in ("M", "C", "g", "tau"):
             return False
-        energies = (other for other in candidates if other.target.quantity in ENERGIES)
+        energies = (other for other in candidates if other.target.quantity in _ENERGIES)
         user = next((other.target.quantity for other in energies if self._is_made_with(other, one)), "")
         if user:
             self.record.note(f"{one.line}: {one.name} is read as the program's own name, which {user} uses")

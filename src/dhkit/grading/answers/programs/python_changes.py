@@ -29,7 +29,7 @@ from dhkit.grading.answers.rewriting import MODULES as USUAL_MODULES
 from dhkit.grading.answers.tokens import to_ascii, word_set
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES
 
-UNBOUNDED = word_set(
+_UNBOUNDED = word_set(
     """
     exec eval compile globals locals vars setattr delattr getattr execfile run_line_magic import_module get_ipython
     run_cell_magic run_path run_module modules builtins inspect gc f_globals f_locals f_back user_ns
@@ -37,9 +37,9 @@ UNBOUNDED = word_set(
 )
 """Names and attributes with which a program may change any name of its own."""
 
-HARMLESS_DUNDER = frozenset(("__name__", "__file__", "__doc__", "__version__", "__all__", "__init__"))
+_HARMLESS_DUNDER = frozenset(("__name__", "__file__", "__doc__", "__version__", "__all__", "__init__"))
 
-NEW = (frozenset(FUNCTION_NAMES) - {"max", "min"}) | word_set(
+_NEW = (frozenset(FUNCTION_NAMES) - {"max", "min"}) | word_set(
     """
     Matrix ImmutableMatrix array matrix zeros eye ones full zeros_like ones_like identity arange linspace diag symbols
     Symbol dynamicsymbols Function diff Derivative lambdify latex pycode ccode fcode octave_code srepr inv pinv solve
@@ -51,8 +51,8 @@ NEW = (frozenset(FUNCTION_NAMES) - {"max", "min"}) | word_set(
 )
 """Functions that only calculate, and whose result shares no entry with what they are given."""
 
-QUIET = (
-    NEW
+_QUIET = (
+    _NEW
     | UNCHANGED
     | word_set(
         """
@@ -65,7 +65,7 @@ QUIET = (
 )
 """Functions that only calculate, draw or print."""
 
-QUIET_METHODS = QUIET | word_set(
+_QUIET_METHODS = _QUIET | word_set(
     """
     subs evalf T tolist join xreplace rewrite coeff n row col is_symmetric conjugate mean astype values keys items get
     split strip lower upper has free_symbols equals multiply adjugate cofactor LUsolve LDLsolve minor charpoly
@@ -75,10 +75,10 @@ QUIET_METHODS = QUIET | word_set(
 )
 """Methods of libraries' objects that change neither their object nor their arguments."""
 
-CHANGING_KEYWORDS = frozenset(("out", "inplace", "overwrite_a", "overwrite_b", "where", None))
+_CHANGING_KEYWORDS = frozenset(("out", "inplace", "overwrite_a", "overwrite_b", "where", None))
 """Keywords with which a function may change its arguments; None is the keyword of ``**options``."""
 
-MOST_ARGUMENTS = dict.fromkeys(FUNCTION_NAMES, 1) | {
+_MOST_ARGUMENTS = dict.fromkeys(FUNCTION_NAMES, 1) | {
     **dict.fromkeys(("atan2", "arctan2", "hypot", "power", "dot", "matmul", "round", "solve", "transpose", "cond"), 2),
     **dict.fromkeys(("clip", "sum", "max", "min", "reshape", "where", "trace", "outer", "mean"), 3),
     **dict.fromkeys(("diff", "Rational", "Eq", "pow", "sqrt", "root", "atan", "log"), 5),
@@ -101,10 +101,10 @@ def is_unbounded(node: ast.AST) -> bool:
     """Whether a name or an attribute may change any name of the program."""
     match node:
         case ast.Name(name) | ast.Attribute(_, name):
-            is_dunder = name.startswith("__") and name.endswith("__") and name not in HARMLESS_DUNDER
-            return is_dunder or name in UNBOUNDED
+            is_dunder = name.startswith("__") and name.endswith("__") and name not in _HARMLESS_DUNDER
+            return is_dunder or name in _UNBOUNDED
         case ast.alias(name):
-            return name.split(".")[0] in UNBOUNDED or name == "__main__"
+            return name.split(".")[0] in _UNBOUNDED or name == "__main__"
         case ast.ImportFrom(module):
             return module == "__main__"
     return False
@@ -395,7 +395,7 @@ class _Piece:
             case ast.Attribute(inner) | ast.Subscript(inner) | ast.Starred(inner):
                 return self.shared(inner)
             case ast.Call(function, arguments, keywords):
-                is_new = self._library_name(function) in NEW and not {k.arg for k in keywords} & CHANGING_KEYWORDS
+                is_new = self._library_name(function) in _NEW and not {k.arg for k in keywords} & _CHANGING_KEYWORDS
                 if is_new and not any(k.arg == "copy" for k in keywords):
                     return set()
                 shared = set().union(*map(self.shared, arguments), *(self.shared(k.value) for k in keywords))
@@ -443,16 +443,16 @@ class _Piece:
 
     def _is_quiet(self, call: ast.Call) -> bool:
         """Whether a call only calculates, draws or prints."""
-        if {k.arg for k in call.keywords} & CHANGING_KEYWORDS:
+        if {k.arg for k in call.keywords} & _CHANGING_KEYWORDS:
             return False
         arguments = [*call.args, *(k.value for k in call.keywords)]
         if any(self._is_loud_function(x) for argument in arguments for x in ast.walk(argument)):
             return False
         if library := self._library_name(call.func):
-            most = MOST_ARGUMENTS.get(library, 100)
+            most = _MOST_ARGUMENTS.get(library, 100)
             if isinstance(call.func, ast.Name) and library in ("max", "min", "sum"):
                 most = 100  # Python's own
-            return library in QUIET and len(call.args) <= most
+            return library in _QUIET and len(call.args) <= most
         match call.func:
             case ast.Name(name) if name not in self.local or self._is_bound_here(name):
                 match value_of(ascii_name(name), self.scope):
@@ -465,8 +465,8 @@ class _Piece:
             case ast.Attribute(inner, method):
                 reached = self.mentioned(inner)
                 is_own = bool(reached & self.changes.classes)
-                most = MOST_ARGUMENTS.get(method, 100) - 1 if method in ("clip", "dot", "round") else 100
-                return method in QUIET_METHODS and not is_own and len(call.args) <= most
+                most = _MOST_ARGUMENTS.get(method, 100) - 1 if method in ("clip", "dot", "round") else 100
+                return method in _QUIET_METHODS and not is_own and len(call.args) <= most
             case ast.Call(function):
                 return self._library_name(function) == "Function"
         return False

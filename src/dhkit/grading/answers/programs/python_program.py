@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.programs.library import SCALAR, as_matrix, called, flat, unchanged
 from dhkit.grading.answers.programs.python_changes import (
     Changes,
@@ -23,7 +24,6 @@ from dhkit.grading.answers.programs.python_changes import (
 )
 from dhkit.grading.answers.programs.scope import Record, Scope
 from dhkit.grading.answers.programs.values import (
-    MAX_INDEX,
     ONE,
     ZERO,
     Function,
@@ -52,40 +52,34 @@ from dhkit.grading.answers.rewriting import MODULES as USUAL_MODULES
 from dhkit.grading.answers.tokens import rate_name, word_set
 from dhkit.grading.answers.vocabulary import plain_name
 
-MODULES = word_set(
+_MODULES = word_set(
     """
     numpy sympy math cmath mpmath casadi jax.numpy autograd.numpy numpy.lib.scimath sympy.physics.mechanics
     sympy.physics.vector sympy.matrices sympy.abc symengine pylab sympy.functions sympy.core numpy.linalg
     """
 )
 """Modules whose sin is the sine, and whose other functions mean what their names say."""
-KNOWN_PACKAGES = ("numpy", "scipy", "sympy", "casadi", "matplotlib", "IPython", "mpmath", "math", "time", "pprint")
+_KNOWN_PACKAGES = ("numpy", "scipy", "sympy", "casadi", "matplotlib", "IPython", "mpmath", "math", "time", "pprint")
 """Packages whose functions are told by their names."""
-NUMPY = ("numpy", "jax.numpy", "autograd.numpy", "numpy.lib.scimath", "pylab", "np")
+_NUMPY = ("numpy", "jax.numpy", "autograd.numpy", "numpy.lib.scimath", "pylab", "np")
 """Modules whose matrices multiply entry by entry."""
-EXPORTED_LETTERS = frozenset("EINOQSe")
+_EXPORTED_LETTERS = frozenset("EINOQSe")
 """Names of one letter that these modules export."""
-MAX_STATEMENTS = 5_000
-"""Largest number of statements that are read, those of functions each time that they are applied."""
-MAX_DEPTH = 20
-"""Largest depth of calls of the program's own functions."""
-MAX_SYMBOLS = 1_000
-"""Largest index in symbols('q1:4')."""
 
-ASSUMPTIONS = word_set("cls real positive nonnegative nonzero integer commutative finite seq")
+_ASSUMPTIONS = word_set("cls real positive nonnegative nonzero integer commutative finite seq")
 """Keywords of symbols that change nothing of what is judged."""
-KNOWN_KEYWORDS = word_set(
+_KNOWN_KEYWORDS = word_set(
     "deep ratio trig force inverse rational method measure power_base power_exp mul log syms dtype"
 )
 """Keywords with which a function writes an expression in another way."""
-MATRICES = word_set("Matrix ImmutableMatrix MutableDenseMatrix ImmutableDenseMatrix DM SX MX matrix vertcat")
-ARRAYS = word_set("array asarray asanyarray")
-CASADI = word_set("DM SX MX vertcat horzcat")
+_MATRICES = word_set("Matrix ImmutableMatrix MutableDenseMatrix ImmutableDenseMatrix DM SX MX matrix vertcat")
+_ARRAYS = word_set("array asarray asanyarray")
+_CASADI = word_set("DM SX MX vertcat horzcat")
 """Matrices of casadi, which multiply entry by entry."""
-SYMBOLS = frozenset(("symbols", "Symbol", "dynamicsymbols", "var", "Dummy"))
-NUMBERS_OF_SYMPY = {"Half": Scalar("1/2", Level.PRODUCT, 0.5), "One": ONE, "Zero": ZERO, "Pi": Scalar("pi")}
-SIGNS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "^", ast.MatMult: "@"}
-PLAIN_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_SYMBOLS = frozenset(("symbols", "Symbol", "dynamicsymbols", "var", "Dummy"))
+_NUMBERS_OF_SYMPY = {"Half": Scalar("1/2", Level.PRODUCT, 0.5), "One": ONE, "Zero": ZERO, "Pi": Scalar("pi")}
+_SIGNS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "^", ast.MatMult: "@"}
+_PLAIN_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
 
 class PythonProgram:
@@ -176,8 +170,8 @@ class PythonProgram:
     def _block(self, statements: Sequence[ast.stmt], scope: Scope) -> None:
         for statement in statements:
             self.statements += 1
-            if self.statements > MAX_STATEMENTS:
-                raise AnswerError(f"{self.file}: more than {MAX_STATEMENTS} statements")
+            if self.statements > BOUNDS.statements:
+                raise AnswerError(f"{self.file}: more than {BOUNDS.statements} statements")
             self._statement(statement, scope)
 
     def _statement(self, statement: ast.stmt, scope: Scope) -> None:
@@ -370,8 +364,8 @@ class PythonProgram:
     def _import(self, alias: ast.alias, scope: Scope, line: str) -> None:
         first = alias.name.split(".")[0]
         name, module = alias.asname or first, alias.name if alias.asname else first
-        harmless = module.split(".")[0] in (*KNOWN_PACKAGES, "os", "sys")
-        if module in MODULES or harmless:
+        harmless = module.split(".")[0] in (*_KNOWN_PACKAGES, "os", "sys")
+        if module in _MODULES or harmless:
             scope.bind(ascii_name(name), Module(module), line)
         else:
             scope.bind(ascii_name(name), Unread(f"{name[:40]} is the module {module[:40]} since {line}"), line)
@@ -384,28 +378,28 @@ class PythonProgram:
             return
         if module == "sympy.abc":
             value = Given(alias.name)
-        elif full_name in MODULES:
+        elif full_name in _MODULES:
             value = Module(full_name)
-        elif module in MODULES:
+        elif module in _MODULES:
             value = Scalar("pi") if alias.name == "pi" else Library(alias.name)
-            if module in NUMPY and alias.name in (*ARRAYS, "zeros", "eye"):
+            if module in _NUMPY and alias.name in (*_ARRAYS, "zeros", "eye"):
                 value = Library(f"numpy.{alias.name}")
         else:
             value = Unread(f"{name[:40]} comes from {module[:40]} in {line}")
-            if module.split(".")[0] in KNOWN_PACKAGES:
+            if module.split(".")[0] in _KNOWN_PACKAGES:
                 self.changes.imported[name] = alias.name
         scope.bind(name, value, line)
 
     def _import_everything(self, module: str, line: str) -> None:
         """Note which names ``from module import *`` may replace; the names of the module mean what they say."""
-        if module not in MODULES or module == "sympy.abc":
+        if module not in _MODULES or module == "sympy.abc":
             raise AnswerError(
                 f"{self.file}: {line}: found 'from {module[:40]} import *', which may change any name; expected "
                 "numpy, sympy or math"
             )
         self.star_modules.append(module)
         for name, bound in list(self.main.names.items()):
-            is_exported = name in EXPORTED_LETTERS if len(name) == 1 else not any(c.isdigit() for c in name)
+            is_exported = name in _EXPORTED_LETTERS if len(name) == 1 else not any(c.isdigit() for c in name)
             has_value = not isinstance(bound.value, Module | Library | Unread)
             if module == "math":
                 is_exported = name in ("tau", "e", "pi", "inf", "nan") or name in SCALAR
@@ -504,7 +498,7 @@ class PythonProgram:
         """Return what a function returns, and its local names."""
         if function.problem:
             raise UnreadError(function.problem)
-        if self.depth >= MAX_DEPTH:
+        if self.depth >= BOUNDS.call_depth:
             raise UnreadError(f"{function.name} calls itself, or functions nested too deep")
         body = function.definition
         if isinstance(body, ast.expr):
@@ -568,9 +562,9 @@ class PythonProgram:
                 return Text(text)
             case ast.Name(name):
                 return scope.value(ascii_name(name))
-            case ast.BinOp(left, op, right) if type(op) in SIGNS:
+            case ast.BinOp(left, op, right) if type(op) in _SIGNS:
                 values = self._operand(left, scope), self._operand(right, scope)
-                return calculated(values[0], SIGNS[type(op)], values[1], self.record.power)
+                return calculated(values[0], _SIGNS[type(op)], values[1], self.record.power)
             case ast.UnaryOp(ast.USub(), operand):
                 return opposite(self._operand(operand, scope))
             case ast.UnaryOp(ast.UAdd(), operand):
@@ -600,7 +594,7 @@ class PythonProgram:
     def _number(self, node: ast.Constant) -> Scalar:
         line = self.lines[node.lineno - 1].encode()
         typed = line[node.col_offset : node.end_col_offset].decode()
-        if PLAIN_NUMBER.fullmatch(typed) is None:
+        if _PLAIN_NUMBER.fullmatch(typed) is None:
             raise UnreadError(f"the number {typed[:20]!r} is not read")
         return number(f"{typed}0" if typed.endswith(".") else typed)
 
@@ -643,15 +637,15 @@ class PythonProgram:
             case Module(module):
                 if name == "pi":
                     return Scalar("pi")
-                if f"{module}.{name}" in MODULES or name in ("linalg", "physics", "mechanics", "matrices"):
+                if f"{module}.{name}" in _MODULES or name in ("linalg", "physics", "mechanics", "matrices"):
                     return Module(f"{module}.{name}")
-                if module not in MODULES and module not in USUAL_MODULES:
+                if module not in _MODULES and module not in USUAL_MODULES:
                     raise UnreadError(f"{module}.{name} is not read")
-                return Library(f"numpy.{name}" if module in NUMPY else name)
+                return Library(f"numpy.{name}" if module in _NUMPY else name)
             case Matrix() if name == "T":
                 return transposed(value)
-            case Library("S") | Given("S") if name in NUMBERS_OF_SYMPY:
-                return NUMBERS_OF_SYMPY[name]
+            case Library("S") | Given("S") if name in _NUMBERS_OF_SYMPY:
+                return _NUMBERS_OF_SYMPY[name]
         return scope.field(value, name)
 
     def _subscript(self, inner: ast.expr, index: ast.expr, scope: Scope) -> Value:
@@ -694,7 +688,7 @@ class PythonProgram:
                     raise UnreadError(f"{self._quote(index)} as an index is not read")
                 first = 0 if ends[0] is None else ends[0][0]
                 last = first + self.record.robot.n if ends[1] is None else ends[1][0]
-                return Part(name, tuple(range(first, min(last, MAX_INDEX))), is_slice=True, number=value.number)
+                return Part(name, tuple(range(first, min(last, BOUNDS.index))), is_slice=True, number=value.number)
             case Matrix(), ast.Tuple([rows, columns]) if not value.is_flat:
                 m, n = value.shape
                 i, j = _chosen(rows, m), _chosen(columns, n)
@@ -759,11 +753,11 @@ class PythonProgram:
         return value
 
     def _library_call(self, name: str, node: ast.Call, scope: Scope) -> Value:
-        of_numpy = name.startswith("numpy.") or (bool(self.star_modules) and self.star_modules[-1] in NUMPY)
+        of_numpy = name.startswith("numpy.") or (bool(self.star_modules) and self.star_modules[-1] in _NUMPY)
         name = name.removeprefix("numpy.")
         keywords = {k.arg: k.value for k in node.keywords}
-        if name in SYMBOLS:
-            if set(keywords) - ASSUMPTIONS:
+        if name in _SYMBOLS:
+            if set(keywords) - _ASSUMPTIONS:
                 raise UnreadError(f"{self._quote(node)} is not read")
             return self._symbols(name, node)
         if name in ("dict", "SimpleNamespace"):
@@ -774,14 +768,14 @@ class PythonProgram:
             isinstance(dtype, ast.Name | ast.Attribute) and _last(dtype) in ("object", "float", "float64")
         ):
             raise UnreadError(f"{self._quote(node)} is not read")
-        if name in (*MATRICES, *ARRAYS):
+        if name in (*_MATRICES, *_ARRAYS):
             if keywords:
                 raise UnreadError(f"{self._quote(node)} is not read")
             arguments = [self.value(x, scope) for x in node.args]
             return self._matrix(name, arguments, scope)
         if name == "broadcast_arrays" and not keywords:
             return Several(tuple(self.value(x, scope) for x in node.args))
-        if set(keywords) - KNOWN_KEYWORDS:
+        if set(keywords) - _KNOWN_KEYWORDS:
             raise UnreadError(f"{self._quote(node)} is not read")
         arguments = [self._operand_or_list(x, scope) for x in node.args]
         return called(scope, name, arguments, of_numpy)
@@ -793,7 +787,7 @@ class PythonProgram:
         return scope.scalar(value) if isinstance(value, Given | Part) else value
 
     def _matrix(self, name: str, arguments: Sequence[Value], scope: Scope) -> Value:
-        of_numpy = name in (*ARRAYS, *CASADI)
+        of_numpy = name in (*_ARRAYS, *_CASADI)
         match arguments:
             case [Scalar() as m, Scalar() as n, Matrix() as entries] if m.text.isdecimal() and n.text.isdecimal():
                 row_count, columns = int(m.text[:6]), int(n.text[:6])
@@ -871,9 +865,9 @@ class PythonProgram:
                 return unchanged(value)
             case Matrix(), "simplify":
                 raise UnreadError("the method simplify() of a matrix changes it and returns nothing")
-            case _, name if name in UNCHANGED_METHODS and name != "applyfunc":
+            case _, name if name in _UNCHANGED_METHODS and name != "applyfunc":
                 plain = all(self._is_unchanging(x, scope) for x in arguments)
-                if plain and not {k.arg for k in node.keywords} & NOT_UNCHANGING:
+                if plain and not {k.arg for k in node.keywords} & _NOT_UNCHANGING:
                     return unchanged(value)
         raise UnreadError(f"{self._quote(node)} is not read")
 
@@ -894,7 +888,7 @@ class PythonProgram:
     def _is_unchanging(self, node: ast.expr, scope: Scope) -> bool:
         """Whether an argument is a library's function that writes an expression in another way."""
         value = self._value_or_none(node, scope)
-        return isinstance(value, Library | Given) and value.name.removeprefix("numpy.") in UNCHANGED_METHODS
+        return isinstance(value, Library | Given) and value.name.removeprefix("numpy.") in _UNCHANGED_METHODS
 
     # Symbols and time
 
@@ -994,10 +988,10 @@ class PythonProgram:
             return None
 
 
-NOT_UNCHANGING = frozenset(("inplace", "evaluate", "func", "exact", "out"))
+_NOT_UNCHANGING = frozenset(("inplace", "evaluate", "func", "exact", "out"))
 """Keywords with which these functions return something else: ``collect(V, g, evaluate=False)`` a dictionary."""
 
-UNCHANGED_METHODS = word_set(
+_UNCHANGED_METHODS = word_set(
     """
     simplify expand trigsimp factor cancel together powsimp expand_trig radsimp collect doit applyfunc copy
     as_immutable as_mutable
@@ -1012,7 +1006,7 @@ def constant_index(node: ast.expr) -> Index | None:
     if parts and isinstance(parts[0], ast.Constant) and parts[0].value is Ellipsis:
         parts = parts[1:]
     numbers = [part.value if isinstance(part, ast.Constant) else None for part in parts]
-    index = tuple(k for k in numbers if type(k) is int and 0 <= k <= MAX_INDEX)
+    index = tuple(k for k in numbers if type(k) is int and 0 <= k <= BOUNDS.index)
     return index if index and len(index) == len(parts) else None
 
 
@@ -1024,7 +1018,7 @@ def _is_written_out(node: ast.expr) -> bool:
         case ast.BinOp(left, ast.Mult() | ast.Div(), right):
             return _is_written_out(left) or _is_written_out(right)
         case ast.Call(function, arguments):
-            if _last(function) in (*MATRICES, *ARRAYS):
+            if _last(function) in (*_MATRICES, *_ARRAYS):
                 return True
             inner = [*arguments, *([function.value] if isinstance(function, ast.Attribute) else [])]
             return any(_is_written_out(x) for x in inner)
@@ -1067,7 +1061,7 @@ def _symbol_names(text: str) -> list[str]:
     names: list[str] = []
     for piece in map(ascii_name, re.split(r"[\s,]+", text.strip().strip(","))):
         span = re.fullmatch(r"(\w*?)\(?(\d*):(\d+)\)?", piece)
-        if span and int(span[3][:6]) <= MAX_SYMBOLS:
+        if span and int(span[3][:6]) <= BOUNDS.symbol_index:
             names += [f"{span[1]}{k}" for k in range(int(span[2] or 0), int(span[3]))]
         else:
             names.append(piece)

@@ -10,7 +10,7 @@ from dhkit.grading.answers.quantity_names import QuantityNames
 from dhkit.grading.answers.sheet_values import NO_NAMES, Names
 from dhkit.grading.answers.vocabulary import Meaning, plain_name
 
-JOINT_VARIABLE = re.compile(
+_JOINT_VARIABLE = re.compile(
     r"(?:dd|DD|ddot|dot|d2|d|D)?(?:q|th|theta|Theta|vartheta)(?:dd|d|ddot|dot|pp|p)?\d*\w*", re.ASCII
 )
 """Spellings of joint variables that nobody uses for anything else; x2 or t1 may be a student's own name."""
@@ -48,7 +48,7 @@ class RobotNames:
     def is_reserved(self, name: str) -> bool:
         """Whether a name belongs to the robot: a parameter, a joint variable in a usual spelling, pi."""
         plain = plain_name(name)
-        is_joint = JOINT_VARIABLE.fullmatch(plain) is not None or plain in self.vocabulary.own
+        is_joint = _JOINT_VARIABLE.fullmatch(plain) is not None or plain in self.vocabulary.own
         is_state = is_joint and (self.vocabulary.is_state(plain) or self.is_vector(plain))
         return plain == "pi" or self.quantities.is_parameter(name) or is_state
 

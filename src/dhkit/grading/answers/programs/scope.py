@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from dhkit.errors import AnswerError
+from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.programs.robot_names import RobotNames
 from dhkit.grading.answers.programs.values import (
     Function,
@@ -36,9 +37,7 @@ from dhkit.grading.answers.rewriting import DERIVATIVES, MODULES
 from dhkit.grading.answers.tokens import word_set
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Meaning, plain_name
 
-MAX_DEFINITIONS = 2_000
-"""Largest number of names that the answers of one file are made of; reading each takes about a millisecond."""
-NOT_NAMES = word_set("t T top pi e Matrix array matrix sym simplify transpose DM SX")
+_NOT_NAMES = word_set("t T top pi e Matrix array matrix sym simplify transpose DM SX")
 """Words that the reader of formulas takes for something else than a name."""
 
 
@@ -116,8 +115,8 @@ class Record:
         name = self._free_name(base, line, scalar.text)
         self._texts[plain_name(name)] = scalar.text
         self.definitions[key] = name, scalar
-        if len(self.definitions) > 10 * MAX_DEFINITIONS:
-            raise AnswerError(f"answers are made of more than {MAX_DEFINITIONS} names")
+        if len(self.definitions) > 10 * BOUNDS.definitions:
+            raise AnswerError(f"answers are made of more than {BOUNDS.definitions} names")
         return Scalar(name, Level.ATOM, scalar.number, known)
 
     def _free_name(self, base: str, line: str, text: str) -> str:
@@ -131,7 +130,7 @@ class Record:
 
     def _is_free(self, name: str, text: str) -> bool:
         plain = plain_name(name)
-        is_special = name in FUNCTION_NAMES or name in NOT_NAMES or name in MODULES or name in DERIVATIVES
+        is_special = name in FUNCTION_NAMES or name in _NOT_NAMES or name in MODULES or name in DERIVATIVES
         vocabulary = self.robot.vocabulary
         is_known = vocabulary.is_state(plain) or self.robot.is_vector(plain) or self.robot.quantities.is_parameter(name)
         is_name = re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) is not None

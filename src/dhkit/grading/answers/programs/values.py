@@ -12,14 +12,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any, TypeAlias
 
-from dhkit.grading.answers.tokens import MAX_LENGTH
-
-MAX_ENTRIES = 1_024
-"""Largest number of entries of a matrix."""
-MAX_INDEX = 1_000
-"""Largest index that is read."""
-MAX_POWER = 8
-"""Largest power of a matrix."""
+from dhkit.grading.answers.bounds import BOUNDS
 
 Index: TypeAlias = tuple[int, ...]
 """Index of an entry, counted from 0 in both languages."""
@@ -297,8 +290,8 @@ def joined(left: Scalar, sign: str, right: Scalar, power: str = "^") -> Scalar:
         case _:
             level = Level.POWER
             text = f"{left.at_least(Level.ATOM)}{power}{right.at_least(Level.ATOM)}"
-    if len(text) > MAX_LENGTH:
-        raise UnreadError(f"a formula of {len(text)} characters; expected at most {MAX_LENGTH}")
+    if len(text) > BOUNDS.entry_characters:
+        raise UnreadError(f"a formula of {len(text)} characters; expected at most {BOUNDS.entry_characters}")
     return Scalar(text, level, _calculated(left.number, sign, right.number), left.uses | right.uses)
 
 
@@ -321,7 +314,7 @@ def _calculated(left: float | None, sign: str, right: float | None) -> float | N
         return None
 
 
-def negated(scalar: Scalar) -> Scalar:
+def _negated(scalar: Scalar) -> Scalar:
     """Return a scalar with a minus in front."""
     value = None if scalar.number is None else -scalar.number
     return Scalar(f"-{scalar.at_least(Level.PRODUCT)}", Level.SIGNED, value, scalar.uses)
@@ -341,21 +334,21 @@ def matrix_of(rows: Sequence[Sequence[Scalar]], **options: bool) -> Matrix:
     lengths = {len(row) for row in rows}
     if lengths == {0} or len(lengths) != 1:
         raise UnreadError("a matrix whose rows differ in length, or are empty, is not read")
-    if len(rows) * len(rows[0]) > MAX_ENTRIES:
-        raise UnreadError(f"a matrix of more than {MAX_ENTRIES} entries")
+    if len(rows) * len(rows[0]) > BOUNDS.matrix_entries:
+        raise UnreadError(f"a matrix of more than {BOUNDS.matrix_entries} entries")
     return Matrix({(i, j): x for i, row in enumerate(rows) for j, x in enumerate(row)}, **options)
 
 
 def vector_of(scalars: Sequence[Scalar], **options: bool) -> Matrix:
     """Return a flat vector of its entries."""
-    if not scalars or len(scalars) > MAX_ENTRIES:
+    if not scalars or len(scalars) > BOUNDS.matrix_entries:
         raise UnreadError(f"a vector of {len(scalars)} entries is not read")
     return Matrix({(i,): x for i, x in enumerate(scalars)}, **options)
 
 
 def zeros(*shape: int, multiplies_entries: bool = False) -> Matrix:
     """Return a matrix or a flat vector of zeros, whose entries are assigned later."""
-    if not all(0 < k <= MAX_INDEX for k in shape) or len(shape) > 2:
+    if not all(0 < k <= BOUNDS.index for k in shape) or len(shape) > 2:
         raise UnreadError("zeros of this shape are not read")
     options = {"multiplies_entries": multiplies_entries, "is_zeros": True}
     if len(shape) == 1:
@@ -365,7 +358,7 @@ def zeros(*shape: int, multiplies_entries: bool = False) -> Matrix:
 
 def identity(n: int, multiplies_entries: bool = False) -> Matrix:
     """Return an identity matrix."""
-    if not 0 < n <= MAX_INDEX:
+    if not 0 < n <= BOUNDS.index:
         raise UnreadError("an identity matrix of this size is not read")
     rows = [[ONE if i == j else ZERO for j in range(n)] for i in range(n)]
     return matrix_of(rows, multiplies_entries=multiplies_entries)
@@ -396,7 +389,7 @@ def product(left: Matrix, right: Matrix, power: str = "^") -> Matrix | Scalar:
         a = [[row[0] for row in a]]  # numpy: a flat vector in front is a row
     if len(a[0]) != len(b):
         raise UnreadError(f"a product of matrices of {len(a)} x {len(a[0])} and {len(b)} x {len(b[0])}")
-    if len(a) * len(b) * len(b[0]) > MAX_ENTRIES:
+    if len(a) * len(b) * len(b[0]) > BOUNDS.matrix_entries:
         raise UnreadError("a product of matrices of this size is not read")
     columns = list(zip(*b, strict=True))
     rows = [[_dot(row, column, power) for column in columns] for row in a]
@@ -460,7 +453,7 @@ def _of_two_matrices(left: Matrix, sign: str, right: Matrix, power: str) -> Valu
 
 def _power_of_matrix(base: Matrix, exponent: Scalar, power: str) -> Value:
     count = int(exponent.number or 0)
-    if count != exponent.number or not 1 <= count <= MAX_POWER:
+    if count != exponent.number or not 1 <= count <= BOUNDS.matrix_power:
         raise UnreadError("a power of a matrix that is not a small whole number")
     result: Value = base
     for _ in range(count - 1):
@@ -471,7 +464,7 @@ def _power_of_matrix(base: Matrix, exponent: Scalar, power: str) -> Value:
 def opposite(value: Value) -> Value:
     """Return a value with a minus in front."""
     if isinstance(value, Scalar):
-        return negated(value)
+        return _negated(value)
     if isinstance(value, Matrix) and not value.is_list:
-        return value.mapped(negated)
+        return value.mapped(_negated)
     raise UnreadError("a minus in front of what is not a number or a matrix is not read")

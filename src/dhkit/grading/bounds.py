@@ -1,0 +1,39 @@
+"""Bounds on what is handed in besides answers: folders, rubrics, reports of other processes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Largest sizes that are read or shown; :mod:`dhkit.grading.answers.bounds` has those of answers."""
+
+    # Folders of sheets.
+    folder_depth: int = 8
+    """Depth of folders below the one that is graded."""
+    files: int = 200_000
+    """Files and folders that are visited: a student may hand in a whole disk."""
+    sheets: int = 10_000
+    """Sheets of one folder."""
+    listed_files: int = 20
+    """Unread files that are listed by name."""
+    robot_name_characters: int = 200
+    """Characters of the name of a robot file that a sheet may give."""
+    rubric_bytes: int = 100_000
+    """Size of a rubric."""
+
+    # Reports.
+    report_bytes: int = 20_000_000
+    """Size of a report that is accepted from a process."""
+    report_file_bytes: int = 500_000_000
+    """Size of a file of reports, one a line: enough for a thousand students with long answers."""
+    shown_characters: int = 4000
+    """Characters shown of one answer or message: an answer may be a megabyte."""
+    converted_characters: int = 4000
+    """Characters of LaTeX that are converted to MathML: nobody reads a longer equation, and it takes seconds."""
+    notebook_characters: int = 400
+    """Characters of an answer, and of a statement about one, that a notebook shows."""
+
+
+BOUNDS = Bounds()

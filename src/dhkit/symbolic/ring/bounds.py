@@ -1,0 +1,24 @@
+"""Bounds on exact work: the ring's products, and what is derived with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Largest sizes of exact work; beyond them a RingError says so, or a less exact way is taken."""
+
+    terms: int = 300_000
+    """Terms of a product: ten times the longest of the library's robots (Jaco, symbols="inertial")."""
+    pairs: int = 500_000
+    """Pairs of terms that one product multiplies: six times the Jaco's, some seconds in sympy's rings."""
+    angle_multiple: int = 8
+    """Multiple of an angle that is expanded into powers of the angle's own cosine and sine."""
+    inertial_terms: int = 60_000
+    """Terms of M in all inertial parameters: three times the Jaco's, a minute in sympy's rings."""
+    angle_choices: int = 24
+    """Choices of angles that are tried for an entry, to write it with fewer terms."""
+
+
+BOUNDS = Bounds()
