@@ -151,7 +151,7 @@ HEADINGS = {
 
 
 def with_tables(text: str, progress: Progress | None = None) -> str:
-    """Return a Markdown text with new tables in place of the old ones.
+    """Return a Markdown text with new tables instead of the old ones.
 
     Raises
     ------

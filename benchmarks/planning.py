@@ -108,7 +108,7 @@ def compare_motions(
     meshes
         Numbers of intervals of the planner's meshes.
     intervals
-        Of its usual mesh, in place of the planner's own; the fine one has four times as many.
+        Of its usual mesh, instead of the planner's own; the fine one has four times as many.
     speeds
         Times the robot's speed limits.
     seed

@@ -53,7 +53,7 @@ BAD = {
     ),
     "absolute path": (GOOD.replace(ROBOT, 'robot = "/etc/arm.toml"'), "leaves the assignment's folder"),
     "no such robot file": (GOOD.replace(ROBOT, 'robot = "arm.toml"'), "no such file"),
-    "name with a NUL": (GOOD.replace(ROBOT, r'robot = "a\u0000.toml"'), "is no file name"),
+    "name with a NUL": (GOOD.replace(ROBOT, r'robot = "a\u0000.toml"'), "is not a file name"),
     "itself as robot": (GOOD.replace(ROBOT, 'robot = "task.toml"'), "robot: "),
     "robot with an escape": (GOOD.replace(ROBOT, r'robot = "a\u001b[31m"'), "robot: "),
     "robot of another type": (GOOD.replace(ROBOT, "robot = 560"), "robot: found 560; expected "),

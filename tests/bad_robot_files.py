@@ -140,7 +140,7 @@ BAD = {
     "parameter cycle": (GOOD + '[parameters]\nl1 = "l2"\nl2 = "l3"\nl3 = "l1"', "l1 -> l2 -> l3 -> l1 is a cycle"),
     "parameter is itself": (GOOD + '[parameters]\nl1 = "l1"', "l1 -> l1 is a cycle"),
     "parameter named pi": (GOOD + "[parameters]\npi = 3", "'pi' is taken"),
-    "parameter with a hyphen": (GOOD + "[parameters]\n'l-1' = 3", "'l-1' is no name"),
+    "parameter with a hyphen": (GOOD + "[parameters]\n'l-1' = 3", "'l-1' is not a name"),
     "division by a zero parameter": (changed("a = 0.5", 'a = "1/l1"') + "[parameters]\nl1 = 0", "a: division by zero"),
     "import": (changed("a = 0.5", "a = \"__import__('os').system('touch pwned')\""), "unexpected character"),
     "tower of powers": (changed("a = 0.5", 'a = "10**10**10"'), "a: "),

@@ -17,7 +17,7 @@ LONG = 190_000  # characters: as many as an entry may have
 NINE = "(m1 + m2 + l1 + l2 + g + cos(q1) + sin(q1) + cos(q2) + sin(q2))"
 RIGHT_V = "m1*g*l1/2*sin(q1) + m2*g*(l1*sin(q1) + l2/2*sin(q1 + q2))"
 
-# What is no answer, as the potential energy of planar2r.
+# What is not an answer, as the potential energy of planar2r.
 
 REFUSED = {
     "import": f"__import__('os').system('{TOUCH}')",

@@ -24,7 +24,7 @@ class Options:
         Raises
         ------
         TypeError
-            A keyword that is no option, or options of another function.
+            A keyword that is not an option, or options of another function.
         """
         known = [field.name for field in fields(cls)]
         for name in keywords:
@@ -52,4 +52,4 @@ class Options:
 
 
 def _is_same(value: object, default: object) -> bool:
-    return value is default or (type(value) is type(default) and bool(value == default))  # arrays are no defaults
+    return value is default or (type(value) is type(default) and bool(value == default))  # arrays are not defaults

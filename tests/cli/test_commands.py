@@ -85,4 +85,4 @@ def test_commands_print_the_warnings_of_a_robot_file(words, tmp_path, monkeypatc
     with pytest.raises(SystemExit):
         main(words)
     written = capsys.readouterr().err
-    assert "dhkit: warning: link of turn: shape.mesh: 'link.stl' is no mesh that can be read" in written
+    assert "dhkit: warning: link of turn: shape.mesh: 'link.stl' is not a mesh that can be read" in written

@@ -236,7 +236,7 @@ BAD = {
     "gains that do not fit": ({"controller": PID(np.ones((5, 2)))}, "batches of 3, 5; expected one"),
     "states of another arm": ({"q0": np.zeros((3, 6))}, r"q0 has shape \(3, 6\)"),
     "states on a grid": ({"q0": np.zeros((3, 3, 2))}, r"q0 has shape \(3, 3, 2\); expected \(2,\) or \(B, 2\)"),
-    "a state that is no number": ({"q0": np.full((3, 2), np.nan)}, "finite"),
+    "a state that is not a number": ({"q0": np.full((3, 2), np.nan)}, "finite"),
     "a plant of other joints": ({"plant": Arm.load("puma560")}, "a plant has joints RRRRRR; expected RR"),
     "no end": ({"duration": None}, "duration is not given"),
     "a rate of 0": ({"rate": 0}, "rate is 0"),

@@ -1,4 +1,4 @@
-"""Simulations come back from files as they were; results that are no results are refused in one line."""
+"""Simulations come back from files as they were; results that are not results are refused in one line."""
 
 import io
 import re
@@ -107,7 +107,7 @@ def test_what_matlab_saves_again_is_read(tmp_path):
     check_equal(SimulationResult.load(path), result)
 
 
-# Results that are no results
+# Results that are not results
 
 
 def values(**changed):
@@ -140,7 +140,10 @@ BAD_VALUES = {
     "infinite": ({"qdd": spoiled(-np.inf, 0)}, "qdd has values that are not finite, the first in row 0"),
     "times that do not increase": ({"t": np.array([0, 1, 2, 2, 3.0])}, r"t\[2\] is 2 s, t\[3\] is 2 s"),
     "times that begin late": ({"t": np.arange(1.0, 6.0)}, "t begins with 1 s; expected 0"),
-    "an audit that is no number": ({"audit_drives": np.float64(np.nan)}, "audit_drives has values that are not finite"),
+    "an audit that is not a number": (
+        {"audit_drives": np.float64(np.nan)},
+        "audit_drives has values that are not finite",
+    ),
     "an audit of two numbers": ({"audit_drives": np.ones(2)}, r"audit_drives has shape .*; expected \(\)"),
     "a share beyond 1": (
         {"saturated": np.array([0.5, 1.5])},

@@ -297,7 +297,7 @@ BAD = {
     "a number": (lambda: run(controller=3), "controller is int"),
     "saturation in words": (lambda: run(saturation="no"), "saturation is 'no'"),
     "a rate that is true": (lambda: run(rate=True), "rate is True"),
-    "a link that is no number": (lambda: Push([1, 0, 0], link=1.5), "link is 1.5"),
+    "a link that is not a number": (lambda: Push([1, 0, 0], link=1.5), "link is 1.5"),
     "a link of another arm": (lambda: run(pushes=[Push([1, 0, 0], link=9, begin=5)]), "link is 9; planar2r has 2"),
     "no push": (lambda: run(pushes=[(0, 0, 1)]), "pushes has tuple; expected Push"),
     "a controller of another arm": (lambda: run(controller=HOLD), "one of puma560, joints RRRRRR; expected RR"),

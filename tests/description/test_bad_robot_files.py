@@ -42,7 +42,7 @@ def test_a_mesh_that_is_none_is_a_warning_and_the_link_is_drawn_from_the_table(c
     (tmp_path / "bad.stl").write_bytes(content)
     (tmp_path / "good.toml").write_text(GOOD + 'shape = { mesh = "bad.stl" }')
     arm = read_robot(tmp_path / "good.toml")
-    assert "is no mesh that can be read" in arm.warnings[0]
+    assert "is not a mesh that can be read" in arm.warnings[0]
     assert all(part.file is None for part in link_parts(arm))
 
 

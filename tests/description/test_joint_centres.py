@@ -1,4 +1,4 @@
-"""Joint centres of tables whose lengths are no sizes of the arm."""
+"""Joint centres of tables whose lengths are not sizes of the arm."""
 
 import numpy as np
 import pytest

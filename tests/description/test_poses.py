@@ -94,9 +94,9 @@ def test_batches_broadcast():
         (lambda: pose(quat=(0, 0, 0, 0)), "zero length"),
         (lambda: pose(quat=(0, 0, 0, 1), euler=(0, 0, 0)), "both euler and quat"),
         (lambda: pose_parts(np.eye(3)), r"expected \(\.\.\., 4, 4\)"),
-        (lambda: pose_parts(2 * np.eye(4)), "is no pose"),
-        (lambda: pose_parts(np.diag([1.0, 1, -1, 1])), "is no pose"),
-        (lambda: check_pose(np.ones((4, 4)), "goal"), "goal is no pose"),
+        (lambda: pose_parts(2 * np.eye(4)), "is not a pose"),
+        (lambda: pose_parts(np.diag([1.0, 1, -1, 1])), "is not a pose"),
+        (lambda: check_pose(np.ones((4, 4)), "goal"), "goal is not a pose"),
     ],
 )
 def test_what_is_no_pose_is_said(call, complaint):

@@ -1,4 +1,4 @@
-"""Tables in: any order, units, letters, text; and what is no table."""
+"""Tables in: any order, units, letters, text; and what is not a table."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -42,7 +42,7 @@ def test_arrays_and_letters():
         (dict(rows=[(0, np.nan, 0, 0)]), "row 1: d: nan is not finite"),
         (dict(rows=[(0, 0, 0, 0), (0, 0, np.inf, 0)]), "row 2: a: inf is not finite"),
         (dict(rows=[(0, 0, "l1", 0)]), "row 1: a: unknown name 'l1'"),
-        (dict(rows=[(0, 0, None, 0)]), "row 1: a: None is no number"),
+        (dict(rows=[(0, 0, None, 0)]), "row 1: a: None is not a number"),
         (dict(rows=[(0, 0, 0, 0)], kinds="RR"), "kinds is 'RR'; expected 1 letters"),
         (dict(rows=[(0, 0, 0, 0)], kinds="X"), "kinds is 'X'"),
         (dict(rows=[(0, 0, 0, 0)], order=("a", "d", "theta", "theta")), "order is"),

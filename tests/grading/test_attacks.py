@@ -104,7 +104,7 @@ FORBIDDEN = [
 
 @pytest.fixture(scope="module", autouse=True)
 def prepared():
-    """Import and compile all that judging needs: later an import is no disguise for an attack's code."""
+    """Import and compile all that judging needs: later an import is not a disguise for an attack's code."""
     prepare(PLANAR)
     V = f"{RIGHT_V} + 0.12345*m1"
     inverse = {"branches": [["atan2(py, px) - acos(px)", "acos(py)"]]}
@@ -612,14 +612,14 @@ def test_names_of_files_stay_in_the_folder(classroom):
 
 
 @pytest.mark.parametrize(
-    "attack", ["file that is no UTF-8", "long student", "long student of wide letters", "half a letter"]
+    "attack", ["file that is not UTF-8", "long student", "long student of wide letters", "half a letter"]
 )
 def test_no_name_ends_a_batch(tmp_path, capfdbinary, attack):
     folder = tmp_path / "class"
     folder.mkdir()
     written(folder / "ada.toml", HONEST["ada"][0])
     match attack:
-        case "file that is no UTF-8":
+        case "file that is not UTF-8":
             written(Path(os.fsdecode(os.fsencode(folder / "bad") + b"\xff.toml")), sheet('V = "m1"'))
         case "long student":
             written(folder / "long.toml", sheet('V = "m1"', more=f'student = "{"x" * 3_000_000}"'))

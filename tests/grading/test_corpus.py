@@ -14,7 +14,7 @@ LABEL = re.compile(r"# expected: (correct within rounding|correct|undecided|wron
 
 def label(path):
     match = LABEL.fullmatch(path.read_text().splitlines()[0].strip())
-    assert match, f"{path}: the first line is no label"
+    assert match, f"{path}: the first line is not a label"
     return match[1], [] if match[2] in (None, "-") else match[2].split(" + ")
 
 

@@ -73,7 +73,7 @@ def test_sine_and_cosine_of_the_doubles_nearest_to_quarter_turns(law, mode):
 
 
 def test_beyond_the_exact_range(mode):
-    """Right up to 1e6, NaN beyond, and NaN of what is no number."""
+    """Right up to 1e6, NaN beyond, and NaN of what is not a number."""
     x = np.concatenate([np.linspace(1e5, EXACT_RANGE, 10_001), -np.linspace(1e5, EXACT_RANGE, 10_001)])
     y = evaluate("sincos", np.stack([x, x], axis=1))
     assert np.abs(y[:, 0] - np.sin(x.astype(np.longdouble))).max() < SINE_ERROR

@@ -73,7 +73,7 @@ BAD = {
         dae(before=BOMB).replace("?>", ' encoding="utf-16"?>').encode("utf-16"),
         "document type",
     ),
-    "DAE that is no XML": ("a.dae", b"<COLLADA><a></COLLADA>", "no XML"),
+    "DAE that is not XML": ("a.dae", b"<COLLADA><a></COLLADA>", "no XML"),
     "DAE that is other XML": ("a.dae", b"<html/>", "found <html>; expected <COLLADA>"),
     "DAE cut short": ("a.dae", dae(tail="").encode(), "no XML"),
     "DAE of depth 20,000": ("a.dae", dae(tail=DEEP + "</COLLADA>").encode(), "nested more than 64 deep"),

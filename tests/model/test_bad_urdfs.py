@@ -94,9 +94,9 @@ REFUSED = {
     "a name with a line break": (arm(more='<link name="a&#10;b"/>'), "a link has the name 'a\\nb'; expected text"),
     "no such parent": (
         arm().replace('parent link="b"', 'parent link="x"'),
-        "joint 'j': <parent> is 'x', which is no link",
+        "joint 'j': <parent> is 'x', which is not a link",
     ),
-    "no child": (arm().replace('<child link="c"/>', ""), "joint 'j': <child> is '', which is no link"),
+    "no child": (arm().replace('<child link="c"/>', ""), "joint 'j': <child> is '', which is not a link"),
     "unknown type": (arm(kind="hinge"), "joint 'j' is 'hinge'; expected one of revolute"),
     "zero axis": (arm(axis='<axis xyz="0 0 0"/>'), "joint 'j': <axis xyz>: found 0 0 0; expected a direction"),
     "axis of two numbers": (arm(axis='<axis xyz="0 1"/>'), "joint 'j': <axis xyz> has 2 numbers; expected 3"),

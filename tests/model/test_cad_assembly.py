@@ -260,7 +260,7 @@ def test_collada_without_a_unit_is_judged_by_size_and_a_stated_unit_is_held_agai
     ):
         import_cad(tmp_path / "metres", arm)
     forced = import_cad(tmp_path / "metres", arm, unit="mm")
-    assert "unit: mm, as stated, for all files in place of the 1 m that files state" in forced.notes[2]
+    assert "unit: mm, as stated, for all files instead of the 1 m that files state" in forced.notes[2]
     assert apart(forced.meshes[3], expected[3]) < IN_MEMORY
     collada_arm(tmp_path / "inches", "0.0254")
     with pytest.raises(ModelError, match="state the unit of all files"):
@@ -495,11 +495,11 @@ BAD_MATS = {
     "no structs": (cell(x=np.eye(3)), "no struct with fields F, V"),
     "faces of nothing": (cell(s1=TRIANGLE | {"F1": [[1, 2, 4]]}), "a face with a vertex that is none of 1 to 3"),
     "index 0": (cell(s1=TRIANGLE | {"F1": [[0, 1, 2]]}), "none of 1 to 3"),
-    "half an index": (cell(s1=TRIANGLE | {"F1": [[1, 2, 2.5]]}), "no whole numbers"),
+    "half an index": (cell(s1=TRIANGLE | {"F1": [[1, 2, 2.5]]}), "not whole numbers"),
     "NaN": (cell(s1=TRIANGLE | {"V1": np.full((3, 3), np.nan)}), "not finite"),
-    "words": (cell(s1=TRIANGLE | {"V1": "vertices"}), "no matrix of real numbers"),
-    "cells": (cell(s1=TRIANGLE | {"V1": np.array([[1, "a"]], dtype=object)}), "no matrix of real numbers"),
-    "complex": (cell(s1=TRIANGLE | {"V1": 1j * np.eye(3)}), "no matrix of real numbers"),
+    "words": (cell(s1=TRIANGLE | {"V1": "vertices"}), "not a matrix of real numbers"),
+    "cells": (cell(s1=TRIANGLE | {"V1": np.array([[1, "a"]], dtype=object)}), "not a matrix of real numbers"),
+    "complex": (cell(s1=TRIANGLE | {"V1": 1j * np.eye(3)}), "not a matrix of real numbers"),
     "two parts of one name": (
         cell(s=TRIANGLE | {"F2": [[1, 2, 3]], "V2": np.eye(3)}, s1=TRIANGLE),
         "s1: two parts of this name",

@@ -125,7 +125,7 @@ os.write(4, b'{"functions":["fk"]}\\n{"id":1,"value":[[1' + b'0'*400 + b']]}\\n'
 time.sleep(1e6)
 """
     (tmp_path / "h.py").write_text(text)
-    with Program(tmp_path / "h.py", RUN) as program, pytest.raises(ProgramError, match="no array of numbers"):
+    with Program(tmp_path / "h.py", RUN) as program, pytest.raises(ProgramError, match="not an array of numbers"):
         program.fk(np.zeros(2))
 
 

@@ -187,7 +187,7 @@ def test_branches_are_counted_of_all_poses_and_not_of_those_that_were_tried(tmp_
         ("def fk(q): return [[round(x, 4) for x in row] for row in right(q)]\n", "are its numbers rounded"),
         (
             "def fk(q): return [[-r[0], *r[1:]] if k < 3 else r for k, r in enumerate(right(q))]\n",
-            "is no rotation",
+            "is not a rotation",
         ),
         ("def fk(q): return [*right(q)[:3], [0, 0, 0, 2]]\n", "last row is not 0 0 0 1"),
     ],

@@ -268,21 +268,26 @@ def test_programs_of_others_are_refused_where_nothing_isolates_them(monkeypatch)
     assert find_isolation(packages=("sympy", "of-this-test")).kind is Kind.NONE
 
 
+@pytest.fixture
+def open_folder():
+    """A folder that every user may enter: pytest closes its own to all others, at each start of any session."""
+    with tempfile.TemporaryDirectory(dir="/tmp") as folder:
+        Path(folder).chmod(0o755)
+        yield Path(folder)
+
+
 SYSTEM_PYTHON = f"/usr/bin/python3.{sys.version_info.minor}"
 
 
 @pytest.mark.skipif(os.geteuid() != 0 or not Path(SYSTEM_PYTHON).exists(), reason="only root runs it as another user")
-def test_another_user_reads_nothing_of_ours_and_leaves_nothing(program, tmp_path, monkeypatch):
+def test_another_user_reads_nothing_of_ours_and_leaves_nothing(program, open_folder, monkeypatch):
     monkeypatch.setattr(sys, "_base_executable", SYSTEM_PYTHON)
-    tmp_path.chmod(0o755)
-    for folder in list(tmp_path.parents)[:-2]:
-        folder.chmod(0o755)
     # The checkout may lie where no other user may enter.
-    packages = {tmp_path / path.name: inside for path, inside in package_paths(("numpy",)).items()}
+    packages = {open_folder / path.name: inside for path, inside in package_paths(("numpy",)).items()}
     for path in package_paths(("numpy",)):
-        copytree(path, tmp_path / path.name, ignore=ignore_patterns("tests"))
+        copytree(path, open_folder / path.name, ignore=ignore_patterns("tests"))
     monkeypatch.setattr(isolated_commands, "package_paths", lambda names: packages)
-    task = tmp_path / "task.toml"
+    task = open_folder / "task.toml"
     task.write_text("")
     task.chmod(0o600)
     text = (
@@ -297,7 +302,7 @@ def test_another_user_reads_nothing_of_ours_and_leaves_nothing(program, tmp_path
     one.close()
     assert not other_user.processes_of(int(user)) and not Path("/var/tmp/dhkit-left").exists()
     problem = isolation_module._problem_of_user
-    assert "can read" in problem([str(tmp_path)], [])
+    assert "can read" in problem([str(open_folder)], [])
     assert f"cannot read {task}" in problem([], [str(task)])
     assert not problem([str(task)], [str(path) for path in packages])
 

@@ -106,7 +106,7 @@ def test_a_line_out_of_reach_is_named():
 
 
 def test_a_line_on_which_a_branch_ends_is_named():
-    """Beyond this place the closed form has four solutions in place of eight: the followed one is among those lost."""
+    """Beyond this place the closed form has four solutions instead of eight: the followed one is among those lost."""
     arm = library_robot("kr5")
     q = np.array([[-1.56, -0.44, 1.87, 1.58, -1.47, 0.29], [-1.77, -0.55, 1.56, 1.25, -1.08, 0.17]])
     T0, T1 = world_to_tool(arm, q)

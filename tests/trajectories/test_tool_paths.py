@@ -67,7 +67,7 @@ def test_a_circle_keeps_its_distance_and_plane(seed):
     ("call", "complaint"),
     [
         (lambda: tool_line(np.eye(3), np.eye(4)), r"T0 has shape \(3, 3\)"),
-        (lambda: tool_line(np.eye(4), 2 * np.eye(4)), r"T1 is no pose"),
+        (lambda: tool_line(np.eye(4), 2 * np.eye(4)), r"T1 is not a pose"),
         (lambda: tool_line([np.eye(4)], np.eye(4)), r"T0 has shape \(1, 4, 4\); expected \(4, 4\)"),
         (lambda: tool_circle(np.eye(4), [1, 0], [0, 0, 1]), r"centre has shape \(2,\); expected \(3,\)"),
         (lambda: tool_circle(np.eye(4), [1, 0, 0], [0, 0, 0]), r"axis has length 0"),

@@ -104,7 +104,7 @@ BAD = {
     ),
     "no such link": (
         simple().replace('child link="b"', 'child link="x"'),
-        "joint 'j': <child> is 'x', which is no link",
+        "joint 'j': <child> is 'x', which is not a link",
     ),
     "same names": (simple(more='<link name="b"/>'), "two links have the name 'b'"),
     "nan": (simple().replace('mass value="1"', 'mass value="nan"'), "link 'b': <mass value>: found 'nan'"),

@@ -1,4 +1,4 @@
-"""Laws of the protocol: what is encoded comes back, and what is no message is refused."""
+"""Laws of the protocol: what is encoded comes back, and what is not a message is refused."""
 
 import struct
 
@@ -136,11 +136,11 @@ def test_an_acknowledgement_is_read(sequence):
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("{", "no JSON"),
-        (b"\xff", "no JSON"),
-        ("[" * 100_000, "no JSON"),
+        ("{", "not JSON"),
+        (b"\xff", "not JSON"),
+        ("[" * 100_000, "not JSON"),
         ("[1]", "message is list; expected an object"),
-        ("NaN", "no JSON"),
+        ("NaN", "not JSON"),
         ('{"type": "eval"}', "type is 'eval'; expected 'shown' or 'request'"),
         ('{"type": "shown"}', "sequence is None"),
         ('{"type": "shown", "sequence": true}', "sequence is True"),
@@ -152,7 +152,7 @@ def test_an_acknowledgement_is_read(sequence):
         ('{"type": "request", "id": 1, "name": ""}', "name is ''"),
         (f'{{"type": "request", "id": 1, "name": "{"x" * 41}"}}', "expected the name of a request"),
         ('{"type": "request", "id": 1, "name": "x", "data": [1]}', "data is list"),
-        ('{"type": "request", "id": 1, "name": "x", "data": {"q": [NaN]}}', "no JSON"),
+        ('{"type": "request", "id": 1, "name": "x", "data": {"q": [NaN]}}', "not JSON"),
         ('{"type": "request", "id": 1, "name": "x", "data": {"q": [[[[[[[1]]]]]]]}}', "nested 6 levels at most"),
     ],
 )

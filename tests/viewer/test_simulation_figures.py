@@ -23,7 +23,7 @@ def drawn(figure):
 
 
 def curves(axes, color=None):
-    """Return the lines that are no limits, of one colour if given."""
+    """Return the lines that are not limits, of one colour if given."""
     lines = [line for line in axes.lines if len(line.get_xdata()) > 2]
     return [line for line in lines if color is None or line.get_color() == color]
 

@@ -145,7 +145,8 @@ def thread_scaling(workload: Workload, quantity: str, repeats: int) -> ThreadSca
     """
     if cores() < 2:
         raise UnavailableError("needs two cores")
-    function, inputs = method(workload.arm, quantity), workload.inputs(quantity)
+    function = method(workload.arm, quantity)
+    inputs = workload.inputs(quantity)
     out = new_output(function, inputs)
 
     def on(threads: int) -> Call:
@@ -199,7 +200,8 @@ def report_peak() -> None:
     robot, quantity, called, batch, threads = sys.argv[1:]
     workload = Workload.of(Arm.load(robot), int(batch), int(threads), seed=0)
     workload.arm.compile()
-    function, inputs = method(workload.arm, quantity), workload.inputs(quantity)
+    function = method(workload.arm, quantity)
+    inputs = workload.inputs(quantity)
     out = new_output(function, inputs) if called == "out=" else None
     count = min(len(inputs[0]), 1024)
     warm_up = [x[:count] for x in inputs]
@@ -245,7 +247,8 @@ def first_call(workload: Workload, quantity: str) -> FirstCall:
         f"q = np.random.default_rng(0).uniform(-1, 1, (int(sys.argv[2]), arm.n)); arm.{quantity}({arguments})"
     )
     with tempfile.TemporaryDirectory() as folder:
-        robot, cache = _robot_file(workload.arm, folder), {"DHKIT_CACHE_DIR": str(Path(folder) / "cache")}
+        robot = _robot_file(workload.arm, folder)
+        cache = {"DHKIT_CACHE_DIR": str(Path(folder) / "cache")}
 
         def seconds() -> float:
             start = perf_counter()

@@ -420,7 +420,7 @@ def _markdown_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> l
 
 
 def _with_lists(value: Any) -> Any:
-    """Return plain data with lists in place of tuples, as JSON reads it back."""
+    """Return plain data with lists instead of tuples, as JSON reads it back."""
     if isinstance(value, dict):
         return {key: _with_lists(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):

@@ -111,7 +111,8 @@ def run(
     _check_arguments(quantities, batch=batch, threads=threads, repeats=repeats)
     tell = progress or (lambda line: None)
     chosen = all_contenders() if contenders is None else contenders
-    measurements, interrupted = _Measurements(), False
+    measurements = _Measurements()
+    interrupted = False
     try:
         with calm():
             workload = Workload.of(arm, batch, threads, seed)

@@ -56,7 +56,7 @@ def numbers(words: Sequence[str], what: str, counts: Sequence[int]) -> Array:
     Raises
     ------
     DescriptionError
-        There is another count, or a word is no expression.
+        There is another count, or a word is not an expression.
     """
     expressions = _split(words)
     if len(expressions) not in counts:
@@ -95,7 +95,7 @@ def joint_values(
     Raises
     ------
     DescriptionError
-        There is no such configuration, there is another count, or a word is no expression.
+        There is no such configuration, there is another count, or a word is not an expression.
     """
     if len(words) == 1 and words[0] in arm.configurations:
         return _with_warning(arm, arm.configurations[words[0]], words[0], outside)
@@ -148,7 +148,7 @@ def target(
         Not exactly one of --xyz, --matrix and --like is given, there is another count of numbers, or a word is no
         expression.
     ValueError
-        There is no such order of Euler angles, or the matrix is no pose.
+        There is no such order of Euler angles, or the matrix is not a pose.
     """
     if sum(given is not None for given in (xyz, matrix, like)) != 1:
         raise DescriptionError("no single pose; expected one of --xyz, --matrix and --like")
@@ -170,7 +170,7 @@ def objective(text: str) -> Objective:
     Raises
     ------
     DescriptionError
-        There is no such objective, or a factor is no positive number.
+        There is no such objective, or a factor is not a positive number.
 
     Examples
     --------
@@ -208,7 +208,7 @@ def joint_limits(arm: Arm, given: Mapping[str, str | None], degrees: bool, speed
     Raises
     ------
     DescriptionError
-        There is another count, or a word is no expression.
+        There is another count, or a word is not an expression.
     ValueError
         A limit is not positive.
     """
@@ -246,7 +246,7 @@ def payload(text: str | None) -> Payload | None:
     Raises
     ------
     DescriptionError
-        There are other numbers, or a word is no expression.
+        There are other numbers, or a word is not an expression.
     """
     from dhkit.planning import Payload
 
@@ -263,7 +263,7 @@ def obstacles(boxes: Sequence[str], spheres: Sequence[str], floor: str | None) -
     Raises
     ------
     DescriptionError
-        There are other numbers, or a word is no expression.
+        There are other numbers, or a word is not an expression.
     ValueError
         A size is not positive.
     """

@@ -43,9 +43,7 @@ def lab(
         typer.Option(min=1024, max=65535, help="Port of the page; the address, token included, stays the same."),
     ] = None,
     mine: Annotated[Path | None, typer.Option(help="Your file (.py, .m) with fk, ik or controller.")] = None,
-    run: Annotated[
-        str | None, typer.Option(help="Your program in place of a file; ARGUMENTS follow the robot.")
-    ] = None,
+    run: Annotated[str | None, typer.Option(help="Your program instead of a file; ARGUMENTS follow the robot.")] = None,
     arguments: Annotated[list[str] | None, typer.Argument(help="Arguments of the program of --run.")] = None,
     isolated: Isolated = False,
     solid: Annotated[Path | None, typer.Option(help="STL file for the panel of transforms.")] = None,
@@ -81,7 +79,7 @@ def lab(
 def view(
     robot: Robot,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Print the address, and open no browser.")] = False,
-    html: Annotated[Path | None, typer.Option(help="Write a page in place of opening the browser.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page instead of opening the browser.")] = None,
 ) -> ExitStatus:
     """Show an arm in the browser, to look at; Ctrl-C ends it."""
     arm = load_arm(robot)

@@ -148,7 +148,7 @@ def _inverse(description: Description, form: str, output: Path | None, json: boo
         text = derivation.html() if form == "html" else derivation.text()
     if output is not None:
         if output.is_dir() or output.suffix == ".toml":
-            raise DescriptionError(f"{output}: expected the name of a file that is no robot file")
+            raise DescriptionError(f"{output}: expected the name of a file that is not a robot file")
         check_place(output)
         write_atomically(output, text)
         report_files([output], json=json)

@@ -42,14 +42,14 @@ def grade(
         list[Path] | None, typer.Argument(help="Answer sheets (.toml, .py, .m, .tex, .ipynb), or folders of them.")
     ] = None,
     robot: Annotated[
-        str | None, typer.Option(help="A library name or a robot file, in place of the sheets' own.")
+        str | None, typer.Option(help="A library name or a robot file, instead of the sheets' own.")
     ] = None,
     task: Annotated[
         Path | None, typer.Option(help="The instructor's file: robot, [task], [names], [rubric] (.toml).")
     ] = None,
     rubric: Annotated[Path | None, typer.Option(help="Rubric: points of the answers (.toml).")] = None,
     execute: Annotated[
-        bool, typer.Option("--execute", help="Execute programs in processes of their own, in place of reading them.")
+        bool, typer.Option("--execute", help="Execute programs in processes of their own, instead of reading them.")
     ] = False,
     isolated: Isolated = False,
     read: Annotated[bool, typer.Option("--read", help="Show how each entry was read.")] = False,
@@ -108,7 +108,7 @@ def rubric_of(path: Path | None) -> Rubric:
     Raises
     ------
     AnswerError
-        The file is no rubric, or a mistake is not known.
+        The file is not a rubric, or a mistake is not known.
     """
     rubric = Rubric() if path is None else Rubric.read(path)
     rubric.require_mistakes(LIBRARY, f"{path}: ")
@@ -234,7 +234,7 @@ def run(
     delivery
         Form and place of the reports.
     exclude
-        Files in the folders that are no sheets.
+        Files in the folders that are not sheets.
 
     Raises
     ------

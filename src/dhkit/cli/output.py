@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from dhkit.trajectories import Trajectory
 
 PIPE_WIDTH = 200
-"""Width of the output where it is no terminal, columns: tables then do not break."""
+"""Width of the output where it is not a terminal, columns: tables then do not break."""
 FIGURES = (".png", ".svg", ".pdf")
 PAGES = (".html", ".htm")
 RESOLUTION = 120
@@ -64,7 +64,7 @@ def console() -> Console:
 
 
 def say(text: str, style: str = "") -> None:
-    """Print a line of plain text, in which brackets are no markup."""
+    """Print a line of plain text, in which brackets are not markup."""
     console().print(Text(visible(text), style=style))
 
 

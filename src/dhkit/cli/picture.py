@@ -69,7 +69,7 @@ def _size(text: str) -> tuple[int, int]:
 def play(
     robot: Robot,
     file: Annotated[Path, typer.Argument(help="File of a motion or a simulation.")],
-    html: Annotated[Path | None, typer.Option(help="Write a page in place of opening the browser.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page instead of opening the browser.")] = None,
     columns: Columns = None,
     degrees: Annotated[bool, degrees_option("Angles in a file of another program are in degrees.")] = False,
     uniform: Uniform = False,

@@ -92,9 +92,7 @@ def plan(
     ] = 1.0,
     velocity: Annotated[
         str | None,
-        typer.Option(
-            metavar="V ...", help="Velocity limits in place of the robot's, one or one for each joint; rad/s."
-        ),
+        typer.Option(metavar="V ...", help="Velocity limits instead of the robot's, one or one for each joint; rad/s."),
     ] = None,
     acceleration: Annotated[
         str | None, typer.Option(metavar="A ...", help="Acceleration limits, one or one for each joint; rad/s^2.")
@@ -104,7 +102,7 @@ def plan(
     ] = None,
     torque: Annotated[
         str | None,
-        typer.Option(metavar="T ...", help="Torque limits in place of the robot's, one or one for each joint; N m."),
+        typer.Option(metavar="T ...", help="Torque limits instead of the robot's, one or one for each joint; N m."),
     ] = None,
     load: Annotated[
         str | None,

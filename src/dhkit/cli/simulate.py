@@ -50,7 +50,7 @@ Start = Annotated[
     typer.Option(
         "--from",
         metavar="Q ...",
-        help="Start of a motion in place of a file: joint values or a configuration's name; default: nominal, ready, "
+        help="Start of a motion instead of a file: joint values or a configuration's name; default: nominal, ready, "
         "home, another one, or zero, whichever there is first.",
     ),
 ]
@@ -59,7 +59,7 @@ Goal = Annotated[
     typer.Option(
         "--to",
         metavar="Q ...",
-        help="Goal of a motion in place of a file: joint values or a configuration's name; default: each joint of the "
+        help="Goal of a motion instead of a file: joint values or a configuration's name; default: each joint of the "
         "default start moved by 1 rad or less.",
     ),
 ]

@@ -131,7 +131,7 @@ def pushes(texts: Sequence[str]) -> list[Push]:
     Raises
     ------
     DescriptionError
-        There are other numbers, or a word is no expression.
+        There are other numbers, or a word is not an expression.
     ValueError
         A push ends before it begins.
     """

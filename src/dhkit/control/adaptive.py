@@ -60,7 +60,7 @@ class Adaptive:
     ValueError
         A gain that is negative or not finite, a Gamma that is not positive definite, an estimate of another shape.
     TypeError
-        No arm, or what is no numbers.
+        Not an arm, or gains that are not numbers.
     DescriptionError
         A link without a body.
     """

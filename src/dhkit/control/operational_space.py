@@ -61,7 +61,7 @@ class OperationalSpace:
     ValueError
         A gain that is negative or not finite, no direction, a threshold that is not positive.
     TypeError
-        No arm, or what is no numbers.
+        Not an arm, or gains that are not numbers.
     DescriptionError
         A link without a body.
     """

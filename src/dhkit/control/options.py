@@ -75,7 +75,7 @@ class SimulationOptions(Options):
             raise ValueError(f"tolerance is {self.tolerance!r}; expected {TOLERANCES[0]:g} to {TOLERANCES[1]:g}")
 
     def moving(self, description: Description) -> Plant:
-        """Return the plant that moves in place of a robot.
+        """Return the plant that moves instead of a robot.
 
         Raises
         ------
@@ -152,7 +152,7 @@ class BatchOptions(Options):
         check_whole("threads", self.threads, 1)
 
     def moving(self, description: Description) -> tuple[Description, ...]:
-        """Return the arms that move in place of a robot.
+        """Return the arms that move instead of a robot.
 
         Raises
         ------

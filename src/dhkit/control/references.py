@@ -191,7 +191,7 @@ def reference_of(
     Raises
     ------
     ValueError
-        A trajectory of another robot, a matrix that is no pose, or a configuration that is not (n,) and finite.
+        A trajectory of another robot, a matrix that is not a pose, or a configuration that is not (n,) and finite.
     UnreachableError
         A pose that the arm does not reach inside its limits.
     TypeError

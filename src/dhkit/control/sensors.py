@@ -14,7 +14,7 @@ from dhkit.display import value_line
 
 @dataclass(frozen=True, eq=False)
 class Sensors:
-    """Measured joint values and rates in place of the true ones.
+    """Measured joint values and rates instead of the true ones.
 
     A joint value gets normal noise and is then rounded to the encoder's resolution. A rate is the true one with noise,
     as from a tachometer, or with ``differences=True`` the difference of two measured joint values over a period, as

@@ -44,7 +44,7 @@ class StepKernel:
     own
         Inputs of each run, shape (B, p); the setpoint's 3n come first unless it is shared. None for none.
     closed
-        Whether the program includes a control law: it then takes a setpoint in place of torques.
+        Whether the program includes a control law: it then takes a setpoint instead of torques.
     setpoint_shared
         Whether all runs have the same setpoint.
     """

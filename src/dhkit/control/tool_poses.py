@@ -43,9 +43,9 @@ class ToolPoses:
     Raises
     ------
     ValueError
-        Other shapes, matrices that are no poses, times that do not ascend, positions without ``q0``.
+        Other shapes, matrices that are not poses, times that do not ascend, positions without ``q0``.
     TypeError
-        No arm, or what is no numbers.
+        Not an arm, or gains that are not numbers.
     UnreachableError
         The arm does not reach the first pose inside its limits.
     PlanningError

@@ -34,13 +34,13 @@ _ASYMMETRY_TOLERANCE = 1e-12
 
 @takes_robot
 def with_tool(description: Description, T: ArrayLike) -> Description:
-    """Return the arm with its tool's frame at T in DH frame n, shape (4, 4), m, in place of its own."""
+    """Return the arm with its tool's frame at T in DH frame n, shape (4, 4), m, instead of its own."""
     return replace(description, tool=Tool(placement_of_pose(T, "tool"), description.tool.shapes))
 
 
 @takes_robot
 def with_base(description: Description, T: ArrayLike) -> Description:
-    """Return the arm with frame 0 at T in the world, shape (4, 4), m, in place of its own base."""
+    """Return the arm with frame 0 at T in the world, shape (4, 4), m, instead of its own base."""
     base = description.base
     return replace(description, base=Base(placement_of_pose(T, "base"), base.shapes, base.body))
 

@@ -21,7 +21,10 @@ def _plane_rotation(first: int, second: int, angle: Expression) -> ExactPose:
     """Return the rotation from the first axis towards the second by an angle, rad."""
     T = identity()
     c, s = decimals(cos(angle)), decimals(sin(angle))
-    T[first, first], T[first, second], T[second, first], T[second, second] = c, -s, s, c
+    T[first, first] = c
+    T[first, second] = -s
+    T[second, first] = s
+    T[second, second] = c
     return T
 
 
@@ -61,9 +64,11 @@ def placement_of(T: ExactPose) -> Placement:
     level = R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0]
     if level.is_zero:
         # At +-90 degrees of pitch, roll and yaw rotate about one axis: yaw is chosen 0.
-        roll, yaw = arc_tangent(-R[1, 2], R[1, 1]), ZERO
+        roll = arc_tangent(-R[1, 2], R[1, 1])
+        yaw = ZERO
     else:
-        roll, yaw = arc_tangent(R[2, 1], R[2, 2]), arc_tangent(R[1, 0], R[0, 0])
+        roll = arc_tangent(R[2, 1], R[2, 2])
+        yaw = arc_tangent(R[1, 0], R[0, 0])
     angles = roll, arc_tangent(-R[2, 0], sqrt(level)), yaw
     has_symbols = any(entry.symbols for entry in R.ravel().tolist())
     if not has_symbols and any(angle.half_turns is None for angle in angles):

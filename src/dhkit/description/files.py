@@ -73,7 +73,7 @@ def write_atomically(path: str | Path, content: str | bytes, *, private: bool = 
     """Write a file under a temporary name and rename it, so that no reader sees half a file; folders are created.
 
     With ``private`` nobody else may read or write the file, whatever the umask. A symbolic link is followed. A path
-    that is no regular file, such as ``/dev/stdout`` or a named pipe, is written to directly, since a renamed file
+    that is not a regular file, such as ``/dev/stdout`` or a named pipe, is written to directly, since a renamed file
     would replace it.
 
     Raises

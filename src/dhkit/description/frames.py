@@ -132,25 +132,38 @@ def link_transforms(description: Description, q: ArrayLike) -> Array:
     q = joint_array(description, q)
     missing = ~np.all(np.isfinite(q), axis=-1)
     q = np.where(missing[..., None], np.nan, q)
-    angle, offset = np.where(numbers.prismatic, 0.0, q), np.where(numbers.prismatic, q, 0.0)
-    cos_q, sin_q = np.cos(angle), np.sin(angle)
+    angle = np.where(numbers.prismatic, 0.0, q)
+    offset = np.where(numbers.prismatic, q, 0.0)
+    cos_q = np.cos(angle)
+    sin_q = np.sin(angle)
     # The table's own theta enters by the addition theorem, so that an offset of 90 degrees is exact.
     cos_theta = cos_q * numbers.cos_theta - sin_q * numbers.sin_theta
     sin_theta = sin_q * numbers.cos_theta + cos_q * numbers.sin_theta
-    cos_alpha, sin_alpha, a, d = numbers.cos_alpha, numbers.sin_alpha, numbers.a, numbers.d + offset
+    cos_alpha = numbers.cos_alpha
+    sin_alpha = numbers.sin_alpha
+    a = numbers.a
+    d = numbers.d + offset
 
     A = np.zeros((*q.shape, 4, 4))
     A[..., 3, 3] = 1.0
     A[..., 0, 0] = cos_theta
     A[..., 2, 2] = cos_alpha
     if description.convention is Convention.STANDARD:
-        A[..., 0, 1], A[..., 0, 2], A[..., 0, 3] = -sin_theta * cos_alpha, sin_theta * sin_alpha, a * cos_theta
-        A[..., 1, 0], A[..., 1, 1], A[..., 1, 2] = sin_theta, cos_theta * cos_alpha, -cos_theta * sin_alpha
+        A[..., 0, 1] = -sin_theta * cos_alpha
+        A[..., 0, 2] = sin_theta * sin_alpha
+        A[..., 0, 3] = a * cos_theta
+        A[..., 1, 0] = sin_theta
+        A[..., 1, 1] = cos_theta * cos_alpha
+        A[..., 1, 2] = -cos_theta * sin_alpha
         A[..., 1, 3] = a * sin_theta
-        A[..., 2, 1], A[..., 2, 3] = sin_alpha, d
+        A[..., 2, 1] = sin_alpha
+        A[..., 2, 3] = d
     else:
-        A[..., 0, 1], A[..., 0, 3] = -sin_theta, a
-        A[..., 1, 0], A[..., 1, 1], A[..., 1, 2] = sin_theta * cos_alpha, cos_theta * cos_alpha, -sin_alpha
+        A[..., 0, 1] = -sin_theta
+        A[..., 0, 3] = a
+        A[..., 1, 0] = sin_theta * cos_alpha
+        A[..., 1, 1] = cos_theta * cos_alpha
+        A[..., 1, 2] = -sin_alpha
         A[..., 1, 3] = -sin_alpha * d
         A[..., 2, 0], A[..., 2, 1], A[..., 2, 3] = sin_theta * sin_alpha, cos_theta * sin_alpha, cos_alpha * d
     A[missing] = np.nan

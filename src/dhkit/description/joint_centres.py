@@ -1,4 +1,4 @@
-"""Where an arm is whose table has lengths that are no sizes of it: points on its joint axes that lie close together.
+"""Where an arm is whose table has lengths that are not sizes of it: points on its joint axes that lie close together.
 
 The common normal of two nearly parallel axes may be kilometres away, and a and d with it. The arm itself is where its
 joints are: of the points on its axes those are taken whose distances along the chain, from frame 0 to the tool, have
@@ -14,7 +14,7 @@ import numpy as np
 from dhkit.description.arrays import Array
 
 FAR = 4.0
-"""Ratio of the sum of abs(a) + abs(d) to the length along the joint centres from which a and d are no sizes."""
+"""Ratio of the sum of abs(a) + abs(d) to the length along the joint centres from which a and d are not sizes."""
 _Z = np.array([0.0, 0.0, 1.0])
 
 

@@ -162,7 +162,8 @@ def _angle_names(description: Description, locked: Mapping[int, Expression]) -> 
     """Return the parameters that determine angles of base, tool, locked rows and their neighbours."""
     names = names_in((description.base.placement.rpy, description.tool.placement.rpy))
     for place, q in locked.items():
-        joint, neighbours = description.joints[place], description.joints[max(place - 1, 0) : place + 2]
+        joint = description.joints[place]
+        neighbours = description.joints[max(place - 1, 0) : place + 2]
         names |= names_in(tuple(neighbour.alpha for neighbour in neighbours)) | joint.theta.symbols
         names |= q.symbols if joint.is_revolute else frozenset()
     return names
@@ -172,7 +173,8 @@ def _with_numbers(
     description: Description, locked: Mapping[int, Expression], names: frozenset[str]
 ) -> tuple[Description, dict[int, Expression]]:
     """Replace parameters, and those that depend on each other with them, by their numbers everywhere."""
-    parameters, values = description.parameters, resolved(description.parameters)
+    parameters = description.parameters
+    values = resolved(description.parameters)
     # Neither what a replaced parameter is made of nor what is made of it may change on its own any more.
     previous = frozenset[str]()
     while names != previous:
@@ -325,11 +327,14 @@ def _parallel_axes_row(Y: ExactPose, is_opposite: bool) -> _Row:
     x, y, z = Y[:3, 3]
     turn = arc_tangent(Y[1, 0], Y[0, 0])
     if y.is_zero:
-        beta, a = ZERO, x
+        beta = ZERO
+        a = x
     elif x.is_zero:
-        beta, a = PI / 2, y
+        beta = PI / 2
+        a = y
     else:
-        beta, a = arc_tangent(y, x), sqrt(x * x + y * y)
+        beta = arc_tangent(y, x)
+        a = sqrt(x * x + y * y)
     return _Row(beta, z, a, PI if is_opposite else ZERO, beta - turn if is_opposite else turn - beta, ZERO)
 
 
@@ -337,11 +342,14 @@ def _skew_axes_row(Y: ExactPose, number: Callable[[Expression], float]) -> _Row:
     """Return the row of other axes: beta from the second axis' direction, the rest from its position."""
     (x, y, z), (u, v, w) = Y[:3, 3], Y[:3, 2]
     if u.is_zero:
-        beta, sine = ZERO, -v
+        beta = ZERO
+        sine = -v
     elif v.is_zero:
-        beta, sine = PI / 2, u
+        beta = PI / 2
+        sine = u
     else:
-        beta, sine = arc_tangent(u, -v), sqrt(u * u + v * v)
+        beta = arc_tangent(u, -v)
+        sine = sqrt(u * u + v * v)
     c, s = (cos(beta), sin(beta)) if u.is_zero or v.is_zero else (-v / sine, u / sine)
     delta = (x * s - y * c) / sine
     sign = -1 if number(sine) < 0 else 1

@@ -44,11 +44,12 @@ class MeshHeader:
 
 
 class MeshFileError(DescriptionError):
-    """A file that is no readable mesh; ``reason`` is the message without the path."""
+    """A file that is not a readable mesh; ``reason`` is the message without the path."""
 
     def __init__(self, path: Path, reason: str) -> None:
         super().__init__(path, reason)
-        self.path, self.reason = path, reason
+        self.path = path
+        self.reason = reason
 
     def __str__(self) -> str:
         return f"{self.path}: {self.reason}"
@@ -99,12 +100,12 @@ def is_mesh_file(path: Path) -> bool:
 
 
 class _FaultError(Exception):
-    """The reason why a file is no mesh."""
+    """The reason why a file is not a mesh."""
 
 
 @lru_cache(maxsize=256)
 def _header_or_fault(path: Path, size: int, _time: int, _inode: int) -> MeshHeader | str:
-    """Return a file's header, or the reason why it is no mesh."""
+    """Return a file's header, or the reason why it is not a mesh."""
     if size == 0:
         return "an empty file; expected a mesh"
     read_header = {".stl": _stl_header, ".obj": _obj_header, ".ply": _ply_header, ".dae": _dae_header}
@@ -175,7 +176,8 @@ def _ply_header(path: Path, size: int) -> MeshHeader:
 def _ply_elements(lines: list[list[str]], *, is_ascii: bool) -> tuple[dict[str, int], int]:
     """Return the count of each element, and the fewest bytes that all of them take."""
     counts: dict[str, int] = {}
-    min_bytes, element = 0, ""
+    min_bytes = 0
+    element = ""
     for words in lines:
         if words[:1] == ["element"]:
             if len(words) != 3 or not words[2].isdecimal() or len(words[2]) > 12:
@@ -197,7 +199,8 @@ def _ply_elements(lines: list[list[str]], *, is_ascii: bool) -> tuple[dict[str, 
 def _dae_header(path: Path, size: int) -> MeshHeader:
     """Refuse XML with a document type or entities, XML nested too deep, and other XML than COLLADA."""
     parser = expat.ParserCreate()
-    depth, root = 0, ""
+    depth = 0
+    root = ""
 
     def start_element(name: str, _attributes: dict[str, str]) -> None:
         nonlocal depth, root
@@ -213,7 +216,8 @@ def _dae_header(path: Path, size: int) -> MeshHeader:
     def refuse(*_arguments: object) -> None:
         raise _FaultError("has a document type or entities, which a COLLADA file does not need and dhkit does not read")
 
-    parser.StartElementHandler, parser.EndElementHandler = start_element, end_element
+    parser.StartElementHandler = start_element
+    parser.EndElementHandler = end_element
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
     try:
         parser.Parse(_bytes_at(path, 0, size), True)

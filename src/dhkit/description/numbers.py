@@ -80,7 +80,7 @@ class Numbers:
     reach: float
     """The sum of abs(a) + abs(d) + stroke, m; with ``link_ends``, of their lengths and the strokes."""
     link_ends: LinkEnds | None
-    """Ends of the links where a and d are no sizes of the arm, since axes are nearly parallel; see
+    """Ends of the links where a and d are not sizes of the arm, since axes are nearly parallel; see
     :mod:`dhkit.description.joint_centres`."""
 
     @property
@@ -102,7 +102,8 @@ class Numbers:
         Mass, kg, first moments m c, kg m, and second moments xx, yy, zz, xy, yz, xz, kg m^2; NaN where a link has no
         body.
         """
-        m, c = self.mass[:, None], self.com
+        m = self.mass[:, None]
+        c = self.com
         square = np.sum(c * c, axis=-1)[:, None, None] * np.eye(3)
         second = self.inertia + m[..., None] * (square - c[:, :, None] * c[:, None, :])
         listed = np.stack([second[:, i, j] for i, j in INERTIA_PLACES.values()], axis=-1)
@@ -122,7 +123,8 @@ class Numbers:
         def angles(column: Iterable[Expression]) -> list[Expression]:
             return [exact_angle(substitute(x, values)) for x in column]
 
-        alpha, theta = angles(j.alpha for j in joints), angles(j.theta for j in joints)
+        alpha = angles(j.alpha for j in joints)
+        theta = angles(j.theta for j in joints)
         lower = array(j.limits[0] if j.limits else -np.inf for j in joints)
         upper = array(j.limits[1] if j.limits else np.inf for j in joints)
         a, d = array(j.a for j in joints), array(j.d for j in joints)
@@ -131,7 +133,8 @@ class Numbers:
         # How far each prismatic joint can move away from zero, m; one without limits adds nothing to the reach.
         strokes = [float(stroke) for stroke in np.maximum(abs(lower), abs(upper))[prismatic] if np.isfinite(stroke)]
         T_last_tool = matrix(description.tool.placement, values)
-        cos_alpha, sin_alpha = array(cos(x) for x in alpha), array(sin(x) for x in alpha)
+        cos_alpha = array(cos(x) for x in alpha)
+        sin_alpha = array(sin(x) for x in alpha)
         is_standard = description.convention is Convention.STANDARD
         ends = link_ends(a, d, cos_alpha, sin_alpha, is_standard=is_standard, tool=T_last_tool[:3, 3])
         along_table = float(np.sum(np.abs(a) + np.abs(d)))

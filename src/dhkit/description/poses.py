@@ -115,7 +115,7 @@ def check_pose(T: ArrayLike, name: str = "T") -> Array:
     Raises
     ------
     ValueError
-        Not of shape (..., 4, 4), or some matrix is no rigid transform within 1e-6.
+        Not of shape (..., 4, 4), or some matrix is not a rigid transform within 1e-6.
     """
     array = number_array(T, name, "(..., 4, 4)")
     if array.shape[-2:] != (4, 4):
@@ -125,7 +125,7 @@ def check_pose(T: ArrayLike, name: str = "T") -> Array:
     bottom = np.abs(array[..., 3, :] - (0, 0, 0, 1)).max(axis=-1)
     improper = np.linalg.det(R) < 0
     if np.any((defect > ORTHONORMAL) | (bottom > ORTHONORMAL) | improper):
-        raise ValueError(f"{name} is no pose: its rotation must be orthonormal, its last row 0 0 0 1")
+        raise ValueError(f"{name} is not a pose: its rotation must be orthonormal, its last row 0 0 0 1")
     return array
 
 
@@ -153,7 +153,8 @@ def _array(name: str, value: ArrayLike, size: int) -> Array:
 def _axes(order: str) -> tuple[tuple[int, int, int], bool]:
     """Return the axes' indices in the sequence of intrinsic rotations, and whether the order is extrinsic."""
     upper = order.upper()
-    intrinsic, extrinsic = order == upper, order == order.lower()
+    intrinsic = order == upper
+    extrinsic = order == order.lower()
     if len(order) != 3 or set(upper) - set("XYZ") or not (intrinsic or extrinsic) or upper[1] in (upper[0], upper[2]):
         raise ValueError(f"order is {order!r}; expected three of XYZ (moving) or xyz (fixed), neighbours different")
     first, second, third = ("XYZ".index(letter) for letter in (upper if intrinsic else upper[::-1]))
@@ -166,7 +167,8 @@ def _cos_sin(angles: Array, degrees: bool) -> tuple[Array, Array]:
     # Multiples of 90 degrees are split off in degrees, which is exact, so that 90 degrees have the cosine 0.
     quarter = np.round(angles / 90.0)
     remainder = np.radians(angles - 90.0 * quarter)
-    c, s = np.cos(remainder), np.sin(remainder)
+    c = np.cos(remainder)
+    s = np.sin(remainder)
     quadrant = np.where(np.isfinite(quarter), np.mod(quarter, 4), 0)
     cosine = np.select([quadrant == 0, quadrant == 1, quadrant == 2], [c, -s, -c], s)
     sine = np.select([quadrant == 0, quadrant == 1, quadrant == 2], [s, c, -s], -c)
@@ -182,7 +184,8 @@ def _from_euler(angles: Array, order: str, degrees: bool) -> Array:
         i, j = (axis + 1) % 3, (axis + 2) % 3
         factor[..., axis, axis] = 1.0
         factor[..., i, i] = factor[..., j, j] = cosines[..., k]
-        factor[..., i, j], factor[..., j, i] = -sines[..., k], sines[..., k]
+        factor[..., i, j] = -sines[..., k]
+        factor[..., j, i] = sines[..., k]
         rotation = rotation @ factor
     return rotation
 
@@ -195,14 +198,17 @@ def _to_euler(R: Array, order: str) -> Array:
     ends_as_it_begins = i == k
     if ends_as_it_begins:
         level = np.hypot(R[..., j, i], R[..., o, i])
-        first, middle = np.arctan2(R[..., j, i], -parity * R[..., o, i]), np.arctan2(level, R[..., i, i])
+        first = np.arctan2(R[..., j, i], -parity * R[..., o, i])
+        middle = np.arctan2(level, R[..., i, i])
     else:
         level = np.hypot(R[..., i, i], R[..., i, j])
-        first, middle = np.arctan2(-parity * R[..., j, k], R[..., k, k]), np.arctan2(parity * R[..., i, k], level)
+        first = np.arctan2(-parity * R[..., j, k], R[..., k, k])
+        middle = np.arctan2(parity * R[..., i, k], level)
     locked = level == 0.0
     first = np.where(locked, np.arctan2(parity * R[..., o, j], R[..., j, j]), first)
     # Row j of R_i(-p) R depends on the third angle alone, however near gimbal lock is.
-    c, s = np.cos(first), np.sin(first)
+    c = np.cos(first)
+    s = np.sin(first)
     row = c[..., None] * R[..., j, :] + parity * s[..., None] * R[..., o, :]
     sine = -row[..., o] if ends_as_it_begins else row[..., i]
     third = np.where(locked, 0.0, np.arctan2(parity * sine, row[..., j]))

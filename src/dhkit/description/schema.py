@@ -314,7 +314,8 @@ def validated(document: Document) -> RobotForm:
 
 
 def _fault_text(error: ErrorDetails, document: Document) -> str:
-    path, value = tuple(error["loc"]), error["input"]
+    path = tuple(error["loc"])
+    value = error["input"]
     where = _place_text(path, document)
     match error["type"]:
         case "missing":

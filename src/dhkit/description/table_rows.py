@@ -81,7 +81,7 @@ def from_dh(
     Raises
     ------
     DescriptionError
-        Another number of columns, an unknown kind, unit or convention, or a value that is no finite number.
+        Another number of columns, an unknown kind, unit or convention, or a value that is not a finite number.
 
     Examples
     --------

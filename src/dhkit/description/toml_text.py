@@ -51,7 +51,7 @@ def _unquoted(text: str, message: str) -> str:
 
 
 def plain_numbers(document: Document) -> Document:
-    """Return a document with doubles in place of decimals."""
+    """Return a document with doubles instead of decimals."""
 
     def plain(value: object) -> object:
         if isinstance(value, Mapping):

@@ -268,7 +268,7 @@ def _check_sizes(geometry: Geometry, where: str, value: _Value) -> None:
 
 
 def _check_mesh(mesh: Mesh, where: str, value: _Value, description: RobotData) -> Iterator[str]:
-    """Refuse an invalid path or scale; a file that is no mesh is a warning, for the arm works without it."""
+    """Refuse an invalid path or scale; a file that is not a mesh is a warning, for the arm works without it."""
     file = inside(description.mesh_folder, mesh.path, f"{where}.mesh")
     if not mesh.path.lower().endswith(MESH_FORMATS):
         raise DescriptionError(f"{where}.mesh is {mesh.path[:80]!r}; expected one of {', '.join(MESH_FORMATS)}")
@@ -280,14 +280,14 @@ def _check_mesh(mesh: Mesh, where: str, value: _Value, description: RobotData) -
     try:
         check_mesh_file(file)
     except MeshFileError as error:
-        fault = "is not there" if not file.exists() else f"is no mesh that can be read ({error.reason})"
+        fault = "is not there" if not file.exists() else f"is not a mesh that can be read ({error.reason})"
         yield f"{where}.mesh: {mesh.path!r} {fault}; the link is drawn without it"
 
 
 def _check_configurations(description: RobotData, value: _Value) -> Iterator[str]:
     for name, q in description.configurations.items():
         if not NAME.fullmatch(name):
-            raise DescriptionError(f"configurations: {name[:80]!r} is no name")
+            raise DescriptionError(f"configurations: {name[:80]!r} is not a name")
         if len(q) != description.n:
             raise DescriptionError(f"configurations.{name}: {len(q)} numbers; expected {description.n}, one a joint")
         for i, (entry, joint) in enumerate(zip(q, description.joints, strict=True)):

@@ -56,7 +56,8 @@ def power(description: Description, qd: ArrayLike, tau: ArrayLike, out: Array | 
     ValueError, TypeError
         An argument of another shape, or not numeric; ``out`` does not fit.
     """
-    rates, torques = joint_array(description, qd, "qd"), joint_array(description, tau, "tau")
+    rates = joint_array(description, qd, "qd")
+    torques = joint_array(description, tau, "tau")
     shape = np.broadcast_shapes(rates.shape, torques.shape)[:-1]
     result = result_array(shape, out)
     result[...] = np.sum(rates * torques, axis=-1)

@@ -114,7 +114,8 @@ def _explain(description: Description, q: Array, qdd: Array) -> None:
 
 def _failing(M: Array) -> Array:
     """Return the last joint without inertia for each matrix (N, n, n), as ``solve_for_acceleration``; -1: none."""
-    A, least = M.copy(), SINGULAR * np.diagonal(M, axis1=-2, axis2=-1).max(axis=-1)
+    A = M.copy()
+    least = SINGULAR * np.diagonal(M, axis1=-2, axis2=-1).max(axis=-1)
     failing = np.full(len(M), -1)
     for k in reversed(range(M.shape[-1])):
         pivot = A[:, k, k].copy()

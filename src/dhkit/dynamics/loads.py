@@ -122,14 +122,16 @@ def wrench_kernel(description: Description) -> tuple[Kernel, Array]:
 
 
 def _friction_graph(name: str, n: int, smooth: bool) -> Graph:
-    parameters, qd = joint_symbols("parameters", 3 * n + 1), joint_symbols("qd", n)
+    parameters = joint_symbols("parameters", 3 * n + 1)
+    qd = joint_symbols("qd", n)
     torque = friction_expression(qd, parameters, smooth=smooth)
     return Graph.of(name, {"parameters": parameters, "qd": qd}, {"tau": torque})
 
 
 def _wrench_graph(description: Description) -> Graph:
     table, parameters = SymbolicTable.parametric(description)
-    q, wrench = joint_symbols("q", description.n), joint_symbols("wrench", 6)
+    q = joint_symbols("q", description.n)
+    wrench = joint_symbols("wrench", 6)
     return Graph.of(
         "wrench_torque", {"parameters": parameters, "q": q, "wrench": wrench}, {"tau": jacobian(table, q).T @ wrench}
     )

@@ -108,5 +108,6 @@ def _cross_matrix(w: Array) -> Array:
     """Return [w]x, shape (..., 3, 3)."""
     matrix = np.zeros((*w.shape, 3))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        matrix[..., j, i], matrix[..., i, j] = w[..., k], -w[..., k]
+        matrix[..., j, i] = w[..., k]
+        matrix[..., i, j] = -w[..., k]
     return matrix

@@ -137,7 +137,8 @@ def parameter_grouping(description: Description) -> ParameterGrouping:
     states = rng.uniform(-np.pi, np.pi, (3, _STATES_PER_JOINT * n, n))
     A = regressor(description, *states).reshape(-1, 10 * n)
     order = [10 * i + k for i in reversed(range(n)) for k in range(1, 10)] + [10 * i for i in reversed(range(n))]
-    basis, kept = np.zeros((len(A), 0)), []
+    basis = np.zeros((len(A), 0))
+    kept = []
     floor = _DEPENDENT * np.linalg.norm(A, axis=0).max()
     for k in order:
         size = np.linalg.norm(A[:, k])

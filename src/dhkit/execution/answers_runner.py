@@ -12,7 +12,7 @@ The first line has the file's functions and the names that it assigns. Requests 
   matrices ("sympy"), or as CasADi's ("casadi");
 - ``{"call": name, "samples": [{...}, ...], "local": name}``: what it returns, or one of its local names, at numbers.
 
-Values are text, lists of them, or objects ``{"fields": {...}}``; ``{"error": ...}`` stands for what is no answer.
+Values are text, lists of them, or objects ``{"fields": {...}}``; ``{"error": ...}`` stands for what is not an answer.
 
 Arguments: the folder of the packages that the file may import, empty where it may import all; the file.
 """
@@ -56,7 +56,8 @@ def main(packages: str, path: str) -> None:
     if packages:
         sys.path.append(packages)
     sys.addaudithook(import_hook())
-    requests, answers = os.fdopen(REQUESTS, "rb"), os.fdopen(ANSWERS, "wb", 0)
+    requests = os.fdopen(REQUESTS, "rb")
+    answers = os.fdopen(ANSWERS, "wb", 0)
 
     def write(message: Mapping[str, object]) -> None:
         answers.write(json.dumps(message).encode() + b"\n")
@@ -94,7 +95,8 @@ def main(packages: str, path: str) -> None:
 
 def import_hook() -> Callable[[str, tuple[Any, ...]], None]:
     """Return an audit hook that says when dhkit is imported: a hint for readers of the report, and no defence."""
-    write, said = os.write, list[str]()
+    write = os.write
+    said = list[str]()
 
     def hook(event: str, arguments: tuple[Any, ...]) -> None:
         if event == "import" and not said and str(arguments[0]).partition(".")[0] == "dhkit":
@@ -127,7 +129,7 @@ def assigned_lines(source: bytes) -> dict[str, int]:
     return lines
 
 
-# Symbols in place of numbers
+# Symbols instead of numbers
 
 
 class Symbolic:
@@ -388,7 +390,7 @@ class Writer:
         self._entries = MAX_ENTRIES
 
     def tree(self, value: Any) -> object:
-        """Return a value as text, lists of text or fields; an error for what is no answer."""
+        """Return a value as text, lists of text or fields; an error for what is not an answer."""
         try:
             return self._tree(value)
         except RecursionError:
@@ -434,7 +436,7 @@ class Writer:
             checked_name(str(symbol))
         for call in value.atoms(sympy.core.function.AppliedUndef):
             if len(call.args) != 1 or not call.args[0].is_Symbol:
-                raise ValueError(f"{call} is no joint variable as a function of time")
+                raise ValueError(f"{call} is not a joint variable as a function of time")
             checked_name(call.func.__name__)
         for count, _ in enumerate(sympy.preorder_traversal(value)):
             if count > MAX_NODES:
@@ -487,7 +489,8 @@ class Writer:
 def used_counts(root: Any) -> dict[int, int]:
     """Return how many other nodes use each node of a CasADi expression."""
     counts: dict[int, int] = {}
-    waiting, seen = [root], set[int]()
+    waiting = [root]
+    seen = set[int]()
     while waiting:
         node = waiting.pop()
         if node.element_hash() in seen:
@@ -565,7 +568,7 @@ def number_text(value: Any) -> str:
         return str(value)
     number = float(value)
     if not math.isfinite(number):
-        raise ValueError(f"{number} is no number")
+        raise ValueError(f"{number} is not a number")
     return f"{number:.{DIGITS}g}"
 
 

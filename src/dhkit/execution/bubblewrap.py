@@ -76,7 +76,8 @@ def package_paths(names: tuple[str, ...]) -> dict[Path, Path]:
     Packages that are not installed are left out, and so are folders that several packages share.
     """
     paths: dict[Path, Path] = {}
-    waiting, known = list(names), set[str]()
+    waiting = list(names)
+    known = set[str]()
     while waiting:
         name = waiting.pop().lower().replace("_", "-")
         if name in known:

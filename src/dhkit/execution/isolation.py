@@ -143,7 +143,7 @@ def _problem_of_bubblewrap(hidden: Sequence[str], packages: tuple[str, ...]) -> 
 
 
 def _problem_of_user(hidden: Sequence[str], needed: Sequence[str]) -> str:
-    """Return why another user is no isolation here, or cannot read the packages it needs; empty where it works."""
+    """Return why another user does not isolate here, or cannot read the packages it needs; empty where it works."""
     seen, error = _probe([base_python(), "-I", "-S", "-c", _WHAT_IS_SEEN, *hidden, *needed], FIRST_USER)
     if error:
         return error

@@ -60,7 +60,7 @@ class Failure(StrEnum):
     ENDED = "ended"
     """The process ended."""
     GARBAGE = "garbage"
-    """The process wrote something that is no answer."""
+    """The process wrote something that is not an answer."""
     UNREADABLE = "unreadable"
     """The program cannot be loaded."""
 
@@ -112,7 +112,8 @@ class CallTime:
     def __init__(self, process: Process, seconds: float) -> None:
         self.seconds = seconds
         self._process = process
-        self._begun, self._processor_begun = time.monotonic(), process.processor_time
+        self._begun = time.monotonic()
+        self._processor_begun = process.processor_time
 
     @property
     def on_the_clock(self) -> float:
@@ -207,7 +208,7 @@ class Process:
         Raises
         ------
         ProgramError
-            The answer does not come in time or is no JSON object, or the process has ended.
+            The answer does not come in time or is not a JSON object, or the process has ended.
         """
         line = self._next_line(call)
         if line is None:
@@ -288,7 +289,7 @@ class Process:
             Failure.PROCESSES: f"started more than {MAX_PROCESSES} processes",
             Failure.FILES: f"wrote more than {BOUNDS.written_bytes >> 20} MB to files",
             Failure.ENDED: f"the program ended{self._exit_status_text()}",
-            Failure.GARBAGE: "wrote what is no answer",
+            Failure.GARBAGE: "wrote what is not an answer",
         }
         if self.failure is Failure.ENDED:
             self._drained.wait(_LAST_WORDS_TIME)  # its last words may come after the news of its end

@@ -28,7 +28,8 @@ def main(packages: str, path: str) -> None:
     sys.addaudithook(import_hook())
     import numpy as np
 
-    requests, answers = os.fdopen(REQUESTS, "rb"), os.fdopen(ANSWERS, "wb", 0)
+    requests = os.fdopen(REQUESTS, "rb")
+    answers = os.fdopen(ANSWERS, "wb", 0)
     name = os.path.basename(path)  # noqa: PTH119
 
     def write(message: dict[str, object]) -> None:
@@ -66,7 +67,8 @@ def main(packages: str, path: str) -> None:
 
 def import_hook() -> Callable[[str, tuple[Any, ...]], None]:
     """Return an audit hook that says when dhkit is imported: a hint for readers of the report, and no defence."""
-    write, said = os.write, list[str]()
+    write = os.write
+    said = list[str]()
 
     def hook(event: str, arguments: tuple[Any, ...]) -> None:
         if event == "import" and not said and str(arguments[0]).partition(".")[0] == "dhkit":

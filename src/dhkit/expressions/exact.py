@@ -205,7 +205,7 @@ class Expression:
         try:
             return float(self.value())
         except OverflowError:
-            raise ExpressionError(f"{plain(self.text, _SHOWN_LENGTH)} is no finite double") from None
+            raise ExpressionError(f"{plain(self.text, _SHOWN_LENGTH)} is not a finite double") from None
 
     @property
     def text(self) -> str:
@@ -227,7 +227,8 @@ class Expression:
 
     def with_digits(self, digits: int) -> Expression:
         """Return the value with longer coefficients rounded to this number of digits."""
-        limit, context = 10**digits, Context(prec=digits)
+        limit = 10**digits
+        context = Context(prec=digits)
 
         def rounded(c: Fraction) -> Fraction:
             if abs(c.numerator) < limit and c.denominator < limit:
@@ -366,11 +367,13 @@ def _merged(left: Monomial, right: Monomial) -> tuple[Monomial, Expression | Non
         raise ExpressionError(f"an exponent of more than {BOUNDS.exponent**2}")
     factor: Expression | None = None
     for atom, exponent in list(powers.items()):
-        resolved, left_over = 0, exponent
+        resolved = 0
+        left_over = exponent
         if atom.name == "sqrt" and atom.arguments:
             resolved, left_over = divmod(exponent, 2)
         elif atom.name == "group" and exponent > 0:
-            resolved, left_over = exponent, 0
+            resolved = exponent
+            left_over = 0
         if resolved:
             factor = (factor or Expression.number(1)) * atom.arguments[0] ** resolved
         powers[atom] = left_over

@@ -175,7 +175,7 @@ def decimals(expression: Expression) -> Expression:
 
 
 def _steps(angle: Expression) -> int | None:
-    """Return an angle in steps of 15 degrees; None if it is no multiple."""
+    """Return an angle in steps of 15 degrees; None if it is not a multiple."""
     half_turns = angle.half_turns
     if half_turns is None or (half_turns * STEPS_IN_PI).denominator != 1:
         return None
@@ -227,7 +227,8 @@ def _direction(angle: Expression) -> tuple[Expression, Expression] | None:
         return None
     y, x = arcs[0][0][0][0].arguments
     r = sqrt(x * x + y * y)
-    c, s = x / r, y * arcs[0][1] / r
+    c = x / r
+    s = y * arcs[0][1] / r
     return (c, s) if rest.is_zero else (c * cos(rest) - s * sin(rest), s * cos(rest) + c * sin(rest))
 
 
@@ -237,11 +238,13 @@ def _leads_negative(x: Expression) -> bool:
 
 def _prime_factors(number: int) -> list[tuple[int, int]]:
     """Factor by trial division; numbers are small here."""
-    factors, prime = [], 2
+    factors = []
+    prime = 2
     while prime * prime <= number:
         power = 0
         while number % prime == 0:
-            number, power = number // prime, power + 1
+            number = number // prime
+            power = power + 1
         if power:
             factors.append((prime, power))
         prime += 1

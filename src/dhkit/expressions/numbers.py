@@ -18,12 +18,12 @@ def exact(value: object) -> Expression:
     Raises
     ------
     ExpressionError
-        The value is no number, or not finite.
+        The value is not a number, or not finite.
     """
     if isinstance(value, Expression):
         return value
     if isinstance(value, bool) or not isinstance(value, (Real, Decimal)):
-        raise ExpressionError(f"{value!r} is no number")
+        raise ExpressionError(f"{value!r} is not a number")
     if isinstance(value, Integral):
         whole = int(value)
         if abs(whole) > LARGEST:

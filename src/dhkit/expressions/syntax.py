@@ -97,7 +97,7 @@ def read(text: str) -> Tree:
     Raises
     ------
     ExpressionError
-        The text is no expression, or is longer or deeper than the limits of this module.
+        The text is not an expression, or is longer or deeper than the limits of this module.
     """
     if len(text) > BOUNDS.characters:
         raise ExpressionError(f"an expression of {len(text)} characters; expected at most {BOUNDS.characters}")
@@ -117,7 +117,7 @@ def read_tokens(tokens: Sequence[Token], text: str) -> Tree:
     Raises
     ------
     ExpressionError
-        The tokens are no expression, or nested deeper than ``BOUNDS.nesting``.
+        The tokens are not an expression, or nested deeper than ``BOUNDS.nesting``.
     """
     return _Reader(tokens, text).whole()
 
@@ -155,7 +155,8 @@ def decimal_text(value: Fraction) -> str | None:
 
 
 def _tokens(text: str) -> list[Token]:
-    tokens, at = [], 0
+    tokens = []
+    at = 0
     end = len(text.rstrip())
     while at < end:
         match = _TOKEN.match(text, at)

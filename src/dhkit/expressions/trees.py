@@ -55,7 +55,7 @@ class Algebra(ABC, Generic[T]):
 
     @abstractmethod
     def call(self, tree: Call) -> T:
-        """Return the value of a call; :meth:`of` has those of its arguments, unless they are no values here."""
+        """Return the value of a call; :meth:`of` has those of its arguments, unless they are not values here."""
 
     @abstractmethod
     def power(self, tree: Power) -> T:
@@ -129,7 +129,8 @@ def names_of(tree: Tree) -> set[str]:
 
 def node_count(tree: Tree, limit: int) -> int:
     """Return how many nodes a tree has, those that are shared each time; counting ends beyond a limit."""
-    count, waiting = 0, [tree]
+    count = 0
+    waiting = [tree]
     while waiting and count <= limit:
         count += 1
         waiting += operands(waiting.pop())

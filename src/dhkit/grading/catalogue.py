@@ -120,7 +120,7 @@ INVERSE = _catalogue(
             "sum_of_angles_too_much": "a sum of angles about parallel axes stands where one joint's own angle belongs",
             "offset_forgotten": "a constant length of base or table is not taken off a component of the position",
             "triangle_angle_forgotten": "the angle in the triangle of two links is not taken off: the direction to the"
-            " end of the second is given in place of the first link's",
+            " end of the second is given instead of the first link's",
             "tool_length_forgotten": "the length beyond the last joint, of the last link or of the tool, is not taken"
             " off the position: the triangle ends at the last joint",
             "shoulder_offset_forgotten": "the shoulder's offset is missing: the point does not lie in the plane through"
@@ -135,7 +135,7 @@ INVERSE = _catalogue(
             "rounded_length": "a length is rounded: the formula needs all of its digits, or its name",
         },
         (Subject.INVERSE, "Look again at this step: put the pose of one configuration into both sides, and compare."): {
-            "equation_wrong": "the equation is no identity of the arm; no single mistake explains it",
+            "equation_wrong": "the equation is not an identity of the arm; no single mistake explains it",
             "solution_wrong": "the solution is wrong given the joints before; no single mistake explains it",
         },
         (Subject.INVERSE, "Look again at the triangle of the links: what does the law of cosines say?"): {
@@ -151,7 +151,7 @@ INVERSE = _catalogue(
             "square_forgotten": "a square is missing: a length or a cosine stands where its square belongs",
             "square_too_much": "the square of a length stands where the length belongs",
             "root_too_much": "a root is taken where its square belongs",
-            "arc_function_forgotten": "the sine, cosine or tangent of the angle is given in place of the angle",
+            "arc_function_forgotten": "the sine, cosine or tangent of the angle is given instead of the angle",
         },
         (Subject.INVERSE, "Look again at which component of the pose and which length stand where."): {
             "axis_exchanged": "another component of the pose stands where this one belongs",
@@ -170,13 +170,13 @@ _EQUATION = _catalogue(
     {
         (Subject.ENERGY, "Look again at the inertia: of which body is this the formula, and about which point?"): {
             "inertia_halved": "the link's inertia about its centre of mass counts by half",
-            "disc_for_rod": "the inertia is that of a disc, m r^2/2, in place of a rod's, m l^2/12",
-            "point_mass_for_rod": "the inertia is that of a point mass, m l^2, in place of a rod's",
-            "rod_about_end": "the inertia is that of a rod about its end, m l^2/3, in place of about its centre, m "
+            "disc_for_rod": "the inertia is that of a disc, m r^2/2, instead of a rod's, m l^2/12",
+            "point_mass_for_rod": "the inertia is that of a point mass, m l^2, instead of a rod's",
+            "rod_about_end": "the inertia is that of a rod about its end, m l^2/3, instead of about its centre, m "
             "l^2/12",
-            "sphere_for_rod": "the inertia is that of a sphere, 2 m r^2/5, in place of a rod's, m l^2/12",
-            "inertia_quarter_for_rod": "the inertia is m l^2/4 in place of a rod's m l^2/12",
-            "rod_with_half_length": "the inertia is that of a rod of half the length, m l^2/48, in place of m l^2/12",
+            "sphere_for_rod": "the inertia is that of a sphere, 2 m r^2/5, instead of a rod's, m l^2/12",
+            "inertia_quarter_for_rod": "the inertia is m l^2/4 instead of a rod's m l^2/12",
+            "rod_with_half_length": "the inertia is that of a rod of half the length, m l^2/48, instead of m l^2/12",
             "inertia_moments_exchanged": "two principal moments of the inertia are exchanged",
         },
         (Subject.ENERGY, "Look again at the heights: from which axis does each angle count?"): {
@@ -192,7 +192,7 @@ _EQUATION = _catalogue(
         },
         (Subject.ENERGY, "Look again at the drives: which rotor and which gear belong to which joint?"): {
             "drives_exchanged": "two drives are exchanged: each rotor has the other's gear and inertia",
-            "gear_inverted": "the rotor's inertia is divided by the gear ratio's square in place of multiplied",
+            "gear_inverted": "the rotor's inertia is divided by the gear ratio's square instead of multiplied",
         },
         (Subject.ENERGY, "Look again at the table behind the dynamics: convention, twists and lengths."): {
             "convention_in_dynamics": "the table is read in the other convention: a and alpha belong to another link",
@@ -222,7 +222,7 @@ _EQUATION = _catalogue(
             Subject.EQUATION,
             "Look again at whether each joint's angle counts from the link before or from a fixed direction.",
         ): {
-            "gravity_torque_relative_angle": "the gravity torques use the joint's own angle in place of the sum of the"
+            "gravity_torque_relative_angle": "the gravity torques use the joint's own angle instead of the sum of the"
             " angles up to it",
             "relative_for_absolute": "the answer is one for angles from the link before, and was declared absolute",
             "absolute_for_relative": "the answer is one for angles from a fixed direction, and was handed in as "
@@ -280,7 +280,7 @@ _EQUATION = _catalogue(
             "term_angle": "a term has the wrong angle",
             "term_rate": "a term has another rate or acceleration than it should",
             "term_parameter": "a term has another parameter than it should",
-            "term_replaced": "one term stands in place of another",
+            "term_replaced": "one term stands instead of another",
         },
     }
 )

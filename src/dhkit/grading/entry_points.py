@@ -161,7 +161,8 @@ def robot_of(sheet: AnswerSheet, folder: str | Path) -> Description:
     DescriptionError
         The file describes no robot.
     """
-    name, place = sheet.robot, f"{sheet.file}: robot"
+    name = sheet.robot
+    place = f"{sheet.file}: robot"
     if not name:
         raise AnswerError(f"{place}: missing; expected a library name, or a robot file beside the sheet")
     if not name.endswith(".toml"):
@@ -170,12 +171,12 @@ def robot_of(sheet: AnswerSheet, folder: str | Path) -> Description:
         except DescriptionError as error:
             raise AnswerError(f"{place}: {error}") from None
     if len(name) > BOUNDS.robot_name_characters or not name.isprintable():
-        raise AnswerError(f"{place}: {name[:40]!r} is no file name")
+        raise AnswerError(f"{place}: {name[:40]!r} is not a file name")
     inside = Path(folder).resolve()
     try:
         path = (inside / name).resolve()
     except (ValueError, OSError, RuntimeError):  # a NUL in the name, a name that is too long, a link to itself
-        raise AnswerError(f"{place}: {name[:60]!r} is no file name") from None
+        raise AnswerError(f"{place}: {name[:60]!r} is not a file name") from None
     if not path.is_relative_to(inside):
         raise AnswerError(f"{place}: {name!r} leaves the sheet's folder; expected a file in it")
     return read_robot(path)

@@ -110,7 +110,8 @@ class _Solution:
         self.lag: Lagrangian = lagrangian(description)
 
     def steps(self) -> Iterator[Step]:
-        n, lag = self.description.n, self.lag
+        n = self.description.n
+        lag = self.lag
         kind = "R_z(theta) T_z(d) T_x(a) R_x(alpha)"
         if not lag.arm.is_standard:
             kind = "R_x(alpha) T_x(a) R_z(theta) T_z(d), with the alpha and a of the row"
@@ -168,7 +169,8 @@ class _Solution:
         results = []
         for name, array in quantities:
             stem = name.rstrip("0123456789")
-            letter, number = {"w": r"\omega", "tau": r"\tau"}.get(stem, stem), name[len(stem) :]
+            letter = {"w": r"\omega", "tau": r"\tau"}.get(stem, stem)
+            number = name[len(stem) :]
             for index, element in np.ndenumerate(shortened(self.lag.arm, element_array(array))):
                 if element:
                     indices = [str(k + 1) for k in index]

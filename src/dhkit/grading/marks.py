@@ -72,7 +72,8 @@ def marks(report: GradeReport, rubric: Rubric) -> Marks:
     weights = _quantity_weights(report, rubric)
     total = sum(weights.values()) or Fraction(1)
     points = _exact(rubric.points)
-    entries, sums = [], {quantity: [Fraction(0), points * weight / total] for quantity, weight in weights.items()}
+    entries = []
+    sums = {quantity: [Fraction(0), points * weight / total] for quantity, weight in weights.items()}
     for entry in report.entries:
         most = sums[entry.quantity][1] * _part(entry, report, rubric)
         share, rule = _share(entry, report, rubric.credit)

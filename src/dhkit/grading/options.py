@@ -17,7 +17,7 @@ class GradeOptions(Options):
     Raises
     ------
     TypeError
-        A task that is no answer sheet, or an isolation that is none.
+        A task that is not an answer sheet, or an isolation that is none.
     """
 
     task: AnswerSheet | None = None
@@ -29,7 +29,7 @@ class GradeOptions(Options):
     explain: bool = True
     """Whether to look for mistakes; verdicts do not depend on it."""
     execute: bool = False
-    """Whether a program (.py, .m, .ipynb) is executed in a process of its own in place of being read. Its answers are
+    """Whether a program (.py, .m, .ipynb) is executed in a process of its own instead of being read. Its answers are
     then the formulas that its names stand for. Functions that cannot be called with symbols are called with numbers,
     and agree at sampled states at best."""
     isolation: Isolation | None = None

@@ -154,7 +154,7 @@ def _properties() -> Schema:
     }
     keys["steps"] = {
         "type": "array",
-        "description": "Steps in the order in which joints are found; in place of branches.",
+        "description": "Steps in the order in which joints are found; instead of branches.",
         "minItems": 1,
         "maxItems": BOUNDS.steps,
         "items": _table(KEYS["step"], keys, "An equation, its solution, or both.")

@@ -189,7 +189,8 @@ class _SheetJudge:
         Of an arm in a plane these are the two positions in it, with the angle about its normal or without; of others
         three rows are those of the position, and four or five those that are not zero.
         """
-        asked, errors = self.sheet.task.jacobian_rows, list[AnswerError]()
+        asked = self.sheet.task.jacobian_rows
+        errors = list[AnswerError]()
         for rows in [asked] if asked else [(0, 1, 2, 3, 4, 5), *self._rows_of_few()]:
             size = (len(rows), names.n)
             try:
@@ -238,7 +239,8 @@ class _SheetJudge:
     def _table(self) -> KinematicJudgement:
         from dhkit.grading.judging.tables import judge_table
 
-        description, (convention, rows) = self.truth.description, self.sheet.table or ("", ())
+        description = self.truth.description
+        (convention, rows) = self.sheet.table or ("", ())
         return _judge_rows(
             "dh",
             given_rows(rows, description.n, self.vocabulary),

@@ -60,7 +60,7 @@ def find_sheets(paths: Sequence[Path], exclude: Collection[Path] = ()) -> list[S
     paths
         Files and folders.
     exclude
-        Files in them that are no sheets, such as the rubric.
+        Files in them that are not sheets, such as the rubric.
 
     Raises
     ------

@@ -65,7 +65,8 @@ class Interpreter:
     def _staged(self, lanes: int) -> Stage:
         buffer: Any
         buffer, run = self._functions[lanes].buffer()
-        zero, parameters = np.zeros(1), np.zeros(self._inputs[0])
+        zero = np.zeros(1)
+        parameters = np.zeros(self._inputs[0])
         inputs = [np.zeros((lanes, size)) for size in self._inputs[1:]]
         outputs: list[NDArray[Any]] = [np.zeros((lanes, size)) for size in self._outputs]
         for k, array in enumerate((zero, parameters, *inputs)):

@@ -94,7 +94,8 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
         Type of each output: ``FLOAT``, or ``SMALL_INTEGER`` for whole numbers from 0 to 255.
     """
     # Programs that decide small integers round every operation as the interpreter does, so that both decide alike.
-    layout, body = _Layout(graph), Body(EXACT if SMALL_INTEGER in types else FUSING)
+    layout = _Layout(graph)
+    body = Body(EXACT if SMALL_INTEGER in types else FUSING)
     results = _results(graph, layout, body, types)
     inputs = [f"%x{k}" for k in range(len(graph.inputs) - 1)]
     outputs = [f"%y{k}" for k in range(len(graph.outputs))]
@@ -251,7 +252,9 @@ def _copied(label: str, before: str, array: str, size: int, row: int, kind: str,
     yield f"  %{label}_entries = getelementptr {kind}, ptr {array}, i64 %{label}_offset"
     yield f"  %{label}_column = getelementptr double, ptr %work, i64 %{label}_i"
     for k in range(size):
-        outer, inner, value = f"%{label}_outer{k}", f"%{label}_inner{k}", f"%{label}_value{k}"
+        outer = f"%{label}_outer{k}"
+        inner = f"%{label}_inner{k}"
+        value = f"%{label}_value{k}"
         yield f"  {outer} = getelementptr {kind}, ptr %{label}_entries, i64 {k}"
         yield f"  {inner} = getelementptr double, ptr %{label}_column, i64 {(row + k) * BLOCK}"
         yield f"  {value} = load double, ptr {outer if reading else inner}"

@@ -88,7 +88,8 @@ class CompiledFunction:
 
     def _stages(self, parameters: Array, inputs: Sequence[Array], outputs: Sequence[NDArray[Any]]) -> Stages:
         """Return stages for single items of arrays such as these."""
-        sizes, kinds = [array.shape[1] for array in inputs], [(array.shape[1], array.dtype) for array in outputs]
+        sizes = [array.shape[1] for array in inputs]
+        kinds = [(array.shape[1], array.dtype) for array in outputs]
 
         def staged(items: int) -> Stage:
             own = np.zeros(parameters.shape)

@@ -92,7 +92,8 @@ def _own_group(gid: int) -> bool:
     import pwd
 
     try:
-        group, user = grp.getgrgid(gid), pwd.getpwuid(os.geteuid())
+        group = grp.getgrgid(gid)
+        user = pwd.getpwuid(os.geteuid())
     except KeyError:
         return False
     return group.gr_name == user.pw_name and user.pw_gid == gid and set(group.gr_mem) <= {user.pw_name}
@@ -116,7 +117,8 @@ def read(name: str, key: str) -> bytes | None:
     except OSError as error:
         log.warning("%s: %s; the kernel is compiled anew", path, error.strerror)
         return None
-    seal, code = content[: len(_seal(b""))], content[len(_seal(b"")) :]
+    seal = content[: len(_seal(b""))]
+    code = content[len(_seal(b"")) :]
     if seal != _seal(code):
         log.warning("%s: damaged; the kernel is compiled anew", path)
         return None
@@ -165,7 +167,8 @@ def _seal(code: bytes) -> bytes:
 
 @cache
 def _circumstances() -> tuple[str, ...]:
-    root, total = Path(__file__).parents[1], hashlib.sha256()
+    root = Path(__file__).parents[1]
+    total = hashlib.sha256()
     for package in PACKAGES:
         for path in sorted((root / package).rglob("*.py")):
             total.update(path.read_bytes())

@@ -38,7 +38,8 @@ class Vector:
     """Name of the value, or text of a constant."""
 
     def _with(self, instruction: str, other: Number, *, swapped: bool = False) -> str:
-        first, second = self.name, _text(other)
+        first = self.name
+        second = _text(other)
         return self.body.define(f"{instruction} {VECTOR} {f'{second}, {first}' if swapped else f'{first}, {second}'}")
 
     def __add__(self, other: Number) -> Vector:
@@ -53,7 +54,8 @@ class Vector:
     def __truediv__(self, other: Number) -> Vector:
         return Vector(self.body, self._with(f"fdiv {self.body.liberties}", other))
 
-    __radd__, __rmul__ = __add__, __mul__
+    __radd__ = __add__
+    __rmul__ = __mul__
 
     def __rsub__(self, other: Number) -> Vector:
         return Vector(self.body, self._with(f"fsub {self.body.liberties}", other, swapped=True))

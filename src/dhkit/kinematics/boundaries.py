@@ -81,7 +81,8 @@ def _turned_ring(description: Description, point: str) -> tuple[Boundary, ...]:
     plane = ArmPlane.of(Axes.of(description))
     least, most = side.radii(description.numbers.lower, description.numbers.upper)
     # Over all q1 together: a point in front of axis 1 is reached from the front, from behind, or both.
-    a1, sign = abs(side.a1), -1.0 if side.a1 < 0 else 1.0
+    a1 = abs(side.a1)
+    sign = -1.0 if side.a1 < 0 else 1.0
     ring = _Ring(a1, least, most)
 
     def world(section: Array) -> Array:
@@ -92,7 +93,8 @@ def _turned_ring(description: Description, point: str) -> tuple[Boundary, ...]:
         turns = _unit_circle()
         return np.asarray(plane.origin + radius * (turns[:, :1] * plane.R[0] + turns[:, 1:] * plane.R[2]))
 
-    nowhere, found = np.empty((0, 3)), []
+    nowhere = np.empty((0, 3))
+    found = []
     if np.isfinite(most):
         found.append(Boundary("outer", point, world(ring.outer), around(float(np.hypot(a1 + most, side.offset)))))
     inner = ring.inner
@@ -161,7 +163,8 @@ def _ring(description: Description, fit: Fit) -> tuple[Boundary, ...]:
     """Return the boundaries of a ring across the first axis, or of the tube if a prismatic joint moves along it."""
     p = fit.parameters
     T_plane_world = np.asarray(p["T_plane_world"])
-    R, origin = T_plane_world[:, :3], -T_plane_world[:, :3].T @ T_plane_world[:, 3]
+    R = T_plane_world[:, :3]
+    origin = -T_plane_world[:, :3].T @ T_plane_world[:, 3]
     heights = float(np.asarray(p["height"])) + _rises(description, fit)
 
     def boundary(name: str, radius: float) -> Boundary:
@@ -176,7 +179,8 @@ def _ring(description: Description, fit: Fit) -> tuple[Boundary, ...]:
 
 def _radii(description: Description, fit: Fit) -> tuple[float, float]:
     """Return the least and largest distance of the tool from the first axis, m."""
-    p, numbers = {key: np.asarray(value, dtype=float) for key, value in fit.parameters.items()}, description.numbers
+    p = {key: np.asarray(value, dtype=float) for key, value in fit.parameters.items()}
+    numbers = description.numbers
     if "start" in p:
         return slide_radii(float(p["start"]), float(p["lift"]), float(numbers.lower[1]), float(numbers.upper[1]))
     return link_radii([float(p["L2"]), float(p["L3"]), float(np.linalg.norm(p["lever"]))][: fit.structure.count("R")])
@@ -186,7 +190,8 @@ def _rises(description: Description, fit: Fit) -> Array:
     """Return the tool's displacement along the first axis at the prismatic joint's limits, shape (2,), m."""
     if "P" not in fit.structure:
         return np.zeros(2)
-    joint, numbers = fit.structure.index("P"), description.numbers
+    joint = fit.structure.index("P")
+    numbers = description.numbers
     limits = np.array([numbers.lower[joint], numbers.upper[joint]])
     return np.asarray(np.where(np.isfinite(limits), np.asarray(fit.parameters["senses"])[joint] * limits, 0.0))
 

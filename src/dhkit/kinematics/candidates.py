@@ -126,7 +126,8 @@ def is_beyond_all_links(description: Description, positions: Array) -> NDArray[n
 def _outside(description: Description, q: Array) -> NDArray[np.bool_]:
     """Return whether a joint is outside its limits for all whole turns, shape (...); False for NaN."""
     numbers = description.numbers
-    lower, upper = numbers.lower - LIMIT_SLACK, numbers.upper + LIMIT_SLACK
+    lower = numbers.lower - LIMIT_SLACK
+    upper = numbers.upper + LIMIT_SLACK
     with np.errstate(invalid="ignore"):
         windings = np.floor((upper - q) / math.tau) - np.ceil((lower - q) / math.tau)
         outside: NDArray[np.bool_] = np.where(numbers.prismatic, (q < lower) | (q > upper), windings < 0)

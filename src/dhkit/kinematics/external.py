@@ -70,7 +70,8 @@ def solve_externally(description: Description, T: ArrayLike) -> IKSolutions:
     poses = pose_rows(T)
     solver = _solver(description)
     posed = are_poses(poses)
-    goals, n = orthonormal(poses[posed]), description.n
+    goals = orthonormal(poses[posed])
+    n = description.n
     if solver is None:
         found = [np.empty((0, n)) for _ in goals]
     else:

@@ -88,8 +88,10 @@ def _with_poses_at_the_boundary(description: Description, found: IKSolutions, po
     refined = solve_from_neighbour(description, poses.reshape(-1, 4, 4)[rows])
     B = len(found.branches)
     q = found.q.reshape(-1, B, description.n)
-    valid, flags = found.valid.reshape(-1, B), found.flags.reshape(-1, B)
-    status, distance = found.status_code.ravel(), found.distance.ravel()
+    valid = found.valid.reshape(-1, B)
+    flags = found.flags.reshape(-1, B)
+    status = found.status_code.ravel()
+    distance = found.distance.ravel()
     q[rows], valid[rows], flags[rows] = refined.q[:, :B], refined.valid[:, :B], refined.flags[:, :B]
     # What iteration finds beside the branches takes the place of the first.
     by_iteration = np.flatnonzero(refined.valid[:, B] & ~refined.valid[:, :B].any(axis=1))

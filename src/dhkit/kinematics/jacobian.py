@@ -120,6 +120,7 @@ def _graph(description: Description, frame: ReferenceAxes) -> Graph:
 
 def _dot_graph(description: Description, frame: ReferenceAxes) -> Graph:
     table, parameters = SymbolicTable.parametric(description)
-    q, qd = joint_symbols("q", description.n), joint_symbols("qd", description.n)
+    q = joint_symbols("q", description.n)
+    qd = joint_symbols("qd", description.n)
     J_dot = symbolic_jacobian_dot(table, q, qd, frame)
     return Graph.of("jacobian_dot", {"parameters": parameters, "q": q, "qd": qd}, {"J_dot": J_dot})

@@ -104,7 +104,8 @@ def isotropy(description: Description, q: ArrayLike, motion: Motion = "translati
     sigma = singular_values(description, q, motion)
     if not rank:
         return 0.0 * sigma[..., 0]
-    largest, smallest = sigma[..., 0], sigma[..., rank - 1]
+    largest = sigma[..., 0]
+    smallest = sigma[..., rank - 1]
     flat = smallest <= _FLATNESS * largest
     return np.divide(np.where(flat, 0.0, smallest), np.where(flat, 1.0, largest))
 

@@ -201,7 +201,7 @@ def _largest_miss(description: Description) -> float:
 def _are_twins(description: Description, starts: Array, q: Array) -> NDArray[np.bool_]:
     """Return which solutions (N, B, n) another start reached that was nearer to them, shape (N, B).
 
-    Branches whose starts coincide, at singularities of the neighbour, are no twins.
+    Branches whose starts coincide, at singularities of the neighbour, are not twins.
     """
     together = _largest_difference(description, q[:, :, None], q[:, None]) < _SAME_ANGLE
     apart = _largest_difference(description, starts[:, :, None], starts[:, None]) > _SAME_ANGLE

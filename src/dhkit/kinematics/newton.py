@@ -32,7 +32,8 @@ class Newton:
     @classmethod
     def of(cls, description: Description, *, position_only: bool, limits: bool) -> Newton:
         """Return the steps of an arm."""
-        numbers, anywhere = description.numbers, np.full(description.n, np.inf)
+        numbers = description.numbers
+        anywhere = np.full(description.n, np.inf)
         return cls(
             description,
             length=Axes.of(description).scale,

@@ -19,7 +19,9 @@ _TINY = 1e-300
 
 def error_program(size: int) -> Graph:
     """Return the program of :meth:`dhkit.kinematics.newton.Newton.error`."""
-    length, T, goal = ca.SX.sym("length"), ca.SX.sym("T", 4, 4), ca.SX.sym("goal", 4, 4)
+    length = ca.SX.sym("length")
+    T = ca.SX.sym("T", 4, 4)
+    goal = ca.SX.sym("goal", 4, 4)
     way = (goal[:3, 3] - T[:3, 3]) / length
     turn = _rotation_vector(goal[:3, :3] @ T[:3, :3].T)
     error = ca.vertcat(way, turn)[:size]
@@ -33,9 +35,13 @@ def step_program(n: int, size: int) -> Graph:
     dq = J^T (J J^T + damping)^-1 error. A joint at a limit that the error pushes outward stays (Bertsekas 1982,
     Projected Newton methods for optimization problems with simple constraints); the others end at theirs.
     """
-    length, q, error, J = ca.SX.sym("length"), ca.SX.sym("q", n), ca.SX.sym("error", size), ca.SX.sym("J", 6, n)
+    length = ca.SX.sym("length")
+    q = ca.SX.sym("q", n)
+    error = ca.SX.sym("error", size)
+    J = ca.SX.sym("J", 6, n)
     units, turns, lower, upper = (ca.SX.sym(name, n) for name in ("units", "turns", "lower", "upper"))
-    damping, endless = ca.SX.sym("damping"), turns != 0
+    damping = ca.SX.sym("damping")
+    endless = turns != 0
     A = ca.vertcat(J[:3, :] / length, J[3:, :])[:size, :] @ ca.diag(units)
     push = A.T @ error
     stays = [_stays(q[i], push[i], lower[i], upper[i], endless[i]) for i in range(n)]
@@ -80,12 +86,14 @@ def _rotation_vector(R: _SX) -> _SX:
     xy, xz, yz = R[0, 1] + R[1, 0], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1]
     x2, y2, z2 = (1 + 2 * R[k, k] - trace for k in range(3))
     products = ((1 + trace, *odd), (odd[0], x2, xy, xz), (odd[1], xy, y2, yz), (odd[2], xz, yz, z2))
-    largest, best = products[0][0], ca.vertcat(*products[0])
+    largest = products[0][0]
+    best = ca.vertcat(*products[0])
     for k in range(1, 4):
         larger = products[k][k] > largest
         best = ca.if_else(larger, ca.vertcat(*products[k]), best)
         largest = ca.if_else(larger, products[k][k], largest)
-    w, v = best[0], best[1:]
+    w = best[0]
+    v = best[1:]
     w, v = ca.fabs(w), ca.if_else(w < 0, -v, v)
     size = ca.norm_2(v)
     return v * (2 * ca.atan2(size, w) / (size + _TINY))

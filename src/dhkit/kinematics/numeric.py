@@ -121,13 +121,16 @@ def solve_numerically(
     if not tolerance > 0:
         raise ValueError(f"tolerance is {tolerance}; expected a positive number")
     poses = pose_rows(T)
-    batch, n = poses.shape[:-2], description.n
+    batch = poses.shape[:-2]
+    n = description.n
     newton = Newton.of(description, position_only=position_only, limits=limits)
     starts = _first_starts(newton, q0, batch).reshape(-1, n)
     posed = are_poses(poses)
-    q, distance = np.full((posed.size, n), np.nan), np.full(posed.size, np.nan)
+    q = np.full((posed.size, n), np.nan)
+    distance = np.full(posed.size, np.nan)
     search = Search(newton, tolerance, restarts, seed)
-    rows, goals = np.flatnonzero(posed), orthonormal(poses[posed]).reshape(-1, 16)
+    rows = np.flatnonzero(posed)
+    goals = orthonormal(poses[posed]).reshape(-1, 16)
 
     # Not counted for a few poses, so that their many starts do not start a compilation in a control loop.
     few = uncounted if posed.size < SMALL_BATCH else nullcontext
@@ -223,7 +226,8 @@ class Search:
         count, k, n = starts.shape
         many = np.ascontiguousarray(starts.reshape(-1, n))
         found, misses = descend(self.newton, np.repeat(goals, k, axis=0), many, self.tolerance)
-        found, misses = found.reshape(count, k, n), misses.reshape(count, k, -1)
+        found = found.reshape(count, k, n)
+        misses = misses.reshape(count, k, -1)
         closed = closes(misses, self.tolerance)
         moved = np.sum(((found - first[:, None]) / self.newton.units) ** 2, axis=-1)
         # A result that reaches its pose is better than any that does not.
@@ -255,7 +259,8 @@ class _Descent:
     @classmethod
     def start(cls, newton: Newton, goals: Array, q: Array) -> _Descent:
         """Begin at q, shape (N, n)."""
-        error, N = newton.error(q, goals), len(q)
+        error = newton.error(q, goals)
+        N = len(q)
         cost = np.sum(error**2, axis=1)
         return cls(np.arange(N), goals, q, error, cost, np.ones(N), cost, np.zeros(N, dtype=np.intp))
 
@@ -287,7 +292,8 @@ class _Descent:
 
 def descend(newton: Newton, goals: Array, q: Array, tolerance: float) -> tuple[Array, Array]:
     """Search for poses (N, 16) from q (N, n) until all are reached or stalled; return joint positions and errors."""
-    last_q, last_error = np.empty_like(q), np.empty((len(q), newton.size))
+    last_q = np.empty_like(q)
+    last_error = np.empty((len(q), newton.size))
     searches = _Descent.start(newton, goals, q)
     while len(searches.row):
         over = closes(searches.error, tolerance) | (searches.steps_since >= _STALL_STEPS)
@@ -325,7 +331,8 @@ def refined(description: Description, q: Array, goals: Array) -> tuple[Array, ND
 def closes(error: Array, tolerance: float) -> NDArray[np.bool_]:
     """Return whether errors (..., 6) or (..., 3) are within the tolerance, position and rotation each, shape (...)."""
     squares = error**2
-    position, rotation = squares[..., :3].sum(axis=-1), squares[..., 3:].sum(axis=-1)
+    position = squares[..., :3].sum(axis=-1)
+    rotation = squares[..., 3:].sum(axis=-1)
     within: NDArray[np.bool_] = np.maximum(position, rotation) <= tolerance**2
     return within
 

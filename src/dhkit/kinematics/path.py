@@ -126,13 +126,17 @@ def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits
     jump = _MAX_STEP * np.where(description.numbers.prismatic, description.reach / 2 / np.pi, 1.0)
     q = np.full((len(poses), description.n), np.nan)
     places = np.full(len(poses), -1)
-    switches, lost, at = [], [], q0
+    switches = []
+    lost = []
+    at = q0
     for k in range(len(poses)):
-        candidates, allowed = solutions.q[k], usable[k]
+        candidates = solutions.q[k]
+        allowed = usable[k]
         if np.any(solutions.flags[k] & (IKFlag.wrist | IKFlag.shoulder)):
             # Where the wrist is straight, or its centre on axis 1, one joint is free and keeps its angle.
             here = inverse_kinematics(description, poses[k], seed=at)
-            candidates, allowed = here.q, here.allowed if limits else here.valid
+            candidates = here.q
+            allowed = here.allowed if limits else here.valid
         chosen = _nearest_branch(candidates, allowed, at, solutions, limits)
         if chosen is None:
             lost.append(k)

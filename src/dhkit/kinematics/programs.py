@@ -50,7 +50,7 @@ def export_kinematics(description: Description, folder: str | Path, name: str | 
     Raises
     ------
     ValueError
-        ``name`` is no identifier.
+        ``name`` is not an identifier.
     """
     name = description.name if name is None else name
     graphs = [_forward(description, name), _jacobian(description, name)]

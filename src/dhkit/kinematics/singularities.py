@@ -191,7 +191,8 @@ def singular_configurations(description: Description, kind: str, count: int, see
     factor = _factor(description, kind)
     lower, upper = _ranges(description)
     rng = np.random.default_rng(seed)
-    inside, outside = [np.empty((0, description.n))], [np.empty((0, description.n))]
+    inside = [np.empty((0, description.n))]
+    outside = [np.empty((0, description.n))]
     for batch in range(_MAX_BATCHES):
         limited = batch < _MAX_BATCHES / 2 or bool(sum(map(len, inside)))
         low, high = (lower, upper) if limited else (-_room(description), _room(description))
@@ -243,7 +244,8 @@ def _elbow_wrist(fit: Fit) -> _Parts:
 
 def _slide_wrist(fit: Fit) -> _Parts:
     p = _parameters(fit)
-    boom, length = complex(*p["boom"]), complex(p["start"], p["lift"])
+    boom = complex(*p["boom"])
+    length = complex(p["start"], p["lift"])
     side = _side(p, (Link(boom, slide=2), Link(boom * length)))
     return (side, _slide(p, 2), _wrist(p, "axes 4 and 6 coincide")), "the wrist centre", _WHOLE
 
@@ -265,7 +267,8 @@ def _yaw_three(fit: Fit) -> _Parts:
 
 
 def _parallel_chain(fit: Fit) -> _Parts:
-    p, kinds = _parameters(fit), fit.structure
+    p = _parameters(fit)
+    kinds = fit.structure
     second = [i for i, letter in enumerate(kinds) if letter == "R"][1]
     rows = [0, 1, *([2] if "P" in kinds else []), *([5] if kinds.count("R") == 3 else [])]
     return (_elbow(p, second, float(p["senses"][second])),), "the tool", np.eye(6)[rows]

@@ -71,7 +71,7 @@ class IKSolutions:
     distance: Array
     """Distance, m, shape (...), from the point that decides the reach (the wrist's centre, or the tool) to the nearest
     reachable one: exact for arms with a spherical wrist, an upper bound for others. 0 where the pose is reached, NaN
-    where it is no pose. Joint limits do not count."""
+    where it is not a pose. Joint limits do not count."""
     branches: tuple[str, ...]
     """The branches' names, in words that :meth:`branch` understands."""
     met: tuple[str, ...]
@@ -316,7 +316,7 @@ class IKSolutions:
         others = f" (and {count - 1} more)" if count > 1 else ""
         status = IKStatus(int(self.status_code[place]))
         if status is IKStatus.not_a_pose:
-            return f"{where}{others} is no pose: NaN, or a rotation that is not orthonormal"
+            return f"{where}{others} is not a pose: NaN, or a rotation that is not orthonormal"
         if status is IKStatus.not_found:
             return f"{where}{others}: no solution was found, which does not prove that there is none"
         if status is IKStatus.out_of_reach:

@@ -71,7 +71,8 @@ def solve_in_closed_form(
     """
     fit = solver.fit
     batch = poses.shape[:-2]
-    B, n = len(fit.branches), description.n
+    B = len(fit.branches)
+    n = description.n
     q = result_array((*batch, B, n), out)
     if out is not None and np.may_share_memory(out, poses):
         poses = poses.copy()

@@ -71,7 +71,8 @@ class Grid:
         a smooth border halves, on average, the cells that it goes through.
         """
         reached = self.counts > 0
-        outer, inner = np.count_nonzero(reached), np.count_nonzero(_without_border(reached))
+        outer = np.count_nonzero(reached)
+        inner = np.count_nonzero(_without_border(reached))
         cell = self.edge**self.counts.ndim
         return Estimate(cell * (outer + inner) / 2, cell * (outer - inner) / 2, self.counts.ndim)
 
@@ -111,7 +112,8 @@ class Workspace:
         return repr_line("Workspace", self.description.name, f"{counted(self.samples, 'sample')}{estimate}")
 
     def _repr_html_(self) -> str:
-        box, best = self.bounds, int(np.argmax(self.manipulability))
+        box = self.bounds
+        best = int(np.argmax(self.manipulability))
         facts = [
             ("samples", f"{self.samples}, seed {self.seed}"),
             ("distance from axis 1", _range(self.radii)),
@@ -214,8 +216,10 @@ def workspace(
         raise ValueError(f"edge is {edge} m; expected a positive length")
     lower, upper, assumed = _ranges(description)
     rng = np.random.default_rng(seed)
-    positions, measures = np.empty((samples, 3)), np.empty(samples)
-    best, most = lower, -np.inf
+    positions = np.empty((samples, 3))
+    measures = np.empty(samples)
+    best = lower
+    most = -np.inf
     for start in range(0, samples, CHUNK):
         chunk = slice(start, min(start + CHUNK, samples))
         q = lower + (upper - lower) * rng.random((chunk.stop - start, description.n))
@@ -223,7 +227,8 @@ def workspace(
         measures[chunk] = manipulability(description, q)
         k = int(np.argmax(measures[chunk]))
         if measures[start + k] > most:
-            best, most = q[k], measures[start + k]
+            best = q[k]
+            most = measures[start + k]
         if progress is not None:
             progress(chunk.stop, samples)
     return Workspace(
@@ -266,7 +271,8 @@ def occupancy(points: Array, edge: float | None = None, flat: float = 0.0) -> Gr
     if not len(axes):
         return None
     places = points @ axes.T
-    low, spans = places.min(axis=0), np.ptp(places, axis=0)
+    low = places.min(axis=0)
+    spans = np.ptp(places, axis=0)
     edge = _fitting_edge(spans, len(points)) if edge is None else float(edge)
     wanted = [float(span / edge) for span in spans]
     if np.prod(np.ceil(wanted)) > _MOST_CELLS:
@@ -300,10 +306,13 @@ def first_axis(description: Description) -> Array:
 def _ranges(description: Description) -> tuple[Array, Array, tuple[str, ...]]:
     """Return what joints are sampled from and to, and what was assumed."""
     numbers = description.numbers
-    lower, upper, assumed = numbers.lower.copy(), numbers.upper.copy(), []
+    lower = numbers.lower.copy()
+    upper = numbers.upper.copy()
+    assumed = []
     for i in np.flatnonzero(~np.isfinite(lower) | ~np.isfinite(upper)):
         room = (description.reach or 1.0) if numbers.prismatic[i] else np.pi
-        lower[i], upper[i] = -room, room
+        lower[i] = -room
+        upper[i] = room
         if numbers.prismatic[i]:
             name = description.joints[i].name
             assumed.append(f"joint {i + 1} {name} has no limits: it was moved {room:.4g} m to both sides")

@@ -310,7 +310,7 @@ def _robot_path(name: str, folder: Path) -> Path:
     try:
         path = (inside / name).resolve()
     except (ValueError, OSError, RuntimeError):  # a NUL in the name, one too long, a link to itself
-        raise DescriptionError(f"{name[:60]!r} is no file name; {expected}") from None
+        raise DescriptionError(f"{name[:60]!r} is not a file name; {expected}") from None
     if not name.isprintable() or not path.is_relative_to(inside):
         raise DescriptionError(f"{name[:60]!r} leaves the assignment's folder; {expected}")
     return path

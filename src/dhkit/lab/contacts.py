@@ -27,7 +27,7 @@ class Contacts:
         self._arm: Arm | None = None
 
     def prepare(self, arm: Arm, done: Callable[[], None]) -> None:
-        """Prepare for an arm in the background, in place of any other arm; then call ``done``."""
+        """Prepare for an arm in the background, instead of any other arm; then call ``done``."""
         self._arm = None
 
         def work(job: Job) -> None:

@@ -74,7 +74,7 @@ class Desk:
         self._contacts = Contacts()
 
     def replace(self, arm: Arm, q: Array | None = None) -> None:
-        """Show another arm in place of this one; if the pages cannot show it, the old arm stays.
+        """Show another arm instead of this one; if the pages cannot show it, the old arm stays.
 
         Parameters
         ----------

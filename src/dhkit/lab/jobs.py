@@ -95,7 +95,7 @@ class Jobs:
         self._thread: threading.Thread | None = None
 
     def start(self, title: str, work: Callable[[Job], Result], take: Callable[[Result], None]) -> int:
-        """Start a job in place of the one that runs, and return its number; ``take`` is called with its result."""
+        """Start a job instead of the one that runs, and return its number; ``take`` is called with its result."""
         self.cancel()
         self._count += 1
         job = self._job = Job(self._count, title, self._report)

@@ -62,7 +62,7 @@ class Fields:
         Raises
         ------
         ValueError
-            The field is missing and has no default, is no number, or is out of bounds. The other methods raise the
+            The field is missing and has no default, is not a number, or is out of bounds. The other methods raise the
             same error in the same cases.
         """
         value = self.data.get(name, default)

@@ -91,7 +91,7 @@ class Settings:
     reference: ReferenceKind = ReferenceKind.HOLD
 
     def changed(self, given: Fields) -> Settings:
-        """Return the settings with the values of a request's fields in place of their own.
+        """Return the settings with the values of a request's fields instead of their own.
 
         Raises
         ------

@@ -112,7 +112,7 @@ def _sheet(text: str) -> str:
 
 
 def _require_robot(text: str, name: str) -> None:
-    """Refuse a sheet about another robot; a text that is no sheet is refused where it is judged."""
+    """Refuse a sheet about another robot; a text that is not a sheet is refused where it is judged."""
     with suppress(TOMLKitError):
         robot = tomlkit.parse(text).get("robot")
         if isinstance(robot, str) and Path(robot).stem != name:

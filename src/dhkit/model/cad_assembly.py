@@ -99,7 +99,8 @@ class CadImport:
 
     def _write_files(self, folder: Path) -> list[str]:
         """Write all files; return their names. Meshes that the table had before, such as the tool's, are copied."""
-        description, hulls = self.description, dict[str, str]()
+        description = self.description
+        hulls = dict[str, str]()
         files: dict[str, bytes] = {}
         for link, mesh in self.meshes.items():
             name = _mesh_path(link)
@@ -170,7 +171,8 @@ def import_cad(
     ModelError
         A part that is missing, cannot be assigned or read, was moved on export, or whose unit is not clear: one line.
     """
-    folder, description = Path(folder), description_of(description)
+    folder = Path(folder)
+    description = description_of(description)
     if unit is not None and unit not in UNITS:
         raise ModelError(f"unit is {unit[:20]!r}; expected one of {', '.join(UNITS)}")
     stated = StatedMasses.of(description.n, density, mass, [Path(report) for report in reports])
@@ -182,7 +184,8 @@ def import_cad(
     notes += distant_part_warnings(assembly)
 
     meshes, bodies = {}, {}
-    to_frames, placed_meshes = [_rigid_inverse(T) for T in assembly.frames], dict(assembly.meshes)
+    to_frames = [_rigid_inverse(T) for T in assembly.frames]
+    placed_meshes = dict(assembly.meshes)
     del assembly  # frees the memory of each mesh once it is moved
     for link, several in parts.items():
         own = [mesh.moved(to_frames[link]) for mesh in placed_meshes.pop(link)]
@@ -206,9 +209,11 @@ def _export_pose(description: Description, q: ArrayLike | None) -> tuple[Array, 
     """Return the joint values in the pose of the export, shape (n,), and a note on their source."""
     ready = description.numbers.configurations.get("ready")
     if q is not None:
-        pose, source = joint_vector(description, q), "as given"
+        pose = joint_vector(description, q)
+        source = "as given"
     elif ready is not None:
-        pose, source = ready, "the configuration ready"
+        pose = ready
+        source = "the configuration ready"
     else:
         return np.zeros(description.n), "pose of the export: all joint values 0 (the table has no configuration ready)"
     joints = zip(description.joints, pose.tolist(), strict=True)
@@ -238,13 +243,14 @@ def _in_metres(
         check_size(assembly)
         others = f"; {found_unit} for the other files, found by size" if without_unit else ""
         return assembly, f"unit: {listed}, as the files state it{others}: {assembly.sizes_text}", True
-    size, length = assembly.size, description.reach
+    size = assembly.size
+    length = description.reach
     sizes = f"the assembly is {size:.4g} m across, the arm {length:.4g} m long"
     if unit is None:
         return assembly, f"unit: {found_unit}, found by size: {sizes}", True
     is_usual = _USUAL_SIZES[0] * length <= size <= _USUAL_SIZES[1] * length
     is_overridden = any(file_unit != UNITS[unit] for file_unit in file_units)
-    override = f", for all files in place of the {listed} that files state" if is_overridden else ""
+    override = f", for all files instead of the {listed} that files state" if is_overridden else ""
     return assembly, f"unit: {unit}, as stated{override}: {sizes}", is_usual
 
 

@@ -132,7 +132,8 @@ def simplified(mesh: TriangleMesh, count: int, name: str) -> TriangleMesh:
     started = time.perf_counter()
     log.info("simplifying %s: %d triangles to %d ...", name, len(mesh.faces), count)
     # Relative to the mesh's size: collapses are ordered by distances in single precision.
-    size, middle = mesh.size or 1.0, mesh.bounds.mean(axis=0)
+    size = mesh.size or 1.0
+    middle = mesh.bounds.mean(axis=0)
     points = ((mesh.vertices - middle) / size).astype(np.float32)
     vertices, faces = fast_simplification.simplify(points, mesh.faces.astype(np.int32), target_count=count)
     reduced = TriangleMesh(np.asarray(vertices, dtype=np.float64) * size + middle, np.asarray(faces, dtype=np.intp))

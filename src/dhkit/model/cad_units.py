@@ -124,7 +124,9 @@ def unit_of(assembly: Assembly) -> str:
     ModelError
         No unit fits, or more than one; names the option that states it.
     """
-    where, length, size = assembly.where, assembly.arm_length, assembly.size
+    where = assembly.where
+    length = assembly.arm_length
+    size = assembly.size
     if length == 0:
         raise ModelError(f"{where}: the table has no lengths to compare with; state the unit, such as --unit mm")
     fitting = [unit for unit, metres in UNITS.items() if _SIZE_RANGE[0] <= size * metres / length <= _SIZE_RANGE[1]]

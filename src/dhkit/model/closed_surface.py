@@ -109,8 +109,10 @@ def is_closed(mesh: TriangleMesh) -> bool:
     """
     if not len(mesh.faces):
         return False
-    edges, count = _edges(mesh.faces).astype(np.uint64), np.uint64(len(mesh.vertices))
-    forward, backward = edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0]
+    edges = _edges(mesh.faces).astype(np.uint64)
+    count = np.uint64(len(mesh.vertices))
+    forward = edges[:, 0] * count + edges[:, 1]
+    backward = edges[:, 1] * count + edges[:, 0]
     return bool(_digest(forward).sum() == _digest(backward).sum())
 
 
@@ -131,7 +133,9 @@ def tetrahedra(a: Array, b: Array, c: Array) -> Array:
 
     Volumes are in the unit of the corners cubed: m^3 for m.
     """
-    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = a.T, b.T, c.T
+    (ax, ay, az) = a.T
+    (bx, by, bz) = b.T
+    (cx, cy, cz) = c.T
     volumes: Array = (ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)) / 6
     return volumes
 
@@ -157,19 +161,23 @@ def _consistently_oriented(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     they pass it in opposite directions. A piece of the surface that can be oriented is then two components, and the one
     with the larger area of unchanged triangles is kept, so that the inner shell of a hollow link stays an inner shell.
     """
-    m, edges = len(mesh.faces), _edges(mesh.faces)
-    low, high = edges.min(axis=1), edges.max(axis=1)
+    m = len(mesh.faces)
+    edges = _edges(mesh.faces)
+    low = edges.min(axis=1)
+    high = edges.max(axis=1)
     order = np.lexsort((high, low))
     is_same = (low[order][1:] == low[order][:-1]) & (high[order][1:] == high[order][:-1])
     starts = np.flatnonzero(np.concatenate([[True], ~is_same]))
     pairs = starts[np.diff(np.append(starts, len(order))) == 2]  # edges of exactly two triangles
-    first, second = order[pairs], order[pairs + 1]
+    first = order[pairs]
+    second = order[pairs + 1]
     is_alike = (edges[first, 0] == edges[second, 0]).astype(np.int64)
     f, g = first % m, second % m
     labels = component_labels(
         np.concatenate([f, f + m]), np.concatenate([g + is_alike * m, g + (1 - is_alike) * m]), 2 * m
     )
-    kept, turned = labels[:m], labels[m:]
+    kept = labels[:m]
+    turned = labels[m:]
     if np.any(kept == turned):  # one-sided, like a Moebius strip
         return mesh, 0
     area = np.linalg.norm(np.cross(*np.moveaxis(np.diff(mesh.corners, axis=1), 1, 0)), axis=1)
@@ -181,13 +189,15 @@ def _consistently_oriented(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
 
 def _capped(mesh: TriangleMesh) -> tuple[TriangleMesh, float]:
     """Return a mesh with a fan of triangles over each hole, and the fans' share of the area; itself for large holes."""
-    edges, count = _edges(mesh.faces), len(mesh.vertices)
+    edges = _edges(mesh.faces)
+    count = len(mesh.vertices)
     keys, times = np.unique(edges[:, 0] * count + edges[:, 1], return_counts=True)
     reversed_keys = (keys % count) * count + keys // count
     places = np.minimum(np.searchsorted(keys, reversed_keys), len(keys) - 1)
     missing = times - np.where(keys[places] == reversed_keys, times[places], 0)
     rim = np.repeat(keys, np.maximum(missing, 0))  # edges that are passed more often than their reversed ones
-    start, end = rim // count, rim % count
+    start = rim // count
+    end = rim % count
     labels = component_labels(start, end, count)
     holes, hole = np.unique(labels[start], return_inverse=True)
     sizes = np.bincount(hole, minlength=len(holes))
@@ -235,7 +245,8 @@ def _shell_notes(shells: Shells) -> list[str]:
     notes = []
     if cavities := int((shells.volume < 0).sum()):
         notes.append(f"{cavities} cavit{'y' if cavities == 1 else 'ies'} inside")
-    doubled, (twice, reaching) = shells.doubled(), shells.shared()
+    doubled = shells.doubled()
+    (twice, reaching) = shells.shared()
     share = f" ({100 * twice / float(shells.volume.sum()):.2g} % of the volume)" if twice else ""
     if doubled or twice:
         which = f"{doubled} of {shells.count}" if doubled else "some"

@@ -49,7 +49,7 @@ def collada_unit(content: bytes) -> float | None:
     Raises
     ------
     ModelError
-        No XML, or a unit that is no positive number.
+        No XML, or a unit that is not a positive number.
     """
     return _Document(content).unit()
 
@@ -149,7 +149,8 @@ class _Document:
         if "VERTEX" not in inputs:
             raise ModelError(f"<{element.tag}> without an input of vertices")
         offsets = [_whole_number(source.get("offset", "0")) for source in element.findall("input")]
-        stride, offset = max(offsets) + 1, _whole_number(inputs["VERTEX"].get("offset", "0"))
+        stride = max(offsets) + 1
+        offset = _whole_number(inputs["VERTEX"].get("offset", "0"))
         vertices = self._positions(self._named(inputs["VERTEX"]))
         corners, counts = _corners(element, stride, offset)
         if len(corners) and (corners.min() < 0 or corners.max() >= len(vertices)):

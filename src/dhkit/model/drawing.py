@@ -110,7 +110,8 @@ def _links(description: Description) -> list[_Link]:
     """Return the paths of links 0 to n."""
     numbers = description.numbers
     rows = np.stack([numbers.a, numbers.cos_alpha, numbers.sin_alpha], axis=1).tolist()
-    d, straight = [0.0, *numbers.d.tolist()], (0.0, 1.0, 0.0)
+    d = [0.0, *numbers.d.tolist()]
+    straight = (0.0, 1.0, 0.0)
     # A row's a and alpha describe the end of its own link, in the modified convention that of the link before.
     if description.convention is Convention.STANDARD:
         return [
@@ -126,7 +127,9 @@ def _joints(description: Description, links: Sequence[_Link]) -> list[_Joint]:
     taper = _LAST_DRUM_RADIUS - _FIRST_DRUM_RADIUS
     joints: list[_Joint] = []
     for i, (before, after) in enumerate(pairwise(links)):
-        prismatic, radius, lift = bool(numbers.prismatic[i]), scale * (_FIRST_DRUM_RADIUS + taper * i / n), 0.0
+        prismatic = bool(numbers.prismatic[i])
+        radius = scale * (_FIRST_DRUM_RADIUS + taper * i / n)
+        lift = 0.0
         half = radius * (_BLOCK_HALF_LENGTH if prismatic else _DRUM_HALF_HEIGHT)
         if joints and abs(before.d) + abs(before.a) < joints[-1].extent:
             radius = min(radius, _NESTED_RADIUS * joints[-1].radius)
@@ -185,7 +188,8 @@ class Drawing:
 
         The floor is frame 0's plane if the arm rises from it, the world's z = 0 if frame 0 is above that.
         """
-        joint, T_base_end = self.joints[0], self.links[0].T_end
+        joint = self.joints[0]
+        T_base_end = self.links[0].T_end
         T_world_end = self.T_world_base @ T_base_end
         up = -1.0 if joint.lift < 0 else 1.0
         raised = T_world_end[2, 3] if np.isclose(up * T_world_end[2, 2], 1.0) else 0.0
@@ -234,12 +238,15 @@ class Drawing:
 def _own_joint_solids(link: _Link, joint: _Joint, tube: float) -> Iterator[Solid]:
     """Draw a link's part of its own joint: a hub and the column above it, a rod, or a block on a rail."""
     if not joint.prismatic:
-        T_start, half = link.T_corner @ _shift(z=-link.d), _HUB_HALF_LENGTH * joint.half
+        T_start = link.T_corner @ _shift(z=-link.d)
+        half = _HUB_HALF_LENGTH * joint.half
         yield _cylinder(T_start, _HUB_RADIUS * joint.radius, joint.lift - half, joint.lift + half)
         if link.d:
             yield _cylinder(T_start, tube, 0.0, link.d)
         return
-    T, (low, high), wide = link.T_corner @ _about_z(-joint.theta), joint.stroke, joint.radius
+    T = link.T_corner @ _about_z(-joint.theta)
+    (low, high) = joint.stroke
+    wide = joint.radius
     if joint.is_rod:
         yield _box(
             T,
@@ -252,7 +259,8 @@ def _own_joint_solids(link: _Link, joint: _Joint, tube: float) -> Iterator[Solid
 
 def _next_joint_solids(link: _Link, joint: _Joint) -> Iterator[Solid]:
     """Draw a link's part of the next joint: a drum, a block around a rod, or a rail with its stops."""
-    T, wide = link.T_end, joint.radius
+    T = link.T_end
+    wide = joint.radius
     if not joint.prismatic:
         yield _cylinder(T, joint.radius, joint.lift - joint.half, joint.lift + joint.half)
     elif joint.is_rod:
@@ -301,7 +309,8 @@ def _at(point: Array) -> Array:
 
 
 def _about_z(angle: float) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
+    c = np.cos(angle)
+    s = np.sin(angle)
     return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
 
 

@@ -137,7 +137,10 @@ def _table_part(where: str, cells: Sequence[str], factors: Mapping[str, float], 
         raise ModelError(f"{where}: {len(cells)} entries; expected {len(factors)}{hint}")
     row = dict(zip(factors, cells, strict=True))
     numbers = [factors[name] * _plain_number(row[name], f"{where}: {name}") for name in COLUMNS[1:]]
-    mass, com, (xx, yy, zz), products = numbers[0], numbers[1:4], numbers[4:7], numbers[7:]
+    mass = numbers[0]
+    com = numbers[1:4]
+    (xx, yy, zz) = numbers[4:7]
+    products = numbers[7:]
     if any(products) and sign is None:
         raise ModelError(
             f"{where}: products of inertia without their sign; expected a line '# products = -integral' "

@@ -86,7 +86,7 @@ def _mesh(
 ) -> TriangleMesh:
     faces, vertices = _matrix(faces_field), _matrix(vertices_field)
     if faces is None or vertices is None:
-        raise ModelError(f"{part}: its {'faces' if faces is None else 'vertices'} are no matrix of real numbers")
+        raise ModelError(f"{part}: its {'faces' if faces is None else 'vertices'} are not a matrix of real numbers")
     if vertices.shape[1] not in (3, 4):
         raise ModelError(f"{part}: vertices of shape {vertices.shape}; expected (k, 3) or (k, 4)")
     points = np.array(vertices[:, :3], dtype=np.float64)
@@ -95,7 +95,7 @@ def _mesh(
     is_missing = np.isnan(faces)  # patch fills the rows of smaller polygons with NaN
     indices = faces[~is_missing]
     if np.any(indices != np.round(indices)) or np.any(is_missing[:, :3]):
-        raise ModelError(f"{part}: faces that are no whole numbers")
+        raise ModelError(f"{part}: faces that are not whole numbers")
     if np.any((indices < 1) | (indices > len(points))):
         raise ModelError(f"{part}: a face with a vertex that is none of 1 to {len(points)}")
     triangles = triangles_of(points, indices.astype(np.intp) - 1, (~is_missing).sum(axis=1))

@@ -40,7 +40,7 @@ class MeshFinder:
             raise ModelError(f"package_dirs: {error}") from None
         for folder in self.package_dirs:
             if not folder.is_dir():
-                raise ModelError(f"package_dirs: {folder} is no folder")
+                raise ModelError(f"package_dirs: {folder} is not a folder")
 
     @property
     def mesh_folder(self) -> Path:

@@ -72,8 +72,8 @@ def read_mesh(
     Raises
     ------
     ModelError
-        It is no mesh, too large, has no triangles, coordinates that are not finite, or indices of no vertex: one line
-        that begins with the path.
+        It is not a mesh, too large, or has no triangles, coordinates that are not finite, or indices of no vertex: one
+        line that begins with the path.
     """
     path = Path(path)
     header = mesh_header(path, max_bytes)
@@ -120,7 +120,7 @@ def read_part(part: Part) -> TriangleMesh:
     Raises
     ------
     ModelError
-        It has no folder, or its file is no mesh: one line that names link and file.
+        It has no folder, or its file is not a mesh: one line that names link and file.
     """
     geometry = part.geometry
     if not isinstance(geometry, Mesh):

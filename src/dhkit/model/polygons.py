@@ -23,7 +23,8 @@ def triangles_of(vertices: Array, corners: NDArray[np.intp], counts: NDArray[np.
     counts
         The number of corners of each polygon, shape (p,); polygons with fewer than three are left out.
     """
-    starts, sizes = np.cumsum(counts) - counts, np.maximum(counts - 2, 0)
+    starts = np.cumsum(counts) - counts
+    sizes = np.maximum(counts - 2, 0)
     first_triangles = np.cumsum(sizes) - sizes
     first = np.repeat(starts, sizes)
     step = np.arange(int(sizes.sum())) - np.repeat(first_triangles, sizes)

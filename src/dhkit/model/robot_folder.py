@@ -52,7 +52,8 @@ def write_robot_with_meshes(description: Description, path: str | Path) -> tuple
         A mesh cannot be read, or a file cannot be written.
     """
     path = Path(path)
-    names, folder = _copy_names(description), description.mesh_folder
+    names = _copy_names(description)
+    folder = description.mesh_folder
     with model_errors(path):
         if names and folder is None:
             raise ModelError(f"{description.name}: where its mesh {next(iter(names))!r} lies is not known")
@@ -67,7 +68,8 @@ def _copy_names(description: Description) -> dict[str, str]:
     names: dict[str, str] = {}
     for source in mesh_paths(description):
         own = PurePosixPath(source)
-        name, count = own.name, 1
+        name = own.name
+        count = 1
         while f"{MESHES}/{description.name}/{name}" in names.values():
             count += 1
             name = f"{own.stem}_{count}{own.suffix}"

@@ -155,7 +155,8 @@ def with_drawn_shapes(description: Description) -> Description:
         explicit.append(given if here else (*given, *solids))  # meshes that cannot be read stay missing
     base, *links, at_tool = explicit
     if not described[-1]:  # drawn in the frame of the last link
-        links[-1], at_tool = (*links[-1], *at_tool), ()
+        links[-1] = (*links[-1], *at_tool)
+        at_tool = ()
     return replace(
         description,
         base=replace(description.base, shapes=base),
@@ -167,7 +168,9 @@ def with_drawn_shapes(description: Description) -> Description:
 
 def _parts(description: Description) -> tuple[list[list[Part]], list[list[Part]]]:
     """Return the described and the drawn parts of the base, each link and the tool; drawn are those without shapes."""
-    n, T_last_tool, arm = description.n, description.numbers.T_last_tool, Drawing(description)
+    n = description.n
+    T_last_tool = description.numbers.T_last_tool
+    arm = Drawing(description)
     colors = [_BASE_COLOR, *(_PALETTE[i % len(_PALETTE)] for i in range(n))]
     own = (description.base.shapes, *(joint.shapes for joint in description.joints))
     described = [_described_parts(description, shapes, i, colors[i]) for i, shapes in enumerate(own)]
@@ -204,7 +207,8 @@ def _described_parts(description: Description, shapes: Sequence[Shape], link: in
     poses = {frame: matrix(frame, values) for frame in dict.fromkeys(shape.frame for shape in shapes)}
     parts: list[Part] = []
     for shape in shapes:
-        geometry, file = shape.geometry, None
+        geometry = shape.geometry
+        file = None
         if isinstance(geometry, Mesh):
             file = _mesh_file(description, geometry)
             if file is None:

@@ -81,7 +81,7 @@ class Shells:
         self.flipped = self.flipped ^ chosen
 
     def inside_out(self) -> NDArray[np.bool_]:
-        """Return whether each shell has negative volume although it is no cavity, shape (count,).
+        """Return whether each shell has negative volume although it is not a cavity, shape (count,).
 
         Points just inside a cavity lie in the material that other shells enclose; touching cavities do not count for
         each other.
@@ -107,7 +107,9 @@ class Shells:
         sizes = np.diff(self._ends)
         if int((near @ sizes).sum() - sizes.sum()) > BOUNDS.boolean_triangles:
             return 0.0, 0
-        twice, reaching, solids = 0.0, 0, dict[int, "Manifold | None"]()
+        twice = 0.0
+        reaching = 0
+        solids = dict[int, "Manifold | None"]()
         order = np.argsort(-np.abs(self.volume), kind="stable")
         for place, k in enumerate(order):
             around = [int(j) for j in order[:place] if near[k, j]]
@@ -119,7 +121,8 @@ class Shells:
             common = _common_volume(solids[k], [(solids[j], self.volume[j] > 0) for j in around])
             if common is None:
                 continue
-            volume, allowed = abs(float(self.volume[k])), self._allowed_overlap(k)
+            volume = abs(float(self.volume[k]))
+            allowed = self._allowed_overlap(k)
             if self.volume[k] > 0 and common > allowed:
                 twice += common
             reaching += bool(self.volume[k] < 0 and volume - common > allowed)
@@ -213,7 +216,8 @@ class _Rays:
     def __init__(self, corners: Array) -> None:
         # Rotated, so that no ray runs along a usual face of a machine part or through its edges.
         self.corners = corners @ _OBLIQUE_ROTATION
-        self.low, self.high = self.corners[:, :, :2].min(axis=1).T.copy(), self.corners[:, :, :2].max(axis=1).T.copy()
+        self.low = self.corners[:, :, :2].min(axis=1).T.copy()
+        self.high = self.corners[:, :, :2].max(axis=1).T.copy()
 
     def windings(self, chosen: slice, points: Array) -> Array:
         """Return the winding number of some triangles' surface at each point, shape (p,)."""

@@ -107,7 +107,9 @@ def read_solidworks_report(text: str, path: str, first: int = 1) -> tuple[str, M
 
 class _Reader:
     def __init__(self, text: str, path: str, first: int) -> None:
-        self.text, self.path, self.first = text, path, first
+        self.text = text
+        self.path = path
+        self.first = first
 
     def report(self) -> tuple[str, MassProperties, tuple[str, ...]]:
         title = REPORT.search(self.text)
@@ -172,7 +174,8 @@ class _Reader:
 
     def _tensor(self, block: re.Match[str], letter: str) -> tuple[Array, Array]:
         """Return a block's nine entries as listed, kg m^2, and half a unit of the last decimals, shape (3, 3)."""
-        unit, entries = self._moment_unit(block), self._entries(block, letter)
+        unit = self._moment_unit(block)
+        entries = self._entries(block, letter)
         if missing := [name for row in _ENTRY_NAMES for name in row if name not in entries]:
             raise self._error(f"no {letter}{missing[0]}; expected nine entries {letter}xx ... {letter}zz", block)
         numbers = np.array([[entries[name] for name in row] for row in _ENTRY_NAMES])
@@ -231,7 +234,8 @@ class _Reader:
 
     def _principal_misfit(self, listed: Array, half: Array, block: re.Match[str]) -> _Misfit:
         """Return the deviation of both tensors from the principal moments and axes."""
-        unit, entries = self._moment_unit(block), self._entries(block, "P")
+        unit = self._moment_unit(block)
+        entries = self._entries(block, "P")
         if missing := [k for k in "xyz" if k not in entries]:
             raise self._error(f"no P{missing[0]}; expected the principal moments Px, Py, Pz", block)
         moments = unit * np.array([entries[k].value for k in "xyz"])
@@ -253,7 +257,9 @@ class _Reader:
     def _steiner_misfit(self, listed: Array, half: Array, centre: _Centre, block: re.Match[str]) -> _Misfit:
         """Return the deviation of both tensors, with Steiner's terms, from the block at the origin."""
         origin, origin_half = self._tensor(block, "I")
-        mass, com, com_half = centre.mass, centre.com, centre.com_half
+        mass = centre.mass
+        com = centre.com
+        com_half = centre.com_half
         steiner = mass * (com @ com * np.eye(3) - np.outer(com, com))
         reach = float(np.abs(com).max()) + com_half
         allowed = (
@@ -280,7 +286,8 @@ class _Reader:
         if "," in text or text.count(".") > 1:
             raise self._error(f"found {text[:40]!r}; decimal commas are not read, write 1.5 for 1,5", at)
         mantissa, _, exponent_text = text.lower().partition("e")
-        places, exponent = len(mantissa.partition(".")[2]), int(exponent_text or 0)
+        places = len(mantissa.partition(".")[2])
+        exponent = int(exponent_text or 0)
         return _Number(float(text), 0.5 * 10.0 ** (exponent - places) if abs(exponent) < 300 else 0.0)
 
     def _error(self, message: str, at: re.Match[str]) -> ModelError:

@@ -42,7 +42,7 @@ def ascii_corners(content: bytes) -> Array:
     Raises
     ------
     ModelError
-        A facet without three vertices, or a coordinate that is no number.
+        A facet without three vertices, or a coordinate that is not a number.
     """
     content = _NAME_LINE.sub(b"", content)
     vertices = _VERTEX.findall(content)

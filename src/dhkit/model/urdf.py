@@ -80,7 +80,9 @@ def mechanics_urdf_text(description: Description) -> str:
 
 
 def _urdf(description: Description, drawn: Iterable[Part], paths: Mapping[str, PathMap]) -> str:
-    robot, numbers, n = ElementTree.Element("robot", name=description.name), description.numbers, description.n
+    robot = ElementTree.Element("robot", name=description.name)
+    numbers = description.numbers
+    n = description.n
     robot.append(ElementTree.Comment(_comment(description)))
     parts: dict[int, list[Part]] = {}
     for part in drawn:
@@ -97,7 +99,8 @@ def _urdf(description: Description, drawn: Iterable[Part], paths: Mapping[str, P
     for i in range(1, n + 1):
         _add_joint(robot, description, i)
         link = _child(robot, "link", name=f"link{i}")
-        frame_origin, T_link_frame = _frame_origin(description, i), _frame_matrix(description, i)
+        frame_origin = _frame_origin(description, i)
+        T_link_frame = _frame_matrix(description, i)
         if not np.isnan(mass := numbers.mass[i - 1]):
             com = T_link_frame[:3, :3] @ numbers.com[i - 1] + frame_origin.xyz
             _add_inertial(link, Origin(com, frame_origin.rpy), mass, numbers.inertia[i - 1])
@@ -120,7 +123,7 @@ def write_urdf(description: Description, path: str | Path, mesh_prefix: str | No
     path
         The file; its folder is created.
     mesh_prefix
-        Beginning of the meshes' names in the URDF, in place of ``meshes/``: ``package://my_robot/meshes/`` for ROS.
+        Beginning of the meshes' names in the URDF, instead of ``meshes/``: ``package://my_robot/meshes/`` for ROS.
 
     Raises
     ------
@@ -159,7 +162,8 @@ def _comment(description: Description) -> str:
 
 def _frame_origin(description: Description, i: int) -> Origin:
     """Return the origin of DH frame i in link i (i from 1)."""
-    k, n = i - 1, description.numbers
+    k = i - 1
+    n = description.numbers
     if description.convention is Convention.MODIFIED:
         return Origin(np.zeros(3), (0.0, 0.0, n.theta[k]))
     along_x = np.array([n.a[k] * n.cos_theta[k], n.a[k] * n.sin_theta[k], n.d[k]])
@@ -168,10 +172,15 @@ def _frame_origin(description: Description, i: int) -> Origin:
 
 def _frame_matrix(description: Description, i: int) -> Array:
     """Return :func:`_frame_origin` as a (4, 4) matrix, from the exact cosines."""
-    k, n = i - 1, description.numbers
-    ct, st, ca, sa = n.cos_theta[k], n.sin_theta[k], n.cos_alpha[k], n.sin_alpha[k]
+    k = i - 1
+    n = description.numbers
+    ct = n.cos_theta[k]
+    st = n.sin_theta[k]
+    ca = n.cos_alpha[k]
+    sa = n.sin_alpha[k]
     if description.convention is Convention.MODIFIED:
-        ca, sa = 1.0, 0.0
+        ca = 1.0
+        sa = 0.0
     T = np.eye(4)
     T[:3, :3] = [[ct, -st * ca, st * sa], [st, ct * ca, -ct * sa], [0.0, sa, ca]]
     T[:3, 3] = _frame_origin(description, i).xyz
@@ -180,17 +189,22 @@ def _frame_matrix(description: Description, i: int) -> Array:
 
 def _joint_origin(description: Description, i: int) -> Origin:
     """Return the origin of joint i in the link before it (dh0 for the first)."""
-    k, n = i - 1, description.numbers
+    k = i - 1
+    n = description.numbers
     if description.convention is Convention.STANDARD:
         return _frame_origin(description, i - 1) if k else Origin(np.zeros(3))
     # Frame i - 1 is rotated by the theta of its own row against the link.
     ct, st, theta = (n.cos_theta[k - 1], n.sin_theta[k - 1], n.theta[k - 1]) if k else (1, 0, 0)
-    x, y, z = n.a[k], -n.d[k] * n.sin_alpha[k], n.d[k] * n.cos_alpha[k]
+    x = n.a[k]
+    y = -n.d[k] * n.sin_alpha[k]
+    z = n.d[k] * n.cos_alpha[k]
     return Origin(np.array([ct * x - st * y, st * x + ct * y, z]), (n.alpha[k], 0.0, theta))
 
 
 def _add_joint(robot: _Element, description: Description, i: int) -> None:
-    k, numbers, joint = i - 1, description.numbers, description.joints[i - 1]
+    k = i - 1
+    numbers = description.numbers
+    joint = description.joints[i - 1]
     element = _child(robot, "joint", name=joint.name, type=joint.type.value)
     _add_origin(element, _joint_origin(description, i))
     _child(element, "parent", link=f"link{i - 1}" if k else "dh0")

@@ -199,7 +199,7 @@ def tool_frame(leaves: Sequence[str]) -> str | None:
 def only_tip(tree: UrdfTree, base: str) -> str | None:
     """Return the end of the only chain below a link; None if there are several.
 
-    Frames on the links before a tool of a conventional name, such as dhkit's own dh1, dh2 ..., are no other chains.
+    Frames on the links before a tool of a conventional name, such as dhkit's own dh1, dh2 ..., are not other chains.
     """
     tips = chain_tips(tree, base)
     longest = max(tips, key=len, default=())
@@ -323,7 +323,8 @@ def _notes(
     dropped: Collection[str],
     side: Side,
 ) -> list[str]:
-    names, links = _names(joints), {link for group in groups for link in group}
+    names = _names(joints)
+    links = {link for group in groups for link in group}
     notes = [
         str(warning)
         for warning in tree.warnings

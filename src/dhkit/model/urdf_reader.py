@@ -101,7 +101,7 @@ class _Reader:
         joints = {name: self._joint(ElementName("joint", name), element) for name, element in joint_elements.items()}
         for joint in joints.values():
             if joint.mimics is not None and joint.mimics not in joints:
-                self._warn(ElementName("joint", joint.name), f" follows {joint.mimics[:60]!r}, which is no joint")
+                self._warn(ElementName("joint", joint.name), f" follows {joint.mimics[:60]!r}, which is not a joint")
         links = {
             name: self._link(ElementName("link", name), element, colors) for name, element in link_elements.items()
         }
@@ -264,7 +264,8 @@ class _Reader:
             raise ModelError(f"{name} has {len(elements)} shapes; expected {BOUNDS.shape_elements} at most")
         for element in elements:
             T = self._origin(f"{name}: {element.tag}", element.find("origin"))
-            color, material = None, element.find("material")
+            color = None
+            material = element.find("material")
             if material is not None:
                 color = _color(material) or colors.get(material.get("name", ""))
             geometry, size = self._geometry(name, element)
@@ -327,7 +328,7 @@ def _parent_joints(links: Mapping[str, Element], joints: Mapping[str, Element]) 
     for name, joint in joints.items():
         for tag in ("parent", "child"):
             if (link := child_name(joint, tag)) not in links:
-                raise ModelError(f"joint {name!r}: <{tag}> is {link[:60]!r}, which is no link")
+                raise ModelError(f"joint {name!r}: <{tag}> is {link[:60]!r}, which is not a link")
         child = child_name(joint, "child")
         if child in parents:
             raise ModelError(f"link {child!r} has two parents, by joints {parents[child]!r} and {name!r}")
@@ -370,7 +371,7 @@ def _color(material: Element) -> str | None:
     try:
         levels = [round(255 * min(max(float(word), 0.0), 1.0)) for word in rgba[:3]]
     except ValueError:
-        return None  # an invalid colour is no reason to refuse a robot
+        return None  # an invalid colour is not a reason to refuse a robot
     return "#{:02x}{:02x}{:02x}".format(*levels) if len(levels) == 3 else None
 
 

@@ -183,7 +183,8 @@ class UrdfTree:
 
     def joints_to(self, link: str, base: str | None = None) -> tuple[UrdfJoint, ...] | None:
         """Return the joints from a base (the root if not given) to a link; None if the base is not on that path."""
-        end, joints = self.root if base is None else base, []
+        end = self.root if base is None else base
+        joints = []
         while link != end:
             joint = self.parent_joint.get(link)
             if joint is None:

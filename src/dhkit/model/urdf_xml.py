@@ -121,12 +121,12 @@ def child_name(joint: Element, tag: str) -> str:
 def numbers(where: str, element: Element | None, key: str, count: int) -> list[float]:
     """Return an attribute's numbers; an empty list if element or attribute is missing.
 
-    Pinocchio reads words that are no numbers as 0 or as the number that they begin with; here they are refused.
+    Pinocchio reads words that are not numbers as 0 or as the number that they begin with; here they are refused.
 
     Raises
     ------
     ModelError
-        Another count, or a word that is no finite number; begins with ``where``.
+        Another count, or a word that is not a finite number; begins with ``where``.
     """
     text = None if element is None else element.get(key)
     if element is None or text is None:

@@ -12,7 +12,7 @@ from dhkit.programs.bounds import BOUNDS
 from dhkit.programs.program import Program
 
 LENGTH_UNITS = {"mm": 1e3, "cm": 1e2, "inches": 1 / 0.0254}
-"""Units of length that programs may use in place of metres, and how many a metre has."""
+"""Units of length that programs may use instead of metres, and how many a metre has."""
 POSE_TOLERANCE = 1e-6
 """Largest difference of poses that agree: entries of rotations, and positions as shares of the arm's reach."""
 _FATAL = {Failure.LATE, Failure.MEMORY, Failure.PROCESSES, Failure.FILES, Failure.ENDED, Failure.GARBAGE}
@@ -30,7 +30,8 @@ class Caller:
     """
 
     def __init__(self, program: Program, function: str) -> None:
-        self.program, self.function = program, function
+        self.program = program
+        self.function = function
         self.failures: Counter[str] = Counter()
         self.seconds: list[float] = []
         self._fatal = 0

@@ -136,7 +136,9 @@ def _pose_hint(poses: Array, error: float) -> tuple[str, ...]:
         return (f"it differs by {error:.1g} at most: are its numbers rounded? {POSE_TOLERANCE:g} is allowed",)
     skew = float(np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max())
     if skew > _MAX_ROUNDING or np.any(np.linalg.det(R) < 0):
-        return (f"its upper left 3 x 3 part is no rotation: R^T R differs from 1 by {skew:.2g}; look at signs in A_i",)
+        return (
+            f"its upper left 3 x 3 part is not a rotation: R^T R differs from 1 by {skew:.2g}; look at signs in A_i",
+        )
     return ()
 
 
@@ -182,7 +184,8 @@ def _score_controller(
     arm: Arm, call: Caller, rubric: CheckRubric, rng: np.random.Generator, samples: int
 ) -> Iterator[Part]:
     """Score the peak error of the controller on the motion of the rubric."""
-    task, most = rubric.controller, rubric.points("controller")["follows"]
+    task = rubric.controller
+    most = rubric.points("controller")["follows"]
     start, goal = _ends(arm, task.start, task.goal)
     plant = arm.with_payload(task.payload) if task.payload else arm
 

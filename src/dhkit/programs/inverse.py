@@ -68,7 +68,8 @@ def score_inverse(
         right_singular = [judge.solve(T).is_right for T in arm.fk(singular)]
         text = f"{sum(right_singular)} of {len(right_singular)} singular poses are met"
         yield Part("singular", points["singular"] * float(np.mean(right_singular)), points["singular"], text)
-    limit, share = rubric.ik.seconds, float(np.mean(right))
+    limit = rubric.ik.seconds
+    share = float(np.mean(right))
     text = f"{1e3 * seconds:.3g} ms a pose; {1e3 * limit:g} ms are asked for" if np.isfinite(seconds) else "no answer"
     if share < 1:
         text += f"; counts for the {100 * share:.0f} % of the poses that are met"
@@ -106,7 +107,9 @@ class _PoseJudge:
     """
 
     def __init__(self, arm: Arm, call: Caller, has_closed_form: bool) -> None:
-        self.arm, self.call, self.has_closed_form = arm, call, has_closed_form
+        self.arm = arm
+        self.call = call
+        self.has_closed_form = has_closed_form
         self._classification = classify(arm.description)
         self._prismatic = arm.description.numbers.prismatic
         fit = self._classification.fit

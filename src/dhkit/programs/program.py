@@ -177,4 +177,4 @@ def _numbers(function: str, value: object) -> Array:
     try:
         return np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError):
-        raise ProgramError(f"{function} returned what is no array of numbers", Failure.RAISED) from None
+        raise ProgramError(f"{function} returned a value that is not an array of numbers", Failure.RAISED) from None

@@ -103,7 +103,7 @@ class CheckRubric:
         Raises
         ------
         AnswerError
-            The file cannot be read, or is no rubric.
+            The file cannot be read, or is not a rubric.
         """
         try:
             data = plain_numbers(toml_document(read_bounded(path, BOUNDS.rubric_bytes, "a rubric").decode()))

@@ -88,7 +88,7 @@ def made_at(mistakes: Iterable[MadeAt | str]) -> frozenset[MadeAt]:
     Raises
     ------
     TypeError
-        One text was given in place of a set of identities.
+        One text was given instead of a set of identities.
     """
     if isinstance(mistakes, str):
         raise TypeError(f"mistakes is {mistakes!r}; expected a set of identities, as in {{{mistakes!r}}}")
@@ -140,17 +140,17 @@ MISTAKES: Mapping[str, Mistake] = catalogue(
     _energy(_INERTIA, inertia_forgotten="the link's inertia about its centre of mass is missing"),
     _energy(
         _POTENTIAL,
-        height_at_joint="the height is that of the joint in place of the centre of mass",
-        height_at_end="the height is that of the link's end in place of the centre of mass",
-        height_relative_angle="the height uses the joint's own angle in place of the sum of the angles up to it",
+        height_at_joint="the height is that of the joint instead of the centre of mass",
+        height_at_end="the height is that of the link's end instead of the centre of mass",
+        height_relative_angle="the height uses the joint's own angle instead of the sum of the angles up to it",
         height_forgotten="the link's potential energy is missing",
     ),
     _energy(
         _COM_VELOCITY,
         com_at_end="the centre of mass is taken at the link's end, where its frame is",
-        velocity_at_joint="the velocity is that of the joint in place of the centre of mass: no parallel-axis term",
+        velocity_at_joint="the velocity is that of the joint instead of the centre of mass: no parallel-axis term",
         velocity_cross_term="the square of the velocity lacks the cross term 2 v.(omega x r)",
-        velocity_relative_angle="the velocity uses the joint's own angle in place of the sum of the angles up to it: "
+        velocity_relative_angle="the velocity uses the joint's own angle instead of the sum of the angles up to it: "
         "the joints before are taken as still",
         com_rotation_transposed="the link's rotation is transposed where its centre of mass is placed",
     ),
@@ -172,14 +172,14 @@ MISTAKES: Mapping[str, Mistake] = catalogue(
     _energy(
         _KINETIC_FACTORS,
         half_forgotten="the kinetic energy lacks its factor 1/2",
-        half_squared="the kinetic energy has the factor 1/4 in place of 1/2",
+        half_squared="the kinetic energy has the factor 1/4 instead of 1/2",
         translation_half_forgotten="the energy of translation lacks its factor 1/2",
         rotation_half_forgotten="the energy of rotation lacks its factor 1/2",
     ),
     _energy(
         _DRIVES,
         rotor_forgotten="the rotor's inertia is missing",
-        rotor_gear="the rotor's inertia is multiplied by the gear ratio in place of its square",
+        rotor_gear="the rotor's inertia is multiplied by the gear ratio instead of its square",
         rotor_without_gear="the rotor's inertia is taken without the gear: the rotor turns N times per joint turn",
     ),
     _energy(

@@ -106,7 +106,8 @@ class TextbookDerivation:
     @cached_property
     def rotors(self) -> Element:
         """Kinetic energy of the rotors, the sum of Jm (G qd)^2 / 2, and that of couplings, b qd_i qd_j each, J."""
-        arm, energies = self.arm, []
+        arm = self.arm
+        energies = []
         for i, (gear, rotor) in enumerate(zip(arm.gear, arm.rotor, strict=True)):
             if not self._has("rotor_forgotten", i):
                 ratio = gear if self._has("rotor_gear", i) else gear * gear
@@ -270,11 +271,14 @@ def _places(arm: ExactArm) -> tuple[_Place, ...]:
     """Walk along the arm."""
     ring = arm.ring
     places: list[_Place] = []
-    R, p = _identity(ring), np.array([ring.zero] * 3, dtype=object)
+    R = _identity(ring)
+    p = np.array([ring.zero] * 3, dtype=object)
     for row in arm.rows:
-        R_before, p_before = R, p
+        R_before = R
+        p_before = p
         R_own, p_own = _transform(arm, row)
-        R, p = R_before @ R_own, p_before + R_before @ p_own
+        R = R_before @ R_own
+        p = p_before + R_before @ p_own
         axis = (R_before if arm.is_standard else R)[:, 2]
         # What a student turns by the joint's own angle alone: the link from its joint on.
         R_still = _with_joints_still(R_before, _joints_before(arm, len(places)))
@@ -336,7 +340,8 @@ class _MovingBody:
     @property
     def end(self) -> Elements:
         """The far end of the link, in its own frame: its origin, or (modified) the next one's; the last's: the tool."""
-        ring, following = self.arm.ring, self.i + 1
+        ring = self.arm.ring
+        following = self.i + 1
         if following == self.arm.n:
             return self.arm.tool
         if self.arm.is_standard:
@@ -374,7 +379,8 @@ class _MovingBody:
         ring = self.arm.ring
         omega = np.array([ring.zero] * 3, dtype=object)
         for j, row in enumerate(self.arm.rows[: self.i + 1]):
-            R, own = _transform(self.arm, row)[0], np.array([ring.zero] * 3, dtype=object)
+            R = _transform(self.arm, row)[0]
+            own = np.array([ring.zero] * 3, dtype=object)
             if ring.kinds[j] == "R":
                 R = _with_joints_still(R, [j])
                 own[2] = ring.rate(j)
@@ -409,7 +415,8 @@ class _MovingBody:
 
     def potential(self) -> Element:
         """Return -m g.p, with p the centre of mass seen from the world's origin."""
-        arm, gravity = self.arm, self.arm.gravity
+        arm = self.arm
+        gravity = self.arm.gravity
         if self.has("gravity_forgotten") or self.has("height_forgotten"):
             return arm.ring.zero
         for name, places in (("gravity_axis", 1), ("gravity_axis_back", -1)):
@@ -426,7 +433,9 @@ class _MovingBody:
 
 def _transform(arm: ExactArm, row: ExactRow) -> tuple[Elements, Elements]:
     """Return rotation and translation of A_i."""
-    zero, (c, s), (ca, sa) = arm.ring.zero, row.theta, row.alpha
+    zero = arm.ring.zero
+    (c, s) = row.theta
+    (ca, sa) = row.alpha
     if arm.is_standard:
         R = [[c, -s * ca, s * sa], [s, c * ca, -c * sa], [zero, sa, ca]]
         return np.array(R, dtype=object), np.array([row.a * c, row.a * s, row.d], dtype=object)

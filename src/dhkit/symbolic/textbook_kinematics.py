@@ -75,12 +75,12 @@ POSE_MISTAKES: Mapping[str, Mistake] = catalogue(
         Subject.TRANSFORM,
         _ENDS,
         convention_exchanged="the table's numbers are put into the A_i of the other convention (standard, modified)",
-        product_reversed="the product runs the wrong way: A_n ... A_1 in place of A_1 ... A_n",
+        product_reversed="the product runs the wrong way: A_n ... A_1 instead of A_1 ... A_n",
         tool_forgotten="the tool's transform is missing: the product ends at frame n",
         tool_inverted="the tool's transform is inverted",
         base_forgotten="the base's transform is missing: the product begins at frame 0",
         base_inverted="the base's transform is inverted",
-        pose_inverted="the pose is inverted: it maps the world to the tool in place of the tool to the world",
+        pose_inverted="the pose is inverted: it maps the world to the tool instead of the tool to the world",
     )
 )
 """Mistakes in the pose of the tool, and in what follows from it."""
@@ -91,24 +91,23 @@ JACOBIAN_MISTAKES: Mapping[str, Mistake] = catalogue(
         _AXES,
         jacobian_x_y_exchanged="the rows of the velocities along x and y are exchanged",
         jacobian_halves_exchanged="angular rows stand above linear ones: here the linear velocity comes first",
-        point_frame_n="the linear velocity is that of frame n's origin in place of the tool's",
-        point_frame_0="the linear velocity is that of the point at frame 0's origin in place of the tool's",
+        point_frame_n="the linear velocity is that of frame n's origin instead of the tool's",
+        point_frame_0="the linear velocity is that of the point at frame 0's origin instead of the tool's",
         point_world="the linear velocity is that of the point at the world's origin (the spatial Jacobian), "
-        "in place of the tool's",
-        axes_of_tool="the Jacobian is in the tool's axes in place of the world's",
-        axes_of_frame_0="the Jacobian is in frame 0's axes in place of the world's",
+        "instead of the tool's",
+        axes_of_tool="the Jacobian is in the tool's axes instead of the world's",
+        axes_of_frame_0="the Jacobian is in frame 0's axes instead of the world's",
     ),
     _mistakes(
         Subject.JACOBIAN,
         COLUMNS,
         lever_not_subtracted="the lever is the tool's position from frame 0: the joint's position is not subtracted",
-        lever_own="the lever is frame i's position from frame 0, in place of that from the joint to the tool",
-        lever_neighbour="the lever begins at the neighbouring frame: at p_i in place of p_(i-1) (modified: the "
-        "reverse)",
-        axis_neighbour="the axis is that of the neighbouring frame: z_i in place of z_(i-1) (modified: the reverse)",
+        lever_own="the lever is frame i's position from frame 0, instead of that from the joint to the tool",
+        lever_neighbour="the lever begins at the neighbouring frame: at p_i instead of p_(i-1) (modified: the reverse)",
+        axis_neighbour="the axis is that of the neighbouring frame: z_i instead of z_(i-1) (modified: the reverse)",
         axis_unturned="every axis is taken as (0, 0, 1): the joints before do not turn it",
         angular_axes_unturned="every axis in the angular half is taken as (0, 0, 1): the joints before do not turn it",
-        cross_product_order="the cross product is lever x axis in place of axis x lever: the linear rows change sign",
+        cross_product_order="the cross product is lever x axis instead of axis x lever: the linear rows change sign",
         prismatic_as_revolute="a sliding joint's column is that of a turning one: it should be (axis; 0)",
         prismatic_angular="a sliding joint turns the tool: the lower half of its column should be 0",
         revolute_as_prismatic="a turning joint's column is that of a sliding one: it should be (axis x lever; axis)",
@@ -207,8 +206,10 @@ class TextbookKinematics:
 
     def _link(self, i: int) -> Elements:
         """Return A_i, i counted from 0, as the product of its four elementary motions."""
-        ring, row = self.arm.ring, self._lengths(i, self._angles(i, self.arm.rows[i]))
-        Rz, Rx = rotation(ring, 0, 1, row.theta), rotation(ring, 1, 2, row.alpha)
+        ring = self.arm.ring
+        row = self._lengths(i, self._angles(i, self.arm.rows[i]))
+        Rz = rotation(ring, 0, 1, row.theta)
+        Rx = rotation(ring, 1, 2, row.alpha)
         Tz, Tx = translation(ring, 2, row.d), translation(ring, 0, row.a)
         first, last = (Rz, Rx) if self._standard else (Rx, Rz)
         if self._has("rotations_first", i):
@@ -225,7 +226,8 @@ class TextbookKinematics:
 
     def _lengths(self, i: int, row: ExactRow) -> ExactRow:
         """Return the row with the mistakes in a and d."""
-        ring, (a, d) = self.arm.ring, (row.a, row.d)
+        ring = self.arm.ring
+        (a, d) = (row.a, row.d)
         if ring.kinds[i] != "R" and self._has("variable_forgotten", i):
             d = d - ring.position(i)
         if self._has("a_forgotten", i):
@@ -264,7 +266,8 @@ class TextbookKinematics:
 
     def _column(self, i: int) -> tuple[Elements, Elements]:
         """Return the linear and the angular half of column i, counted from 0, shape (3,) each."""
-        ring, axis = self.arm.ring, self._axis(i)
+        ring = self.arm.ring
+        axis = self._axis(i)
         nothing = np.array([ring.zero] * 3, dtype=object)
         turning = np.cross(axis, self._lever(i))
         if self._has("cross_product_order"):
@@ -388,7 +391,8 @@ def _known_angles(arm: ExactArm, placement: Placement) -> list[Expression]:
 
 def _placement(arm: ExactArm, placement: Placement) -> Elements:
     """Return a placement's matrix, shape (4, 4): Rz(yaw) Ry(pitch) Rx(roll), then the origin."""
-    ring, naming = arm.ring, Naming(arm.description, arm.symbols)
+    ring = arm.ring
+    naming = Naming(arm.description, arm.symbols)
     roll, pitch, yaw = (ring.direction(angle) for angle in _known_angles(arm, placement))
     T: Elements = rotation(ring, 0, 1, yaw) @ rotation(ring, 2, 0, pitch) @ rotation(ring, 1, 2, roll)
     T[:3, 3] = [ring.read(naming.known(x)) for x in placement.xyz]
@@ -405,7 +409,8 @@ def _product(first: Elements, second: Elements, unrotated: bool) -> Elements:
 
 def _sum(first: Direction, second: Direction) -> Direction:
     """Return cosine and sine of the sum of two angles."""
-    (c, s), (x, y) = first, second
+    (c, s) = first
+    (x, y) = second
     return c * x - s * y, s * x + c * y
 
 

@@ -43,7 +43,7 @@ def straight_line(
     Raises
     ------
     ValueError
-        Other shapes, matrices that are no poses, or a duration that is not positive.
+        Other shapes, matrices that are not poses, or a duration that is not positive.
     PlanningError
         The arm cannot follow: the workspace, a singularity or a joint limit is in the way; or as for
         :func:`dhkit.trajectories.cubic`.

@@ -107,7 +107,7 @@ def load_trajectory(path: str | Path, description: Description | None = None) ->
     Raises
     ------
     DescriptionError
-        One line: the file cannot be read, is damaged, is no trajectory, or is one of another robot.
+        One line: the file cannot be read, is damaged, is not a trajectory, or is one of another robot.
     """
     path = Path(path)
     suffix, content = TRAJECTORY.read(path, ARCHIVES + TABLES)
@@ -292,7 +292,7 @@ def _load(values: Mapping[str, Any]) -> dict[str, Any]:
     Raises
     ------
     DescriptionError, ValueError
-        The numbers are no payload or no friction.
+        The numbers are not those of a payload or of friction.
     """
     found: dict[str, Any] = {}
     if "payload" in values:

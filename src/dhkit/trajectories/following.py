@@ -121,7 +121,8 @@ class _Follower:
             found, closed = self.closed(middles, pieces(middles))
             if not closed.all():
                 raise self._lost(float(middles[~closed][0]), found[~closed][0])
-            s, q = np.insert(s, wrong + 1, middles), np.insert(q, wrong + 1, found, axis=0)
+            s = np.insert(s, wrong + 1, middles)
+            q = np.insert(q, wrong + 1, found, axis=0)
 
     def derivatives(self, s: Array, q: Array) -> tuple[Array, Array]:
         """Return q' and q'' on the path, shape (N, n) each, by the least norm of q' for a redundant arm.
@@ -129,14 +130,18 @@ class _Follower:
         With J^+ from the singular values that the arm has: q' = J^+ v = J^T w, so that
         q'' = J^+ (v' - J' q') + (1 - J^+ J) J'^T w.
         """
-        newton, J = self.newton, self._jacobian(q)
-        rows, units = self._rows, newton.units
+        newton = self.newton
+        J = self._jacobian(q)
+        rows = self._rows
+        units = newton.units
         v, v_rate = (rows[:, 0] * array[:, : newton.size] for array in (self.tool.twists(s), self.tool.twist_rates(s)))
         U, sigma, Vt = np.linalg.svd(J, full_matrices=False)
         if (sigma[:, self.rank - 1] < _SINGULAR).any():
             k = int(np.argmax(sigma[:, self.rank - 1] < _SINGULAR))
             raise PlanningError(f"the path meets a singularity {self._where(float(s[k]), q[k])}")
-        U, sigma, Vt = U[:, :, : self.rank], sigma[:, : self.rank], Vt[:, : self.rank]
+        U = U[:, :, : self.rank]
+        sigma = sigma[:, : self.rank]
+        Vt = Vt[:, : self.rank]
         inverse = np.swapaxes(Vt, 1, 2) / sigma[:, None] @ np.swapaxes(U, 1, 2)
         first = np.einsum("kij,kj->ki", inverse, v)
         J_rate = rows * jacobian_dot(newton.description, q, units * first)[:, : newton.size] * units
@@ -158,7 +163,8 @@ class _Follower:
     def closed(self, s: Array, q: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Return joint values on the path, (N, n), from nearby ones q, and whether each was reached without a jump."""
         goals = self.tool.poses(s).reshape(-1, 16)
-        found, damping = np.ascontiguousarray(q), np.full(len(s), _DAMPING)
+        found = np.ascontiguousarray(q)
+        damping = np.full(len(s), _DAMPING)
         error = self.newton.error(found, goals)
         for _ in range(_NEWTON_STEPS):
             step = self.newton.step(found, error, damping)
@@ -167,19 +173,24 @@ class _Follower:
             better = np.linalg.norm(step_error, axis=1) < np.linalg.norm(error, axis=1)
             if not better.any():
                 break
-            found, error = np.where(better[:, None], step, found), np.where(better[:, None], step_error, error)
+            found = np.where(better[:, None], step, found)
+            error = np.where(better[:, None], step_error, error)
         moved = np.abs((found - q) / self.newton.units).max(axis=1)
         return found, (np.abs(error).max(axis=1) < _KNOT_ERROR) & (moved < _MAX_CORRECTION)
 
     def _follow(self, start: Array) -> tuple[Array, Array]:
         """Return knots (K,) and joint values (K, n), followed from the beginning to the end."""
-        s, q, step = [0.0], [start], _FIRST_STEP
+        s = [0.0]
+        q = [start]
+        step = _FIRST_STEP
         while s[-1] < 1.0:
-            here, at = np.array(s[-1:]), q[-1][None]
+            here = np.array(s[-1:])
+            at = q[-1][None]
             qs, qss = self.derivatives(here, at)
             there = min(s[-1] + step, 1.0)
             h = there - s[-1]
-            first, second = (h * qs)[0], (h**2 / 2 * qss)[0]
+            first = (h * qs)[0]
+            second = (h**2 / 2 * qss)[0]
             if self._largest(second) <= _MAX_SECOND_ORDER * self._largest(first):
                 expected = at + first + second
                 found, closed = self.closed(np.array([there]), expected)
@@ -187,7 +198,9 @@ class _Follower:
                     closed[0]
                     and self._largest(found - expected) <= _MAX_SECOND_ORDER * self._largest(first) + _KNOT_ERROR
                 ):
-                    s, q, step = [*s, there], [*q, found[0]], min(2 * step, _FIRST_STEP)
+                    s = [*s, there]
+                    q = [*q, found[0]]
+                    step = min(2 * step, _FIRST_STEP)
                     continue
             step = h / 2
             if step < _MIN_STEP:
@@ -272,7 +285,8 @@ def _require_inside(path: JointPath, limits: Limits) -> None:
     limit = limits.lower[i] if farthest.is_below else limits.upper[i]
     name = path.description.joints[i].name
     slides = bool(path.description.numbers.prismatic[i])
-    bound, found = joint_text(limit, slides=slides), joint_text(q, slides=slides)
+    bound = joint_text(limit, slides=slides)
+    found = joint_text(q, slides=slides)
     raise PlanningError(
         f"{name} leaves its limit, {bound}, along the path: it comes to {found}"
         f"{degrees_hint(q, slides=slides)} at s = {farthest.place:.4g}"

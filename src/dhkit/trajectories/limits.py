@@ -102,7 +102,8 @@ class Limits:
         array([5., 5.])
         """
         description = description_of(description)
-        numbers, anything = description.numbers, np.full(description.n, np.inf)
+        numbers = description.numbers
+        anything = np.full(description.n, np.inf)
         own = {
             "lower": numbers.lower,
             "upper": numbers.upper,

@@ -36,7 +36,7 @@ def matlab_table(description: Description, content: bytes, most: int, columns: M
     Raises
     ------
     DescriptionError
-        No such file, a variable that is no array of real numbers, or arrays that do not fit together; names it.
+        No such file, a variable that is not an array of real numbers, or arrays that do not fit together; names it.
     """
     variables = read_mat(content, most, advice=_ARRAY_EXPORT)
     names = _chosen(description, variables, columns)

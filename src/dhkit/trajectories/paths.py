@@ -73,7 +73,8 @@ class JointPath:
         >>> JointPath.straight(library_robot("planar2r"), [0, 1], [1, 3]).q(0.5)
         array([0.5, 2. ])
         """
-        start, goal = configuration(description, q0, "q0"), configuration(description, q1, "q1")
+        start = configuration(description, q0, "q0")
+        goal = configuration(description, q1, "q1")
         return cls(description, np.array([0.0, 1.0]), np.stack([start, goal - start])[None])
 
     def q(self, s: ArrayLike) -> Array:
@@ -111,7 +112,8 @@ class JointPath:
         law = Pieces.of(breaks, rows[..., None], 1)
         _check_law(law)
         merged = self._merged_breaks(law)
-        starts, middles = merged[:-1], (merged[:-1] + merged[1:]) / 2
+        starts = merged[:-1]
+        middles = (merged[:-1] + merged[1:]) / 2
         k = np.searchsorted(law.breaks, middles) - 1
         inner = shift(law.coefficients[k], starts - law.breaks[k])[..., 0]
         m = np.clip(np.searchsorted(self.breaks, law(middles)[..., 0]) - 1, 0, len(self.breaks) - 2)
@@ -125,11 +127,13 @@ class JointPath:
 
     def _merged_breaks(self, law: Pieces) -> Array:
         """Return the law's breaks together with the times at which s passes breaks of the path."""
-        low, high = np.zeros(len(self.breaks) - 2), np.full(len(self.breaks) - 2, law.end)
+        low = np.zeros(len(self.breaks) - 2)
+        high = np.full(len(self.breaks) - 2, law.end)
         for _ in range(_BISECTIONS):
             middle = (low + high) / 2
             below = law(middle)[..., 0] < self.breaks[1:-1]
-            low, high = np.where(below, middle, low), np.where(below, high, middle)
+            low = np.where(below, middle, low)
+            high = np.where(below, high, middle)
         crossings = (low + high) / 2
         gaps = np.abs(crossings[:, None] - law.breaks).min(axis=1, initial=np.inf)
         merged = np.sort(np.concatenate([law.breaks, crossings[gaps > _SAME_BREAK * law.end]]))
@@ -143,7 +147,8 @@ def quintic_law() -> tuple[Array, Array]:
 
 
 def _check_law(law: Pieces) -> None:
-    start, end = float(law(0.0)[0]), float(law(law.end)[0])
+    start = float(law(0.0)[0])
+    end = float(law(law.end)[0])
     if max(abs(start), abs(end - 1.0)) > _LAW_SLACK:
         raise ValueError(f"s goes from {start:.9g} to {end:.9g}; expected from 0 to 1")
     inside = law.breaks[1:-1]

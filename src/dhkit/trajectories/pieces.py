@@ -146,7 +146,8 @@ class Pieces:
         rounding = self.coefficients.shape[1] * np.finfo(float).eps * size
         b = np.concatenate([both, -both], axis=2)
         allowed = np.tile(np.broadcast_to(tolerance, both.shape[2]), 2)
-        begin, width = self.breaks[:-1], np.diff(self.breaks)
+        begin = self.breaks[:-1]
+        width = np.diff(self.breaks)
         reached = np.full(b.shape[2], -np.inf)
         places = np.zeros(b.shape[2])
         bound = np.full(b.shape[2], -np.inf)
@@ -162,8 +163,10 @@ class Pieces:
             if not is_open.any():
                 break
             b = np.concatenate(_halves(b[is_open]))
-            begin, width = begin[is_open], width[is_open] / 2
-            begin, width = np.concatenate([begin, begin + width]), np.concatenate([width, width])
+            begin = begin[is_open]
+            width = width[is_open] / 2
+            begin = np.concatenate([begin, begin + width])
+            width = np.concatenate([width, width])
         else:
             bound = np.maximum(bound, b.max(axis=(0, 1)))
         highest, negated = np.split(bound + np.tile(rounding, 2), 2)
@@ -191,7 +194,8 @@ class Pieces:
 
 def _halves(b: Array) -> tuple[Array, Array]:
     """Return the Bernstein coefficients (K, p+1, m) of both halves of pieces, by de Casteljau's algorithm."""
-    left, right = [b[:, 0]], [b[:, -1]]
+    left = [b[:, 0]]
+    right = [b[:, -1]]
     while b.shape[1] > 1:
         b = (b[:, :-1] + b[:, 1:]) / 2
         left.append(b[:, 0])
@@ -208,7 +212,7 @@ def join(first: Pieces, second: Pieces) -> tuple[Array, Array]:
 
 
 def shift(coefficients: Array, u: Array) -> Array:
-    """Return the coefficients (K, p+1, m) of polynomials in x - u in place of x, u of shape (K,)."""
+    """Return the coefficients (K, p+1, m) of polynomials in x - u instead of x, u of shape (K,)."""
     degrees = coefficients.shape[1]
     matrix = np.zeros((len(coefficients), degrees, degrees))
     for i in range(degrees):

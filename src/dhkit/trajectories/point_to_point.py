@@ -144,7 +144,8 @@ def trapezoidal(
     0.8
     """
     check_duration(duration)
-    start, goal = configuration(description, q0, "q0"), configuration(description, q1, "q1")
+    start = configuration(description, q0, "q0")
+    goal = configuration(description, q1, "q1")
     if blend is not None and not 0 < blend <= 0.5:
         raise ValueError(f"blend is {blend!r}; expected more than 0 and at most 0.5")
     if blend is None:
@@ -164,7 +165,8 @@ def _unit(duration: float | None, ends: tuple[ArrayLike | None, ...]) -> float:
 
 def _blended(description: Description, q0: Array, q1: Array, blend: float) -> Trajectory:
     """Return the motion over one second."""
-    way, rate = q1 - q0, (q1 - q0) / (1 - blend)
+    way = q1 - q0
+    rate = (q1 - q0) / (1 - blend)
     speed_up = np.stack([q0, np.zeros_like(way), rate / (2 * blend)])
     cruise = np.stack([q0 + rate * blend / 2, rate, np.zeros_like(way)])
     brake = np.stack([q1 - rate * blend / 2, rate, -rate / (2 * blend)])
@@ -175,10 +177,14 @@ def _blended(description: Description, q0: Array, q1: Array, blend: float) -> Tr
 
 def _best_blend(description: Description, q0: Array, q1: Array, limits: Limits, torques: Torques | None) -> float:
     # The duration may have several minima in the blend: a grid is searched before one is refined.
-    low, high, count = _MIN_BLEND, 0.5, _GRID
+    low = _MIN_BLEND
+    high = 0.5
+    count = _GRID
     for _ in range(_REFINEMENTS + 1):
         blends = np.linspace(low, high, count)
         motions = [_blended(description, q0, q1, float(blend)) for blend in blends]
         best = int(np.argmin(least_slowdowns(motions, limits, torques)))
-        low, high, count = blends[max(best - 1, 0)], blends[min(best + 1, count - 1)], _FINER_GRID
+        low = blends[max(best - 1, 0)]
+        high = blends[min(best + 1, count - 1)]
+        count = _FINER_GRID
     return float(blends[best])

@@ -64,7 +64,8 @@ class _UnexpectedError(Exception):
     """An event of the YAML reader that a message does not have."""
 
     def __init__(self, event: yaml.Event, expected: str) -> None:
-        self.event, self.expected = event, expected
+        self.event = event
+        self.expected = expected
 
 
 def _value(event: yaml.Event, events: Iterator[yaml.Event], depth: int) -> Any:

@@ -51,7 +51,7 @@ def least_slowdown(
     A motion c times as slow has velocities over c, accelerations over c^2 and jerks over c^3, and torques
     g + (tau - g) / c^2, where g are the torques that hold the arm (Hollerbach 1984, Dynamic scaling of manipulator
     trajectories). This is exact without friction. Motions are assumed to go from rest to rest: accelerations at both
-    ends are no jumps, those at breaks inside are.
+    ends are not jumps, those at breaks inside are.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def least_slowdown(
         Number of times per interval, both ends included, at which torques are checked, and more finely about the
         tightest; velocities, accelerations and jerks are checked at their extremes.
     may_be_unlimited
-        Whether a motion that no limit slows down is no error.
+        Whether a motion that no limit slows down is not an error.
 
     Returns
     -------
@@ -101,7 +101,7 @@ def _with_torques_between(trajectory: Trajectory, limits: Limits, c: float) -> f
     """Return the slowdown with which torques between the samples keep their limits too, from one that may be too small.
 
     Where a torque tau of the motion, slowed down c times, exceeds its limit, with g that holds the arm there, it keeps
-    the limit with c^2 (tau - g) / (limit - g) in place of c^2, for positive tau. The worst place is mended until none
+    the limit with c^2 (tau - g) / (limit - g) instead of c^2, for positive tau. The worst place is mended until none
     is left.
     """
     description = trajectory.description
@@ -168,7 +168,8 @@ def require_inside(trajectory: Trajectory, limits: Limits) -> None:
     i, q = farthest.joint, farthest.value
     side, limit = ("lower", limits.lower[i]) if farthest.is_below else ("upper", limits.upper[i])
     slides = bool(trajectory.description.numbers.prismatic[i])
-    bound, found = joint_text(limit, slides=slides), joint_text(q, slides=slides)
+    bound = joint_text(limit, slides=slides)
+    found = joint_text(q, slides=slides)
     raise PlanningError(
         f"{trajectory.description.joints[i].name} leaves its {side} limit, {bound}: it comes to {found}"
         f"{degrees_hint(q, slides=slides)} at {farthest.place:.4g} s"
@@ -262,13 +263,16 @@ class _SamplePoints:
 def _by_torques(trajectories: Sequence[Trajectory], limits: Limits, torques: Torques | None, points: int) -> Array:
     """Return the least slowdown by torques, shape (m,)."""
     description = trajectories[0].description
-    places, most = _SamplePoints.spread(trajectories, points), np.full(len(trajectories), np.inf)
+    places = _SamplePoints.spread(trajectories, points)
+    most = np.full(len(trajectories), np.inf)
     for _ in range(_REFINEMENTS + 1):
         q, qd, qdd = places.states(trajectories)
         if torques is None:
-            tau, g = inverse_dynamics(description, q, qd, qdd), gravity_torque(description, q)
+            tau = inverse_dynamics(description, q, qd, qdd)
+            g = gravity_torque(description, q)
         else:
-            tau, g = torques(q, qd, qdd), torques(q, 0 * q, 0 * q)
+            tau = torques(q, qd, qdd)
+            g = torques(q, 0 * q, 0 * q)
         moves = np.abs(tau - g) > _TORQUE_NOISE * np.abs(tau).max()
         spare = limits.torque - np.where(moves, np.sign(tau - g), np.sign(g)) * g
         falls = (np.abs(g) > limits.torque) | (moves & (spare <= 0))

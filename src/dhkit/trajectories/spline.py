@@ -55,7 +55,8 @@ def spline(
     if not np.isfinite(q).all():
         raise ValueError(f"points[{int(np.argwhere(~np.isfinite(q))[0, 0])}] is not finite")
     if times is None:
-        t, duration = _spaced(q, limits or default_limits(description)), None
+        t = _spaced(q, limits or default_limits(description))
+        duration = None
     else:
         t = check_times(times)
         if len(t) != len(q):

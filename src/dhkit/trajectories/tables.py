@@ -35,7 +35,7 @@ def read_table(text: str) -> Table:
     Raises
     ------
     DescriptionError
-        No header, a row of another length, or an entry that is no finite number; names line and column.
+        No header, a row of another length, or an entry that is not a finite number; names line and column.
     """
     names: tuple[str, ...] | None = None
     rows: list[list[float]] = []
@@ -71,7 +71,7 @@ def read_table(text: str) -> Table:
 def check_columns(
     description: Description, columns: Mapping[str, str] | None, matrices: Collection[str] = ()
 ) -> dict[str, str]:
-    """Return a mapping from our names of columns to a file's, with ``q1`` ... in place of the joints' names.
+    """Return a mapping from our names of columns to a file's, with ``q1`` ... instead of the joints' names.
 
     Parameters
     ----------

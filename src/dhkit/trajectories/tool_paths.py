@@ -105,7 +105,7 @@ def tool_line(T0: ArrayLike, T1: ArrayLike) -> ToolLine:
     Raises
     ------
     ValueError
-        Other shapes, or matrices that are no poses.
+        Other shapes, or matrices that are not poses.
     """
     from scipy.spatial.transform import Rotation
 

@@ -158,7 +158,9 @@ class Trajectory:
         """
         from dhkit.dynamics import inverse_dynamics
 
-        q, qd, qdd = self.q(t, side), self.qd(t, side), self.qdd(t, side)
+        q = self.q(t, side)
+        qd = self.qd(t, side)
+        qdd = self.qdd(t, side)
         chosen = self.friction if friction is None else friction
         return inverse_dynamics(self.loaded, q, qd, qdd, friction=False if chosen is None else chosen)
 
@@ -246,11 +248,13 @@ class Trajectory:
         ):
             if own != theirs:
                 raise ValueError(f"{what} is {own} and then {theirs}; expected one: .carrying(...) sets it")
-        end, start = self.q(self.duration), other.q(0.0)
+        end = self.q(self.duration)
+        start = other.q(0.0)
         apart = np.flatnonzero(np.abs(end - start) > _JOIN_TOLERANCE)
         if len(apart):
             i = int(apart[0])
-            name, slides = self.description.joints[i].name, bool(self.description.numbers.prismatic[i])
+            name = self.description.joints[i].name
+            slides = bool(self.description.numbers.prismatic[i])
             here, there = (joint_text(x, slides=slides, digits=9) for x in (end[i], start[i]))
             raise ValueError(f"{name} ends at {here} and goes on from {there}; expected the same value")
         return self._moved(*join(self.pieces, other.pieces))

@@ -115,7 +115,8 @@ def _rounding_scale(description: Description) -> float:
 
 
 def _kinematics(description: Description, reference: PinocchioResults) -> Iterator[Comparison]:
-    q, size = reference.motion.q, max(1.0, description.numbers.table_length)
+    q = reference.motion.q
+    size = max(1.0, description.numbers.table_length)
     ours = np.concatenate(
         [kinematics.frames(description, q), kinematics.forward_kinematics(description, q)[:, None]], axis=1
     )
@@ -131,12 +132,10 @@ def _kinematics(description: Description, reference: PinocchioResults) -> Iterat
 
 def _dynamics(description: Description, reference: PinocchioResults, notes: list[str]) -> Iterator[Comparison]:
     q, qd, qdd = reference.motion
-    M, C, g, tau = (
-        reference.mass_matrix(),
-        reference.coriolis_matrix(),
-        reference.gravity_torque(),
-        reference.inverse_dynamics(),
-    )
+    M = reference.mass_matrix()
+    C = reference.coriolis_matrix()
+    g = reference.gravity_torque()
+    tau = reference.inverse_dynamics()
     floors = Floors.of(description, M, qd, qdd, tau)
     ours = dynamics.coriolis_matrix(description, q, qd)
     products = np.einsum("nij,nj->ni", C, qd)
@@ -154,7 +153,8 @@ def _dynamics(description: Description, reference: PinocchioResults, notes: list
     else:
         apart = relative_error(ours, reference.forward_dynamics(tau), floors.qdd)
         yield Comparison("forward dynamics qdd", apart, forward_tolerance(M), 3)
-    K, V = dynamics.kinetic_energy(description, q, qd), dynamics.potential_energy(description, q)
+    K = dynamics.kinetic_energy(description, q, qd)
+    V = dynamics.potential_energy(description, q)
     yield _relative("kinetic energy K", K, reference.kinetic_energy(), floors.h, vectors=2)
     yield _relative("potential energy V", V, reference.potential_energy(), floors.g)
     Y = dynamics.regressor(description, q, qd, qdd)

@@ -31,7 +31,8 @@ def differences(description: Description, model: PinocchioModel, tolerance: floa
     """
     least = max(tolerance, 1e-9)
     reach = max(1.0, description.reach)
-    ours, theirs = _screws(description), _model_screws(model)
+    ours = _screws(description)
+    theirs = _model_screws(model)
     apart = [i for i in range(description.n) if _distance(ours[i], theirs[i], reach) > least]
     if apart:
         yield from _axes(description, ours, theirs, apart[0], reach, least)
@@ -139,6 +140,7 @@ def _world_bodies(model: PinocchioModel) -> list[tuple[float, Array, Array]]:
     pin.forwardKinematics(model, data, np.zeros(model.nq))
     bodies = []
     for i in range(1, model.njoints):
-        body, R = model.inertias[i], data.oMi[i].rotation
+        body = model.inertias[i]
+        R = data.oMi[i].rotation
         bodies.append((float(body.mass), data.oMi[i].act(body.lever), R @ body.inertia @ R.T))
     return bodies

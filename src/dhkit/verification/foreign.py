@@ -179,7 +179,8 @@ def _constant_offsets(ours: Array, theirs: Array) -> Iterator[_ConstantOffset]:
 def _dynamics(description: Description, reference: PinocchioResults, tolerance: float) -> Iterator[Comparison]:
     q, qd, qdd = reference.motion
     M = dynamics.mass_matrix(description, q)
-    g, tau = dynamics.gravity_torque(description, q), dynamics.inverse_dynamics(description, q, qd, qdd)
+    g = dynamics.gravity_torque(description, q)
+    tau = dynamics.inverse_dynamics(description, q, qd, qdd)
     floors = Floors.of(description, M, qd, qdd, tau)
     yield Comparison("mass matrix M", relative_error(reference.mass_matrix(), M), tolerance)
     yield Comparison("gravity torque g", relative_error(reference.gravity_torque(), g, floors.g), tolerance)

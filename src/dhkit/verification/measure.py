@@ -20,7 +20,7 @@ def relative_error(ours: Array, reference: Array, floor: Array | float = 0.0) ->
     ours, reference
         A quantity at N states, shape (N, ...).
     floor
-        Shape (N,) or a number: size for states where the reference is smaller, so that noise around 0 is no error.
+        Shape (N,) or a number: size for states where the reference is smaller, so that noise around 0 is not an error.
 
     Returns
     -------
@@ -66,7 +66,8 @@ class Floors:
         weight = float(np.sum(numbers.mass) * np.linalg.norm(numbers.gravity)) * max(1.0, description.reach)
         inertia, rate = _largest(M), _largest(qd)
         g = np.full(len(M), weight)
-        C, h = inertia * rate, inertia * rate**2
+        C = inertia * rate
+        h = inertia * rate**2
         with np.errstate(all="ignore"):
             fastest = _largest(tau) / np.min(np.diagonal(M, axis1=-2, axis2=-1), axis=-1)
         falling = float(np.linalg.norm(numbers.gravity))

@@ -126,7 +126,9 @@ class PinocchioResults:
         R, p = T.rotation, T.translation
         matrix = np.zeros((10, 10))
         for k, unit in enumerate(np.eye(10)):
-            m, h, second = unit[0], unit[1:4], np.zeros((3, 3))
+            m = unit[0]
+            h = unit[1:4]
+            second = np.zeros((3, 3))
             for value, (a, b) in zip(unit[4:], INERTIA_PLACES.values(), strict=True):
                 second[a, b] = second[b, a] = value
             turned = R @ h

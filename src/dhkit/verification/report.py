@@ -52,7 +52,8 @@ class Agreement:
         return ", ".join(f"{name} = {[float(f'{x:.6g}') for x in vector]}" for name, vector in named if vector)
 
     def __repr__(self) -> str:
-        verdict, most = "agrees" if self.ok else "DISAGREES", f"{self.tolerance:.0e}"
+        verdict = "agrees" if self.ok else "DISAGREES"
+        most = f"{self.tolerance:.0e}"
         return repr_line("Agreement", self.quantity, f"{verdict}, error {self.error:.1e} of at most {most}")
 
 

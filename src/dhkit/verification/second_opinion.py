@@ -58,7 +58,8 @@ def _tool_difference(robot: object, chain: Chain, q: Array, tool: Array) -> floa
 
 
 def _same_inertial(robot: object, chain: Chain, name: str) -> bool:
-    ours, theirs = chain.tree.links[name].inertial, robot.link_map[name].inertial  # type: ignore[attr-defined]
+    ours = chain.tree.links[name].inertial
+    theirs = robot.link_map[name].inertial  # type: ignore[attr-defined]
     if ours is None or theirs is None:
         return ours is None and theirs is None
     T = np.eye(4) if theirs.origin is None else np.asarray(theirs.origin, dtype=float)

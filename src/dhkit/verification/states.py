@@ -32,7 +32,7 @@ def random_states(description: Description, samples: int, seed: int = 0) -> Arra
     Raises
     ------
     ValueError
-        ``samples`` is no whole number from 1 on, or ``seed`` none from 0 on.
+        ``samples`` is not a whole number from 1 on, or ``seed`` none from 0 on.
     """
     check_whole("samples", samples, 1)
     check_whole("seed", seed, 0)
@@ -52,14 +52,17 @@ def random_motions(description: Description, samples: int, seed: int = 0) -> Joi
     Raises
     ------
     ValueError
-        ``samples`` is no whole number from 1 on, or ``seed`` none from 0 on.
+        ``samples`` is not a whole number from 1 on, or ``seed`` none from 0 on.
     """
     check_whole("samples", samples, 1)
     check_whole("seed", seed, 0)
-    numbers, rng, shape = description.numbers, np.random.default_rng(seed), (samples, description.n)
+    numbers = description.numbers
+    rng = np.random.default_rng(seed)
+    shape = (samples, description.n)
     limited = np.isfinite(numbers.lower) & np.isfinite(numbers.upper)
     free = np.where(numbers.prismatic, 1.0, np.pi)
-    lower, upper = np.where(limited, numbers.lower, -free), np.where(limited, numbers.upper, free)
+    lower = np.where(limited, numbers.lower, -free)
+    upper = np.where(limited, numbers.upper, free)
     rate = np.where(np.isfinite(numbers.velocity), numbers.velocity, _DEFAULT_SPEED)
     return JointStates(
         rng.uniform(lower, upper, shape),

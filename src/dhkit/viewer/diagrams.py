@@ -78,7 +78,8 @@ def percent_diagram(label: str, joints: NDArray[np.intp], shares: Array) -> Diag
 
 def torque_diagram(description: Description, tau: Array) -> Diagram:
     """Return a diagram of torques, shape (N, n), N m and N; of shares of their limits if all joints have one."""
-    effort, joints = description.numbers.effort, np.arange(description.n)
+    effort = description.numbers.effort
+    joints = np.arange(description.n)
     if np.isfinite(effort).all():
         return percent_diagram("torque / limit [%]", joints, tau / effort)
     unit = "N m, N" if description.numbers.prismatic.any() else "N m"
@@ -91,7 +92,8 @@ def draw_diagram(axes: Axes, diagram: Diagram, times: Array) -> None:
     span = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-12)
     draw_curves(axes, diagram, times)
     distance = _MAX_LIMIT_DISTANCE * span
-    lowest, highest = diagram.values.min(axis=0) - distance, diagram.values.max(axis=0) + distance
+    lowest = diagram.values.min(axis=0) - distance
+    highest = diagram.values.max(axis=0) + distance
     near = [
         (float(limits[k]), i)
         for limits in (diagram.lower, diagram.upper)
@@ -101,7 +103,8 @@ def draw_diagram(axes: Axes, diagram: Diagram, times: Array) -> None:
     shared = [limit for limit, _ in near]
     for limit, i in near:
         axes.axhline(limit, color=SHARED_COLOR if shared.count(limit) > 1 else joint_color(i), **LIMIT_STYLE)
-    low, high = min([low, *(limit for limit, _ in near)]), max([high, *(limit for limit, _ in near)])
+    low = min([low, *(limit for limit, _ in near)])
+    high = max([high, *(limit for limit, _ in near)])
     margin = _MARGIN * max(high - low, span)
     axes.set_ylim(low - margin, high + margin)
 

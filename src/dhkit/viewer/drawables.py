@@ -42,7 +42,7 @@ def part_object(part: Part, name: str) -> Lowered:
     part
         A drawn part of a link.
     name
-        Name of its pieces, in place of meshcat's random identifiers, so that equal scenes are equal bytes.
+        Name of its pieces, instead of meshcat's random identifiers, so that equal scenes are equal bytes.
 
     Raises
     ------
@@ -142,7 +142,9 @@ def _meshcat() -> Any:
 
 def _lowered(kind: str, geometry: Any, material: Any, name: str) -> Lowered:
     drawn = getattr(_meshcat(), kind)(geometry, material)
-    geometry.uuid, material.uuid, drawn.uuid = f"{name}/geometry", f"{name}/material", name
+    geometry.uuid = f"{name}/geometry"
+    material.uuid = f"{name}/material"
+    drawn.uuid = name
     lowered: Lowered = drawn.lower()
     return lowered
 
@@ -162,7 +164,8 @@ def _geometry(part: Part) -> Any:
             cylinder.radialSegments = _ROUND_SIDES
             return cylinder
         case Capsule():
-            radius, half = float(shape.radius), float(shape.length) / 2
+            radius = float(shape.radius)
+            half = float(shape.length) / 2
             return _lathe(np.concatenate([_arc(radius, -half, -90, 0), _arc(radius, half, 0, 90)]))
 
 

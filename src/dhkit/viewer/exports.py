@@ -104,7 +104,8 @@ class Exportable(ABC):
             A motion that cannot be played: see :meth:`dhkit.viewer.View.play`.
         """
         shown = self.snapshot()
-        title, caption = _text("title", title or f"{shown.description.name} · dhkit"), _text("caption", caption)
+        title = _text("title", title or f"{shown.description.name} · dhkit")
+        caption = _text("caption", caption)
         messages = {slot: shown.messages[slot] for slot in sorted(shown.messages)}
         if not interactive:
             return offline_page([*messages.values()], title)

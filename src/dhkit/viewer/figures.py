@@ -129,7 +129,8 @@ def draw_path(axes: Any, description: Description, q: Array) -> None:
     path = world_to_tool(description, q)[:, :3, 3]
     lines = []
     for state, color, label in ((q[0], "#a9b1bf", "start"), (q[-1], LINK_COLOR, "end")):
-        frames, tool = world_to_frames(description, state), world_to_tool(description, state)
+        frames = world_to_frames(description, state)
+        tool = world_to_tool(description, state)
         lines.append(skeleton(description, frames, tool))
         axes.plot(*lines[-1].T, color=color, lw=2.5, solid_capstyle="round", solid_joinstyle="round", label=label)
     axes.plot(*path.T, color=PATH_COLOR, lw=1.8, label="tool")
@@ -203,7 +204,8 @@ def space_axes(figure: Figure, place: Any) -> Any:
 
 def set_space_limits(axes: Any, points: Array, margin: float) -> None:
     """Set limits around points, shape (k, 3), with a margin, m, and equal scales; a flat scene is seen from above."""
-    low, high = points.min(axis=0), points.max(axis=0)
+    low = points.min(axis=0)
+    high = points.max(axis=0)
     is_flat = high[2] - low[2] <= _FLATNESS * max(float((high - low).max()), 1e-12)
     half = np.maximum((high - low) / 2 + margin, _MIN_EDGE_SHARE * float((high - low).max() / 2 + margin))
     centre = (low + high) / 2

@@ -46,7 +46,8 @@ def limits_state(description: Description) -> dict[str, Any]:
 
 def arm_state(description: Description, *, assumed_bodies: bool = False) -> dict[str, object]:
     """Return what panels show of an arm: joints with limits, configurations by name, family, reach (m)."""
-    limits, numbers = limits_state(description), description.numbers
+    limits = limits_state(description)
+    numbers = description.numbers
     fit = classify(description)
     configurations = {"zero": np.zeros(description.n)} | dict(numbers.configurations)
     return {
@@ -95,7 +96,8 @@ def interactive_data(
     ghosts, overlays
         Names and colors (``#rrggbb``) of ghosts, and of other things that are drawn beside the arm.
     """
-    numbers, limits = description.numbers, limits_state(description)
+    numbers = description.numbers
+    limits = limits_state(description)
     rows = [
         {"kind": "R" if joint.is_revolute else "P", "lower": limits["lower"][i], "upper": limits["upper"][i]}
         | {name: float(getattr(numbers, name)[i]) for name in COLUMNS}
@@ -135,7 +137,8 @@ def _motion_state(description: Description, name: str, motion: Motion) -> dict[s
     if isinstance(motion, Trajectory):
         checked = np.linspace(0.0, motion.duration, _LIMIT_SAMPLES)
         has_bodies = all(joint.bodies for joint in description.joints)
-        qd, tau = motion.qd(grid), motion.tau(grid) if has_bodies else None
+        qd = motion.qd(grid)
+        tau = motion.tau(grid) if has_bodies else None
         checked_tau = motion.tau(checked) if has_bodies else None
         excess = exceeded_limit(description, motion.q(checked), motion.qd(checked), checked_tau)
     elif isinstance(motion, SimulationResult):

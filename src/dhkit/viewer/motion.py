@@ -80,7 +80,8 @@ def check_motion(description: Description, times: ArrayLike, q: ArrayLike) -> tu
     TypeError
         Times or joint values are not numbers.
     """
-    t, q = np.asarray(times, dtype=float), joint_array(description, q)
+    t = np.asarray(times, dtype=float)
+    q = joint_array(description, q)
     if t.ndim != 1 or len(t) < 2:
         raise ValueError(f"times has shape {t.shape}; expected (N,) with N >= 2")
     if q.shape != (len(t), description.n):

@@ -112,7 +112,8 @@ def ball_transforms(ellipsoid: Ellipsoid, scale: float | None, longest: float) -
     """
     if scale is not None and not (np.isfinite(scale) and scale > 0):
         raise ValueError(f"scale is {scale}; expected a positive number")
-    centers, axes = ellipsoid.center.reshape(-1, 3), ellipsoid.axes.reshape(-1, 3, 3)
+    centers = ellipsoid.center.reshape(-1, 3)
+    axes = ellipsoid.axes.reshape(-1, 3, 3)
     lengths = ellipsoid.lengths.reshape(-1, 3)
     if np.isinf(lengths).any():
         raise ValueError("the ellipsoid is infinite in a direction that the tool cannot move in; expected a finite one")
@@ -154,11 +155,15 @@ def rounded_boxes(obstacles: Scene, size: float) -> tuple[Array, Array, Array]:
     from dhkit.planning.obstacles import Floor, check_obstacles
 
     scene = check_obstacles(obstacles)
-    T, half_edges, radii = np.tile(np.eye(4), (len(scene), 1, 1)), np.zeros((len(scene), 3)), np.zeros(len(scene))
+    T = np.tile(np.eye(4), (len(scene), 1, 1))
+    half_edges = np.zeros((len(scene), 3))
+    radii = np.zeros(len(scene))
     for k, obstacle in enumerate(scene):
         if isinstance(obstacle, Floor):
             T[k, 2, 3] = obstacle.height
             half_edges[k, :2] = _FLOOR_SHARE * size
         else:
-            T[k], half_edges[k], radii[k] = obstacle.T_world_obstacle, obstacle.half_sizes, obstacle.radius
+            T[k] = obstacle.T_world_obstacle
+            half_edges[k] = obstacle.half_sizes
+            radii[k] = obstacle.radius
     return T, half_edges, radii

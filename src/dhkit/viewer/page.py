@@ -149,7 +149,9 @@ def offline_page(messages: Sequence[bytes], title: str, interactive: Mapping[str
         panels.
     """
     data = [base64.b64encode(message).decode() for message in messages]
-    style, extra, modules = _static("viewer.css"), "", list(MODULES)
+    style = _static("viewer.css")
+    extra = ""
+    modules = list(MODULES)
     if interactive is not None:
         style += _static("lab/lab.css")
         extra = _script(_json(interactive), ' type="application/json" id="offline"')

@@ -116,7 +116,8 @@ def write_motion_pngs(
     ghosts: Sequence[Ghost] = (),
 ) -> list[Path]:
     """Write ``count`` pictures of a motion at equal steps of time; each file is ``path`` with a number in its name."""
-    path, digits = Path(path), len(str(count))
+    path = Path(path)
+    digits = len(str(count))
     images = _motion_pictures(description, motion, count, size, frames, ghosts)
     return [
         write_png(image, path.with_name(f"{path.stem}-{k:0{digits}}{path.suffix}")) for k, image in enumerate(images, 1)

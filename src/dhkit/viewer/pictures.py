@@ -185,12 +185,15 @@ def _triangles(part: Part) -> Array:
     shape = part.geometry
     match shape:
         case Mesh():
-            scale, corners = 1.0, read_part(part).corners
+            scale = 1.0
+            corners = read_part(part).corners
         case Box():
             edges = np.array([float(edge) for edge in shape.size])
-            mesh, scale = trimesh.creation.box(edges / edges.max()), float(edges.max())
+            mesh = trimesh.creation.box(edges / edges.max())
+            scale = float(edges.max())
         case Sphere():
-            mesh, scale = trimesh.creation.uv_sphere(1.0, count=[_ROUND_SIDES // 2, _ROUND_SIDES]), float(shape.radius)
+            mesh = trimesh.creation.uv_sphere(1.0, count=[_ROUND_SIDES // 2, _ROUND_SIDES])
+            scale = float(shape.radius)
         case Cylinder():
             scale = float(shape.radius)  # of unit size, since trimesh merges points nearer than 1e-8
             mesh = trimesh.creation.cylinder(1.0, float(shape.length) / scale, sections=_ROUND_SIDES)
@@ -215,7 +218,8 @@ def _extent(
     """Return the corners of boxes around all that is drawn, shape (k, 3), m, world."""
     extent = [points]
     for solid in solids:
-        low, high = solid.corners.min(axis=(0, 1)), solid.corners.max(axis=(0, 1))
+        low = solid.corners.min(axis=(0, 1))
+        high = solid.corners.max(axis=(0, 1))
         box = np.array(list(product(*zip(low, high, strict=True))))
         nodes = [transforms[:, solid.link], *(ghost.transforms[None, solid.link] for ghost in ghosts)]
         extent += [(box @ T[:3, :3].T + T[:3, 3]) for node in nodes for T in node]
@@ -249,7 +253,8 @@ class _Camera:
         """Return a camera that has all points, shape (k, 3), m, world, in view, for a picture of a size in px."""
         up = -description.numbers.gravity
         up = np.array([0.0, 0.0, 1.0]) if not up.any() else up / np.linalg.norm(up)
-        low, high = points.min(axis=0), points.max(axis=0)
+        low = points.min(axis=0)
+        high = points.max(axis=0)
         span = high - low
         towards = _SPACE_DIRECTION if abs(up[2]) > 0.5 else np.array([0.18, 0.0, 1.0]) + 0.14 * up
         if abs(up[2]) > 0.5 and span[2] < 0.25 * max(span[0], span[1]):
@@ -291,7 +296,8 @@ def _draw_arm(
         world = solid.corners @ T[:3, :3].T + T[:3, 3]
         normals = np.cross(world[:, 1] - world[:, 0], world[:, 2] - world[:, 0])
         lengths = np.linalg.norm(normals, axis=1)
-        world, normals = world[lengths > 0], normals[lengths > 0] / lengths[lengths > 0, None]
+        world = world[lengths > 0]
+        normals = normals[lengths > 0] / lengths[lengths > 0, None]
         # Files may have triangles the wrong way round: the side that is seen is lit.
         towards = np.einsum("ij,ij->i", normals, camera.eye - world[:, 0])
         normals *= np.where(towards < 0, -1.0, 1.0)[:, None]
@@ -319,7 +325,8 @@ def _rasterize(corners: Array, colors: Array, image: NDArray[np.uint8]) -> NDArr
         Shape (height, width, 3).
     """
     height, width = image.shape[:2]
-    drawn, nearest = image.reshape(-1, 3).copy(), np.zeros(height * width)
+    drawn = image.reshape(-1, 3).copy()
+    nearest = np.zeros(height * width)
     # Blocks of triangles cover a few million pixels each: the memory for all at once would have no bound.
     boxes = np.ptp(np.clip(corners[..., :2], 0, [width, height]), axis=1) + 1
     block = np.cumsum(boxes.prod(axis=1)) // _BLOCK_PIXELS
@@ -336,7 +343,10 @@ def _draw_block(corners: Array, colors: Array, drawn: NDArray[np.uint8], nearest
     first = np.clip(np.ceil(left - 0.5), 0, width).astype(int)
     counts = np.clip(np.floor(right - 0.5), -1, width - 1).astype(int) - first + 1
     kept = counts > 0
-    which, y, first, counts = which[kept], y[kept], first[kept], counts[kept]
+    which = which[kept]
+    y = y[kept]
+    first = first[kept]
+    counts = counts[kept]
     x = np.repeat(first, counts) + _ranges(counts)
     which, y = np.repeat(which, counts), np.repeat(y, counts)
     (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (corners[:, k].T for k in range(3))
@@ -361,9 +371,11 @@ def _spans(corners: Array, height: int) -> tuple[NDArray[np.intp], NDArray[np.in
     which = np.repeat(np.arange(len(corners)), counts)
     row = np.repeat(low, counts) + _ranges(counts)
     at = row + 0.5
-    left, right = np.full(len(which), np.inf), np.full(len(which), -np.inf)
+    left = np.full(len(which), np.inf)
+    right = np.full(len(which), -np.inf)
     for k in range(3):
-        (px, py), (qx, qy) = corners[which, k].T, corners[which, (k + 1) % 3].T
+        (px, py) = corners[which, k].T
+        (qx, qy) = corners[which, (k + 1) % 3].T
         crosses = (py <= at) != (qy <= at)
         with np.errstate(divide="ignore", invalid="ignore"):
             x = px + (at - py) / (qy - py) * (qx - px)
@@ -427,7 +439,8 @@ def _finish(
             for label in frame_labels(description)
         ]
     small = drawn.resize((camera.size[0] // _SUPERSAMPLING, camera.size[1] // _SUPERSAMPLING), Image.Resampling.LANCZOS)
-    draw, font = ImageDraw.Draw(small), ImageFont.load_default(max(12, small.height // 36))
+    draw = ImageDraw.Draw(small)
+    font = ImageFont.load_default(max(12, small.height // 36))
     for text, (x, y) in names:
         width = draw.textlength(text, font=font)
         left = x + 7 if x + 7 + width + 4 < small.width else x - 7 - width

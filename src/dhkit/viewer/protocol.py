@@ -49,7 +49,7 @@ _WORD = 4
 
 
 class ProtocolError(ValueError):
-    """Bytes or text that are no message."""
+    """Bytes or text that are not message."""
 
 
 class MessageType(IntEnum):

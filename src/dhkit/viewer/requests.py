@@ -32,12 +32,12 @@ def decode_message(text: str | bytes) -> Shown | Request:
     Raises
     ------
     ProtocolError
-        The text is no JSON object of these types, or a field is missing or of another type; one line.
+        The text is not a JSON object of these types, or a field is missing or of another type; one line.
     """
     try:
         message = json.loads(text, parse_constant=_refuse_constant)
     except (ValueError, RecursionError):
-        raise ProtocolError("message is no JSON") from None
+        raise ProtocolError("message is not JSON") from None
     if not isinstance(message, dict):
         raise ProtocolError(f"message is {type(message).__name__}; expected an object")
     kind = message.get("type")
@@ -46,7 +46,8 @@ def decode_message(text: str | bytes) -> Shown | Request:
     if kind != "request":
         raise ProtocolError(f"message type is {str(kind)[:40]!r}; expected 'shown' or 'request'")
     number = _integer(message, "id", 1)
-    name, data = message.get("name"), message.get("data", {})
+    name = message.get("name")
+    data = message.get("data", {})
     if not isinstance(name, str) or not 0 < len(name) <= BOUNDS.name_characters:
         raise ProtocolError(f"name is {str(name)[:40]!r}; expected the name of a request")
     if not isinstance(data, dict) or _is_deeper(data, BOUNDS.nesting):
@@ -64,7 +65,7 @@ def _integer(message: dict[str, object], name: str, least: int) -> int:
 
 
 def _refuse_constant(text: str) -> NoReturn:
-    """Refuse NaN and infinity, which are no JSON."""
+    """Refuse NaN and infinity, which are not JSON."""
     raise ValueError(text)
 
 

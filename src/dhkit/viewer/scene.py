@@ -82,7 +82,8 @@ def build_scene(description: Description, parts: Sequence[Part]) -> Scene:
     """
     # The next of the sizes that grow in equal ratios.
     steps = math.ceil(_SIZES_PER_OCTAVE * math.log2(scene_size(description)))
-    size, places = float(2.0 ** (steps / _SIZES_PER_OCTAVE)), _shared_origins(description)
+    size = float(2.0 ** (steps / _SIZES_PER_OCTAVE))
+    places = _shared_origins(description)
     commands = [_set_object(f"{_ROOT}/grid", grid_object(size, "grid"))]
     commands += _part_commands(parts)
     commands += _triad_commands(description, places, size)

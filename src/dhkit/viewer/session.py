@@ -72,7 +72,7 @@ class Session:
         return not self._waiting and not any(self._unshown.values())
 
     def offer(self, slot: int, sequence: int, message: bytes | Samples) -> None:
-        """Queue a message in place of the one that waits in its slot; samples are added to those that wait."""
+        """Queue a message instead of the one that waits in its slot; samples are added to those that wait."""
         if slot == Slot.SCENE:
             for other in OF_ONE_ARM:
                 self._waiting.pop(other, None)

@@ -74,7 +74,8 @@ def plot_simulation(result: SimulationResult) -> Figure:
     result
         The simulation.
     """
-    description, kinds = result.description, joint_kinds(result.description)
+    description = result.description
+    kinds = joint_kinds(result.description)
     rows = len(kinds) + 1
     figure = new_figure(figsize=(11.5, 1.6 + 2.2 * rows), layout="constrained")
     controller = f"{result.controller}, " if result.controller else ""
@@ -152,7 +153,8 @@ def _draw_values(axes: Axes, result: SimulationResult, joints: NDArray[np.intp],
     for k, i in enumerate(joints):
         values = both[rows, len(joints) + k]
         axes.plot(result.t[rows], values, color=_darken(joint_color(i)), **_REFERENCE_STYLE)
-        low, high = min(low, float(values.min())), max(high, float(values.max()))
+        low = min(low, float(values.min()))
+        high = max(high, float(values.max()))
     axes.set_ylim(low, high)
 
 
@@ -179,7 +181,8 @@ def _draw_torques(axes: Axes, result: SimulationResult) -> bool:
     for rank, i in enumerate(joints.tolist(), start=1):
         bars = _bars(result.t, shown[:, i] * (1 + _SATURATED_STEP * rank), limited[:, i])
         axes.hlines(*bars, color=joint_color(i), ls=joint_style(i), **_SATURATED_STYLE)
-        low, high = min(low, float(bars[0].min())), max(high, float(bars[0].max()))
+        low = min(low, float(bars[0].min()))
+        high = max(high, float(bars[0].max()))
     margin = _SATURATED_STEP / 2 * (high - low) if len(joints) else 0.0
     axes.set_ylim(low - margin, high + margin)
     if len(joints):
@@ -210,7 +213,8 @@ def _draw_tool_errors(axes: Axes, result: SimulationResult) -> None:
 
 
 def _draw_largest_errors(axes: Axes, results: Mapping[str, SimulationResult]) -> None:
-    least, largest = np.inf, _MIN_ERROR
+    least = np.inf
+    largest = _MIN_ERROR
     for k, (name, result) in enumerate(results.items()):
         error = np.maximum(np.abs(result.error).max(axis=1), _MIN_ERROR)
         rows = _extreme_rows(error[:, None])
@@ -219,7 +223,8 @@ def _draw_largest_errors(axes: Axes, results: Mapping[str, SimulationResult]) ->
             result.t[rows], error[rows], style, color=CONTROLLER_COLORS[k % len(CONTROLLER_COLORS)], lw=1.6, label=name
         )
         # A run that begins on its reference would otherwise stretch the scale down to 0.
-        least, largest = min(least, float(np.quantile(error, 0.02))), max(largest, float(error.max()))
+        least = min(least, float(np.quantile(error, 0.02)))
+        largest = max(largest, float(error.max()))
     axes.set_yscale("log")
     axes.set_ylim(least / 3, 3 * largest)
     axes.set_xlim(0.0, max(float(result.t[-1]) for result in results.values()) or 1.0)
@@ -228,7 +233,8 @@ def _draw_largest_errors(axes: Axes, results: Mapping[str, SimulationResult]) ->
 def _draw_bars(axes: Axes, results: Mapping[str, SimulationResult]) -> None:
     rms = np.array([float(result.rms_error.max()) for result in results.values()])
     drawn = np.maximum(rms, _MIN_ERROR)
-    places, least = list(range(len(rms))), float(drawn.min()) / 3
+    places = list(range(len(rms)))
+    least = float(drawn.min()) / 3
     colors = [CONTROLLER_COLORS[k % len(CONTROLLER_COLORS)] for k in places]
     axes.barh(places, drawn - least, left=least, color=colors, height=0.6)
     for place, value in zip(places, rms, strict=True):
@@ -259,7 +265,8 @@ def _bars(times: Array, levels: Array, chosen: NDArray[np.bool_]) -> tuple[Array
     """Return levels, beginnings and ends, s, of the chosen intervals of times, shape (N,); levels keep their sign."""
     signs = np.where(chosen, np.sign(levels), 0.0)
     changes = np.flatnonzero(np.diff(signs)) + 1
-    begins, ends = np.append(0, changes), np.append(changes, len(signs))
+    begins = np.append(0, changes)
+    ends = np.append(changes, len(signs))
     shown = signs[begins] != 0
     begins, ends = begins[shown], ends[shown]
     return levels[begins], times[begins], times[np.minimum(ends, len(times) - 1)]

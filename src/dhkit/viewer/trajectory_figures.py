@@ -87,7 +87,8 @@ def plot_uses(motions: Mapping[str, Trajectory]) -> Figure:
     if not motions:
         raise ValueError("motions is empty; expected trajectories by their names")
     description = next(iter(motions.values())).description
-    numbers, end = description.numbers, max(motion.duration for motion in motions.values())
+    numbers = description.numbers
+    end = max(motion.duration for motion in motions.values())
     for quantity, limits in (("speed", numbers.velocity), ("torque", numbers.effort)):
         if not np.isfinite(limits).all():
             name = description.joints[int(np.argmin(np.isfinite(limits)))].name
@@ -125,7 +126,8 @@ def _samples(trajectory: Trajectory) -> Samples:
     times = np.concatenate([even, inside, inside])
     left = np.repeat([False, True, False], [len(even), len(inside), len(inside)])
     order = np.lexsort((~left, times))
-    times, left = times[order], left[order, None]
+    times = times[order]
+    left = left[order, None]
     q, qd, qdd = (
         np.where(left, value(times, "left"), value(times)) for value in (trajectory.q, trajectory.qd, trajectory.qdd)
     )

@@ -77,7 +77,9 @@ class View(Exportable):
     ) -> None:
         self._description: Description = description_of(description)
         description = self._description
-        self._answer, self._port, self._token = answer, port, token
+        self._answer = answer
+        self._port = port
+        self._token = token
         self._server: ViewerServer | None = None
         self._widget: Any = None
         """The widget of a notebook that shows this view."""
@@ -138,11 +140,12 @@ class View(Exportable):
             raise ValueError(f"q has shape {q.shape}; expected ({self._description.n},): play shows a motion")
         if not np.isfinite(q).all():
             raise ValueError(f"q is {q.tolist()}; expected finite values")
-        self._q, self._played = q.copy(), None
+        self._q = q.copy()
+        self._played = None
         self._publish(Slot.MOTION, protocol.encode_pose(q, node_transforms(self._description, q)))
 
     def replace(self, description: Robot, q: ArrayLike | None = None) -> None:
-        """Show another arm in place of this one; what was drawn for the one before is taken away.
+        """Show another arm instead of this one; what was drawn for the one before is taken away.
 
         Parameters
         ----------
@@ -162,13 +165,16 @@ class View(Exportable):
             self._description = description
             for slot in OF_ONE_ARM:
                 self._state.pop(slot, None)
-            self._played, self._trace, self._ghosts, self._ghost_names = None, None, (), ()
+            self._played = None
+            self._trace = None
+            self._ghosts = ()
+            self._ghost_names = ()
             self._q = first_configuration(description) if q is None else joint_array(description, q)
             self._publish(Slot.SCENE, scene)
             self.show(self._q)
 
     def panel(self, name: str, data: object) -> None:
-        """Send the state of a panel, of what JSON can hold, to the pages, in place of the last state of this name."""
+        """Send the state of a panel, of what JSON can hold, to the pages, instead of the last state of this name."""
         self._live().publish_state(name, data)
 
     def append(self, samples: Samples) -> None:
@@ -195,14 +201,15 @@ class View(Exportable):
             The trajectory or the simulation is another robot's.
         """
         times, q, reference_q = played_motion(self._description, motion)
-        transforms, ghost = node_transforms(self._description, q), None
+        transforms = node_transforms(self._description, q)
+        ghost = None
         if reference_q is not None:
             ghost = node_transforms(self._description, reference_q), ghost_tints(1)
         self._played = motion
         self._publish(Slot.MOTION, protocol.encode_animation(times, q, transforms, trace=trace, ghost=ghost))
 
     def trace(self, points: ArrayLike | None) -> None:
-        """Draw a line through points, in place of the last; None takes it away.
+        """Draw a line through points, instead of the last; None takes it away.
 
         Parameters
         ----------
@@ -218,7 +225,7 @@ class View(Exportable):
         self._publish(Slot.TRACE, protocol.encode_trace(line))
 
     def points(self, positions: ArrayLike | None, colors: ArrayLike | None = None) -> None:
-        """Draw a cloud of points, in place of the last; None takes it away.
+        """Draw a cloud of points, instead of the last; None takes it away.
 
         Parameters
         ----------
@@ -236,7 +243,7 @@ class View(Exportable):
         self._publish(Slot.POINTS, protocol.encode_points(cloud, color_bytes(colors, len(cloud))))
 
     def ellipsoid(self, ellipsoid: Ellipsoid | None, scale: float | None = None) -> None:
-        """Draw an ellipsoid or a batch of them, in place of the last; None takes them away.
+        """Draw an ellipsoid or a batch of them, instead of the last; None takes them away.
 
         Parameters
         ----------
@@ -256,7 +263,7 @@ class View(Exportable):
         self._publish(Slot.ELLIPSOIDS, protocol.encode_ellipsoids(transforms))
 
     def ghosts(self, q: ArrayLike | None, tints: ArrayLike | None = None, names: Sequence[str] | None = None) -> None:
-        """Draw translucent copies of the arm in further states, in place of the last; None takes them away.
+        """Draw translucent copies of the arm in further states, instead of the last; None takes them away.
 
         Parameters
         ----------
@@ -291,7 +298,7 @@ class View(Exportable):
         self._publish(Slot.GHOSTS, protocol.encode_ghosts(transforms, colors[shown]))
 
     def obstacles(self, obstacles: Scene | None) -> None:
-        """Draw translucent obstacles, in place of the last; None takes them away.
+        """Draw translucent obstacles, instead of the last; None takes them away.
 
         Parameters
         ----------
@@ -327,7 +334,8 @@ class View(Exportable):
         """Stop the server; pages say that the connection is lost, and the view cannot be moved any more."""
         with self._lock:
             self._closed = True
-            server, self._server = self._server, None
+            server = self._server
+            self._server = None
         if server is not None:
             server.close()
 

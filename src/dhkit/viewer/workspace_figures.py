@@ -124,7 +124,8 @@ def plot_workspace(workspace: Workspace) -> Figure:
         image = reach.draw(ax, float(workspace.manipulability.max()))
         _draw_arm(ax, reach.plane.flatten(line), reach.plane.flatten(best))
         for boundary in borders:
-            border, dashes = reach.plane.border(boundary), _BOUNDARY_STYLES[boundary.name]
+            border = reach.plane.border(boundary)
+            dashes = _BOUNDARY_STYLES[boundary.name]
             ax.plot(*border.T, dashes, color=_BOUNDARY_COLOR, lw=1.3, zorder=1.9)  # below the arm
     bar = figure.colorbar(image, ax=axes, shrink=0.9, pad=0.02, aspect=30)
     bar.set_label("best translational manipulability (SI)", fontsize=9)
@@ -203,7 +204,8 @@ def _planes(workspace: Workspace) -> list[_Plane]:
         x, y, z = np.moveaxis(local(points), -1, 0)
         return np.stack([np.hypot(x, y), z], axis=-1)
 
-    title, labels = "section, all turns of the first joint in one", ("distance from axis 1 [m]", "height [m]")
+    title = "section, all turns of the first joint in one"
+    labels = ("distance from axis 1 [m]", "height [m]")
     return [
         _Plane(title, labels, section, is_along_axis=False),
         _Plane("along axis 1", ("x₀ [m]", "y₀ [m]"), lambda points: local(points)[..., :2]),
@@ -221,7 +223,8 @@ def _reach(plane: _Plane, workspace: Workspace) -> _Pixels:
     from scipy.ndimage import binary_closing, maximum_filter
 
     places = plane.flatten(workspace.positions)
-    low, high = places.min(axis=0), places.max(axis=0)
+    low = places.min(axis=0)
+    high = places.max(axis=0)
     span = float((high - low).max()) or scene_size(workspace.description)
     edge = span / float(np.clip(np.sqrt(len(places) / _SAMPLES_PER_PIXEL), 8, _MAX_PIXELS))
     counts = np.ceil((high - low) / edge).astype(int) + 2 * _PIXEL_MARGIN

@@ -172,7 +172,7 @@ def test_wrong_ones_are_wrong_and_named():
         ({"M": "[1 0;0 1]*[1;2]"}, "M: found 2 rows of 1; expected 2 of 2"),
         ({"K": "[1 0;0 1]*[qd1;qd2]"}, "K: found 2 rows of 1; expected a number"),
         ({"g": "[1 2;3 4]*[1;2;]/[1 2]"}, "a division by a matrix"),
-        ({"g": "[1 2;3 4]^-1*[1;2]"}, "a power of a matrix that is no small whole number"),
+        ({"g": "[1 2;3 4]^-1*[1;2]"}, "a power of a matrix that is not a small whole number"),
         ({"g": "np.array([[1,0],[0,1]])*np.array([1,2])"}, "multiplies entry by entry; write @"),
         ({"g": "[1 0;0 1].*[1 2;3 4]"}, "multiplies entry by entry"),
         ({"M": "[1 0;0 1].^2 + [1 2;3 4]"}, "raises entry by entry"),

@@ -1,4 +1,4 @@
-"""Every notation means what a person means by it; what is no mathematics is refused with its place."""
+"""Every notation means what a person means by it; what is not mathematics is refused with its place."""
 
 import contextlib
 import math

@@ -265,7 +265,7 @@ def absolute(corpus):
 
 
 def in_numbers(corpus):
-    """Decimals: of truths with numbers in place of parameters, and of coefficients."""
+    """Decimals: of truths with numbers instead of parameters, and of coefficients."""
     rounded = ("correct within rounding", "correct")
     for robot, quantities in (
         ("pan_tilt", ("M", "h", "g")),

@@ -95,7 +95,7 @@ def wrong(robot, joint, formula, branch=0):
 
 
 def mistakes(judged, branch=0):
-    """Each mistake of a branch with its joint, from 0; None where it is no single joint's."""
+    """Each mistake of a branch with its joint, from 0; None where it is not a single joint's."""
     found = []
     for one in judged.diagnosis:
         place = one.where.split(", ")

@@ -1,4 +1,4 @@
-"""Letters are letters: one that is left out is no number, though its value is 1 or that of another letter."""
+"""Letters are letters: one that is left out is not a number, though its value is 1 or that of another letter."""
 
 import re
 

@@ -38,7 +38,7 @@ def rows(right=np.pi / 2, tilt=0.0):
 
 
 def test_angles_typed_with_few_digits_are_said():
-    """1.5708 is no right angle: axes 4 to 6 still meet, but joint 1's is off by 4e-6."""
+    """1.5708 is not a right angle: axes 4 to 6 still meet, but joint 1's is off by 4e-6."""
     words = Arm.from_dh(rows(1.5708)).family.words
     assert words.startswith("6R: no closed form known (nearly")
     assert "are its angles rounded? as_designed=True" in words

@@ -51,7 +51,7 @@ def test_obstacles_are_values():
         (lambda: Obstacle.box((1, -2, 1), (0, 0, 0)), "expected three positive numbers"),
         (lambda: Obstacle.box((1, 2, np.inf), (0, 0, 0)), "expected three positive numbers"),
         (lambda: Obstacle.box((1, 1, 1), (0, 0)), r"box: at is of shape \(2,\); expected a pose"),
-        (lambda: Obstacle.box((1, 1, 1), 2 * np.eye(4)), "box: at is no pose"),
+        (lambda: Obstacle.box((1, 1, 1), 2 * np.eye(4)), "box: at is not a pose"),
         (lambda: Obstacle.box((1, 1, 1), np.full((4, 4), np.nan)), "expected a pose"),
         (lambda: Obstacle.sphere(0, (0, 0, 0)), "sphere: radius is 0.0; expected a positive number, m"),
         (lambda: Obstacle.sphere((1, 2), (0, 0, 0)), "expected a positive number"),

@@ -59,7 +59,8 @@ def new_output(function: Callable[..., Any], inputs: Sequence[Array]) -> Array:
 
 def _into_out(quantity: str) -> Callable[[Workload], Task]:
     def setup(workload: Workload) -> Task:
-        function, inputs = method(workload.arm, quantity), workload.inputs(quantity)
+        function = method(workload.arm, quantity)
+        inputs = workload.inputs(quantity)
         if quantity == "ik" and workload.arm.family.fit is None:
             raise UnavailableError("arm.ik takes out= only where a closed form decides how many branches there are")
 
@@ -75,7 +76,8 @@ def _into_out(quantity: str) -> Callable[[Workload], Task]:
 
 def _into_new_arrays(quantity: str) -> Callable[[Workload], Task]:
     def setup(workload: Workload) -> Task:
-        function, inputs = method(workload.arm, quantity), workload.inputs(quantity)
+        function = method(workload.arm, quantity)
+        inputs = workload.inputs(quantity)
 
         def prepare(items: int) -> Callable[[], Any]:
             chosen = [x[:items] for x in inputs]
@@ -88,7 +90,8 @@ def _into_new_arrays(quantity: str) -> Callable[[Workload], Task]:
 
 def _single(quantity: str) -> Callable[[Workload], Task]:
     def setup(workload: Workload) -> Task:
-        function, inputs = method(workload.arm, quantity), workload.inputs(quantity)
+        function = method(workload.arm, quantity)
+        inputs = workload.inputs(quantity)
         items = list(zip(*inputs, strict=True))
         return Task(
             one_by_one(function, items),
@@ -114,7 +117,9 @@ def casadi_contenders() -> tuple[Contender, ...]:
 
 def _mapped(quantity: str) -> Callable[[Workload], Task]:
     def setup(workload: Workload) -> Task:
-        function, inputs, n = getattr(workload.arm.casadi, quantity), workload.inputs(quantity), workload.arm.n
+        function = getattr(workload.arm.casadi, quantity)
+        inputs = workload.inputs(quantity)
+        n = workload.arm.n
 
         def prepare(items: int) -> Call:
             mapped = function.map(items)

@@ -58,7 +58,8 @@ def _joint_jacobians(workload: Workload) -> Task:
 
 def _frame_jacobian(workload: Workload) -> Task:
     pin, model, tool = _model(workload)
-    data, axes = model.createData(), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    data = model.createData()
+    axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     compute = pin.computeFrameJacobian
 
     def prepare(items: int) -> Call:
@@ -78,7 +79,8 @@ def _algorithm(name: str, quantity: str) -> Callable[[Workload], Task]:
 
     def setup(workload: Workload) -> Task:
         pin, model, _ = _model(workload)
-        data, compute = model.createData(), getattr(pin, name)
+        data = model.createData()
+        compute = getattr(pin, name)
         states = list(zip(*workload.inputs(quantity), strict=True))
 
         def answer(state: tuple[Array, ...]) -> Array:
@@ -107,7 +109,8 @@ def _in_parallel(name: str, quantity: str) -> Callable[[Workload], Task]:
 
     def setup(workload: Workload) -> Task:
         pin, model, _ = _model(workload)
-        pool, compute = pin.ModelPool(model, workload.threads), getattr(pin, name)
+        pool = pin.ModelPool(model, workload.threads)
+        compute = getattr(pin, name)
         inputs = workload.inputs(quantity)
 
         def prepare(items: int) -> Call:

@@ -108,10 +108,12 @@ def toolbox_robot(description: Description) -> Any:
     UnavailableError
         The toolbox is not installed.
     """
-    toolbox, SE3 = import_peer("roboticstoolbox"), import_peer("spatialmath").SE3
+    toolbox = import_peer("roboticstoolbox")
+    SE3 = import_peer("spatialmath").SE3
     numbers = description.numbers
     ending = "DH" if description.convention is Convention.STANDARD else "MDH"
-    revolute, prismatic = getattr(toolbox, f"Revolute{ending}"), getattr(toolbox, f"Prismatic{ending}")
+    revolute = getattr(toolbox, f"Revolute{ending}")
+    prismatic = getattr(toolbox, f"Prismatic{ending}")
     links = []
     for i in range(description.n):
         shared: dict[str, Any] = {"a": float(numbers.a[i]), "alpha": float(numbers.alpha[i])}

@@ -42,7 +42,8 @@ def _solve(workload: Workload) -> Task:
 
 
 def _package_and_axes(workload: Workload) -> tuple[Any, JointAxes]:
-    package, axes = import_peer("ssik"), joint_axes(workload.arm.description)
+    package = import_peer("ssik")
+    axes = joint_axes(workload.arm.description)
     if workload.arm.n not in (6, 7):
         raise UnavailableError(f"takes 6 or 7 joints; this arm has {workload.arm.n}")
     return package, axes

@@ -17,7 +17,8 @@ def lagranges_equations(description: Description) -> Any:
     UnavailableError
         sympy is not installed.
     """
-    sympy, mechanics = import_peer("sympy"), import_peer("sympy.physics.mechanics")
+    sympy = import_peer("sympy")
+    mechanics = import_peer("sympy.physics.mechanics")
     numbers, n = description.numbers, description.n
 
     def exact(number: float) -> Any:
@@ -28,9 +29,12 @@ def lagranges_equations(description: Description) -> Any:
     world = mechanics.ReferenceFrame("N")
     origin = mechanics.Point("O")
     origin.set_vel(world, 0)
-    frame, point, bodies = world, origin, []
+    frame = world
+    point = origin
+    bodies = []
     for i in range(n):
-        moved, end = mechanics.ReferenceFrame(f"A{i + 1}"), mechanics.Point(f"P{i + 1}")
+        moved = mechanics.ReferenceFrame(f"A{i + 1}")
+        end = mechanics.Point(f"P{i + 1}")
         alpha = _angle(sympy, numbers.alpha[i])
         theta = _angle(sympy, numbers.theta[i]) + (0 if numbers.prismatic[i] else q[i])
         d = exact(numbers.d[i]) + (q[i] if numbers.prismatic[i] else 0)
@@ -56,7 +60,8 @@ def lagranges_equations(description: Description) -> Any:
         gravity = sum((exact(x) * axis for x, axis in zip(numbers.gravity, world, strict=True)), 0 * world.x)
         body.potential_energy = -mass * com.pos_from(origin).dot(gravity)
         bodies.append(body)
-        frame, point = moved, end
+        frame = moved
+        point = end
     method = mechanics.LagrangesMethod(mechanics.Lagrangian(world, *bodies), q)
     method.form_lagranges_equations()
     return method

@@ -34,7 +34,7 @@ def from_mathematica(tokens: Sequence[Token], text: str) -> list[Token]:
     Raises
     ------
     AnswerError
-        Brackets that do not match, a derivative other than by t, or a subscript that is no name.
+        Brackets that do not match, a derivative other than by t, or a subscript that is not a name.
     """
     tokens = replace_runs(tokens, partial(_letter, tokens))
     tokens = replace_runs(tokens, partial(_exponent, tokens))
@@ -46,7 +46,8 @@ def _letter(tokens: Sequence[Token], k: int) -> tuple[list[Token], int] | None:
     r"""Read \[Theta]1 as theta1."""
     if not begins_with(tokens, k, "\\", "[") or not begins_with(tokens, k + 3, "]"):
         return None
-    letter, end = tokens[k + 2].text.lower(), k + 4
+    letter = tokens[k + 2].text.lower()
+    end = k + 4
     if end < len(tokens) and tokens[end].kind == "number" and tokens[end].at == tokens[end - 1].at + 1:
         letter += tokens[end].text
         end += 1
@@ -81,10 +82,11 @@ def _name(tokens: Sequence[Token], k: int, closing: Mapping[int, int], text: str
         case "Subscript":
             parts = [part.text for part in tokens[k + 2 : end] if part.text != ","]
             if not parts or not all(part.isalnum() for part in parts):
-                fail(text, token.at, "a subscript that is no name")
+                fail(text, token.at, "a subscript that is not a name")
             return [Token("name", "".join(parts), token.at)], end + 1
         case "ArcTan" if comma := _only_comma(tokens, k + 1, end):  # the cosine comes first
-            x, y = from_mathematica(tokens[k + 2 : comma], text), from_mathematica(tokens[comma + 1 : end], text)
+            x = from_mathematica(tokens[k + 2 : comma], text)
+            y = from_mathematica(tokens[comma + 1 : end], text)
             arguments = [sign("(", token.at), *y, tokens[comma], *x, sign(")", tokens[end].at)]
             return [Token("name", "atan2", token.at), *arguments], end + 1
     return None
@@ -115,7 +117,9 @@ def _only_comma(tokens: Sequence[Token], start: int, end: int) -> int:
 
 def _derivative(tokens: Sequence[Token], k: int, closing: Mapping[int, int], text: str) -> tuple[list[Token], int]:
     """Read Derivative[1][q1][t]."""
-    order, second, at = tokens[k + 2].text, closing[k + 1] + 1, tokens[k].at
+    order = tokens[k + 2].text
+    second = closing[k + 1] + 1
+    at = tokens[k].at
     if order not in ("1", "2") or not begins_with(tokens, second, "["):
         fail(text, at, "a derivative other than by t")
     end = closing[second] + 1
@@ -131,7 +135,8 @@ def _with_plain_brackets(tokens: list[Token], text: str) -> list[Token]:
         is_call = tokens[start].text == "[" and (before.kind in ("name", "function") or before.text == "'")
         is_time = begins_with(tokens, start, "{", "t")
         pair = "()" if is_call or is_time or tokens[start].text == "(" else "[]"
-        result[start], result[end] = sign(pair[0], tokens[start].at), sign(pair[1], tokens[end].at)
+        result[start] = sign(pair[0], tokens[start].at)
+        result[end] = sign(pair[1], tokens[end].at)
     return result
 
 

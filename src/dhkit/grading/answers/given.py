@@ -277,7 +277,7 @@ def _without_name(target: Target, text: str, names: QuantityNames) -> str | Chai
     if not statement.formulas:
         return text
     if not statement.targets:
-        raise AnswerError(f"{quote(text)}: begins with {quote(statement.formulas[0])}, which is no name of {target}")
+        raise AnswerError(f"{quote(text)}: begins with {quote(statement.formulas[0])}, which is not a name of {target}")
     for name in statement.targets:
         if not _may_stand_for(name, target, names):
             raise AnswerError(f"{quote(text)}: states {name}, and stands where {target} is expected")
@@ -324,7 +324,7 @@ def _entry(target: Target, value: Answer, vocabulary: Vocabulary, names: Quantit
 def _chained(sides: Sequence[Sequence[Given]]) -> tuple[Given, ...]:
     """Return the entries of a chain's last side, each with those of the sides before it that can be read.
 
-    K = q'^T M q'/2 = ... begins with a side that is no formula of the robot's names; the last side is the answer.
+    K = q'^T M q'/2 = ... begins with a side that is not a formula of the robot's names; the last side is the answer.
     """
     chained = []
     for *earlier, last in zip(*sides, strict=True):

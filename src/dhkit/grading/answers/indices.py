@@ -21,7 +21,8 @@ def first_index(texts: Iterable[str], vocabulary: Vocabulary) -> int | None:
     It is 0 where a 0 occurs, 1 in Maple's ``theta[1](t)`` or where an index has a meaning only so, and
     otherwise 0 in Python's and C's notation: ``**``, ``np.cos``, ``pow``.
     """
-    is_one, is_python = False, False
+    is_one = False
+    is_python = False
     for text in texts:
         for name, index, of_time in _SQUARE.findall(text):
             from_zero, from_one = _readings(name, int(index), vocabulary)
@@ -48,7 +49,8 @@ def without_indices(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) 
         name, *behind = tokens[k : k + 4]
         if name.kind != "name" or len(behind) != 3 or behind[1].kind != "number" or not behind[1].text.isdecimal():
             return None
-        whole, index = "", int(behind[1].text[:4])
+        whole = ""
+        index = int(behind[1].text[:4])
         match [token.text for token in behind if token.kind == "sign"]:
             case ["(", ")"]:
                 whole = _in_round_brackets(name, index, vocabulary, text)
@@ -61,7 +63,8 @@ def without_indices(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) 
 
 def _readings(name: str, index: int, vocabulary: Vocabulary) -> tuple[str, str]:
     """Return the names that an index makes, counted from 0 and from 1; empty where it makes none."""
-    from_zero, from_one = f"{plain_name(name)}{index + 1}", f"{plain_name(name)}{index}"
+    from_zero = f"{plain_name(name)}{index + 1}"
+    from_one = f"{plain_name(name)}{index}"
     return from_zero if vocabulary.knows(from_zero) else "", from_one if vocabulary.knows(from_one) else ""
 
 

@@ -86,7 +86,7 @@ class GivenStep:
 def given_steps(steps: Sequence[InverseStep], vocabulary: Vocabulary) -> list[GivenStep]:
     """Return the steps of a sheet; one that cannot be read says why.
 
-    An equation ``D = ...`` of a name that is no joint's defines it, for its own step and those behind; ``r^2 = ...``
+    An equation ``D = ...`` of a name that is not a joint's defines it, for its own step and those behind; ``r^2 = ...``
     defines the length r. A name with two signs, ``S = ±sqrt(1 - D^2)``, holds for its own step.
     """
     given: list[GivenStep] = []
@@ -135,7 +135,8 @@ class _Reading:
         """Functions of the joint that an equation gives, cos(q2) = D, and what they are equal to with each sign."""
 
     def step(self, step: InverseStep, text: str) -> GivenStep:
-        equations, solutions = list[tuple[Tree, Tree]](), list[Tree]()
+        equations = list[tuple[Tree, Tree]]()
+        solutions = list[Tree]()
         self.has_solutions = bool(step.solutions)
         for equation in step.equations:
             for left, right in self._equations(self._plain(equation)):
@@ -188,7 +189,7 @@ class _Reading:
                 return
 
     def _with_values(self, tree: Tree, sign: str) -> Tree:
-        """Return a tree with the values that equations give in place of functions of the joint."""
+        """Return a tree with the values that equations give instead of functions of the joint."""
         for function, values in self.sides:
             places = equal_parts([function, tree])[id(function)]
             tree = replaced_everywhere(tree, places, values[sign])
@@ -217,7 +218,8 @@ class _Reading:
         A length is positive, and an angle of a triangle between 0 and pi; that of a quotient is in the quadrant of its
         numerator and denominator.
         """
-        square, function = _SQUARE_OF_NAME.match(left), _FUNCTION_OF_NAME.match(left)
+        square = _SQUARE_OF_NAME.match(left)
+        function = _FUNCTION_OF_NAME.match(left)
         if square and self._new_name(square[1]):
             self._define(square[1], f"sqrt({right})")
         elif function and function[1] == "cos" and self._new_name(function[2]):
@@ -324,7 +326,7 @@ def _is_name(tree: Tree, text: str) -> bool:
 
 
 def _without_squared_roots(tree: Tree) -> Tree:
-    """Return a formula with X in place of sqrt(X)^2: r is a root where r^2 = X is given."""
+    """Return a formula with X instead of sqrt(X)^2: r is a root where r^2 = X is given."""
     tree = with_operands(tree, [_without_squared_roots(child) for child in operands(tree)])
     match tree:
         case Power(Call("sqrt", (radicand,)), Number(value)) if value == 2:
@@ -351,7 +353,9 @@ def _with_sign(text: str, sign: str) -> str:
 
 def _parts(text: str, separator: re.Pattern[str]) -> list[str]:
     """Return the parts of a text between separators outside brackets."""
-    depth, begin, parts = 0, 0, []
+    depth = 0
+    begin = 0
+    parts = []
     for at, character in enumerate(text):
         depth += nesting(character)
         if depth == 0 and at >= begin and (match := separator.match(text, at)):

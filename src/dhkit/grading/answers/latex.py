@@ -21,7 +21,7 @@ from dhkit.symbolic.equations.latex_names import GREEK as LETTERS
 
 _PIECE = re.compile(r"\s*(?:\\([A-Za-z]+|.)|(\d+\.?\d*|\.\d+)|([A-Za-z]+)|(\S))", re.ASCII | re.DOTALL)
 _MIXED = re.compile(r"(?<![\w.{^])(\d+)\s*$", re.ASCII)
-"""A number in front of a fraction, which is no subscript or exponent."""
+"""A number in front of a fraction, which is not a subscript or exponent."""
 SPACE_NAMES = word_set(
     "quad qquad displaystyle textstyle limits nolimits nonumber notag thinspace enspace space middle it rm bf sf"
 )
@@ -66,7 +66,7 @@ def latex_tokens(text: str, knows: Callable[[str], bool]) -> list[Token]:
     Raises
     ------
     AnswerError
-        A macro that is no mathematics, or brackets that do not match.
+        A macro that is not mathematics, or brackets that do not match.
     """
     return _LatexReader(text, knows).tokens()
 
@@ -123,7 +123,8 @@ class _LatexReader:
         if len(places) > 1:
             fail(self.text, tokens[places[1]].at, "two \\over in one group")
         at = tokens[places[0]].at
-        above, below = tokens[: places[0]], tokens[places[0] + 1 :]
+        above = tokens[: places[0]]
+        below = tokens[places[0] + 1 :]
         return self._fraction(in_brackets(above, at), in_brackets(below, at), at)
 
     def _item(self, piece: re.Match[str]) -> list[Token]:
@@ -228,7 +229,7 @@ class _LatexReader:
         inner = self._argument(at)
         word = "".join({"+": "p", "-": "m", ",": ""}.get(token.text, token.text) for token in inner)
         if not re.fullmatch(r"\w*", word, re.ASCII):
-            fail(self.text, at, "a subscript that is no name")
+            fail(self.text, at, "a subscript that is not a name")
         return word
 
     # Macros
@@ -289,7 +290,7 @@ class _LatexReader:
         r"""Read \frac{d}{d t} \theta_{1}{\left(t \right)}, as sympy prints it, and \frac{d (5 \theta_1)}{dt}."""
         inner = _without_d(above, order)
         if inner is None:
-            fail(self.text, at, "a fraction over dt that is no derivative by t")
+            fail(self.text, at, "a fraction over dt that is not a derivative by t")
         return derivative_by_time(inner or self._operand_of_derivative(at), order, at)
 
     def _operand_of_derivative(self, at: int) -> list[Token]:
@@ -308,7 +309,7 @@ class _LatexReader:
         return tokens
 
     def _one_item(self) -> list[Token]:
-        """Read one thing that is no space; nothing at the end of a group."""
+        """Read one thing that is not a space; nothing at the end of a group."""
         while (piece := self._peek()) is not None and piece[4] != "}":
             if item := self._item(piece):
                 return item
@@ -340,7 +341,7 @@ class _LatexReader:
         r"""Read \dot\theta_1, \dot{\theta}_1 and \dot{\theta_1}."""
         inner = self._argument(at)
         if len(inner) != 1 or inner[0].kind != "name":
-            fail(self.text, at, "dots on something that is no name")
+            fail(self.text, at, "dots on something that is not a name")
         return self._name(rate_name(inner[0].text, dots), at, bare)
 
     def _upright(self, at: int, bare: bool) -> list[Token]:
@@ -358,7 +359,7 @@ class _LatexReader:
     def _environment(self, name: str, at: int) -> list[Token]:
         match = re.compile(r"\s*\{(\w+)\*?\}(?:\{[clr|]*\})?", re.ASCII).match(self.text, self.at)
         if match is None or match[1] not in _MATRICES:
-            fail(self.text, at, "an environment that is no matrix")
+            fail(self.text, at, "an environment that is not a matrix")
         self.at = match.end()
         return [sign("[" if name == "begin" else "]", at)]
 

@@ -145,7 +145,8 @@ def _with_column_brackets(tokens: list[Token], text: str) -> list[Token]:
     end = max((k for k, token in enumerate(tokens) if token.text == ">"), default=-1)
     if end < start:
         return tokens
-    first, last = tokens[start].at, tokens[end].at
+    first = tokens[start].at
+    last = tokens[end].at
     column = [token for row in _split(tokens[start + 1 : end], (",",), text) for token in (sign(";", first), *row)]
     return [*tokens[:start], sign("[", first), *column[1:], sign("]", last), *tokens[end + 1 :]]
 
@@ -190,7 +191,8 @@ def _with_diagonal(tokens: list[Token], text: str) -> list[Token]:
     k = next((k for k in range(len(tokens)) if begins_with(tokens, k, "diag", "(")), None)
     if k is None:
         return tokens
-    at, end = tokens[k].at, closing_bracket(tokens, k + 1)
+    at = tokens[k].at
+    end = closing_bracket(tokens, k + 1)
     inner = _strip(tokens[k + 2 : end])
     if inner and inner[0].text == "[" and inner[-1].text == "]":
         entries = [entry for row in _rows(inner, text) for entry in row]
@@ -215,16 +217,21 @@ def _factors(before: list[Token], after: list[Token], text: str) -> tuple[list[T
     AnswerError
         Anything but factors: a power of a matrix is not that of its entries.
     """
-    is_transposed, start, end = False, 0, len(before)
+    is_transposed = False
+    start = 0
+    end = len(before)
     while True:
         transpose = next((texts for texts in TRANSPOSES if begins_with(after, start, *texts)), None)
         if transpose is not None:
-            is_transposed, start = not is_transposed, start + len(transpose)
+            is_transposed = not is_transposed
+            start = start + len(transpose)
         elif end and before[end - 1].text == "(" and begins_with(after, start, ")"):
-            start, end = start + 1, end - 1
+            start = start + 1
+            end = end - 1
         else:
             break
-    before, after = before[:end], after[start:]
+    before = before[:end]
+    after = after[start:]
     if after and after[0].kind == "sign" and after[0].text not in ("*", "/", "+", "-", "(", ".*", "./", "\\,"):
         fail(text, after[0].at, f"{after[0].text!r} behind a matrix, which is not read,")
     if before and before[-1].text in ("^", "/", ".", "./"):
@@ -239,12 +246,14 @@ def _factors(before: list[Token], after: list[Token], text: str) -> tuple[list[T
 
 def _strip(tokens: list[Token]) -> list[Token]:
     """Take round brackets around a row away, and signs behind it."""
-    start, end = 0, len(tokens)
+    start = 0
+    end = len(tokens)
     while start < end:
         if tokens[end - 1].text in (";", ",", "."):
             end -= 1
         elif tokens[start].text == "(" and closing_bracket(tokens[:end], start) == end - 1:
-            start, end = start + 1, end - 1
+            start = start + 1
+            end = end - 1
         else:
             break
     return tokens[start:end]

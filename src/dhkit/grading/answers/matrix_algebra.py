@@ -50,7 +50,9 @@ def is_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_names
         tokens, _ = matrix_tokens(text, vocabulary)
     except AnswerError:
         return False
-    outermost, is_power, k = 0, False, 0
+    outermost = 0
+    is_power = False
+    k = 0
     while k < len(tokens):
         if _is_named_matrix(tokens, k, matrix_of):
             return True
@@ -231,11 +233,13 @@ class _Reader:
                     or not power.text.isdecimal()
                     or not 1 <= int(power.text[:3]) <= BOUNDS.matrix_power
                 ):
-                    fail(self.text, tokens[k].at, "a power of a matrix that is no small whole number")
-                base, result = value, value
+                    fail(self.text, tokens[k].at, "a power of a matrix that is not a small whole number")
+                base = value
+                result = value
                 for _ in range(int(power.text) - 1):
                     result = self._times(result, base) or result
-                value, k = result, k + 2
+                value = result
+                k = k + 2
             else:
                 break
         return value, k

@@ -119,7 +119,7 @@ def _decimal(value: float) -> Tree:
         Not finite.
     """
     if not math.isfinite(value):
-        raise AnswerError(f"{value} is no number")
+        raise AnswerError(f"{value} is not a number")
     text = f"{abs(value):.15g}"
     number = Number(Fraction(text), text, 0)
     return number if value >= 0 else Sum(((False, number),))

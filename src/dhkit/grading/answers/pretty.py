@@ -125,14 +125,16 @@ class _Block:
         top = next((row for row, line in enumerate(self.lines) if line[column] in _TALL_BRACKETS), None)
         if top is None:
             return None
-        line, hook = self.lines[top], self.lines[top][column]
+        line = self.lines[top]
+        hook = self.lines[top][column]
         middle, foot, *side = list(_TALL_BRACKETS[hook])
         bottom = top + 1
         while bottom < len(self.lines) and self.lines[bottom][column] == middle:
             bottom += 1
         if bottom == len(self.lines) or self.lines[bottom][column] != foot:
             raise _LostError("a tall bracket without its foot")
-        depth, end = 0, column
+        depth = 0
+        end = column
         for end in range(column, len(line)):
             depth += (line[end] == hook) - (line[end] == side[0])
             if depth == 0:
@@ -155,10 +157,12 @@ class _Block:
         if not bars:
             return None
         end, row = max(bars)
-        above, below = self.part(slice(row), slice(column, end)), self.part(slice(row + 1, None), slice(column, end))
+        above = self.part(slice(row), slice(column, end))
+        below = self.part(slice(row + 1, None), slice(column, end))
         if not any(line.strip() for line in above.lines) or not any(line.strip() for line in below.lines):
             raise _LostError("a bar without a numerator or a denominator")
-        top, bottom = above.text(), below.text()
+        top = above.text()
+        bottom = below.text()
         return end, f"{top}/{bottom}" if (top, bottom) in _DERIVATIVES else f"(({top})/({bottom}))", [row]
 
     def matrix(self) -> str:

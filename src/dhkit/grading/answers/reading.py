@@ -88,7 +88,8 @@ def _refuse_lines_apart(text: str) -> None:
     if "\n" not in text or is_latex(text) or is_mathematica(text):
         return
     plain = re.sub(r"\s*\n\s*", "\n", _COMMENT.sub("", text).strip())
-    depth, joined = 0, {match.start() + match[0].index("\n") for match in _JOINED.finditer(plain)}
+    depth = 0
+    joined = {match.start() + match[0].index("\n") for match in _JOINED.finditer(plain)}
     for at, character in enumerate(plain):
         depth += nesting(character)
         is_apart = character == "\n" and depth <= 0 and at not in joined

@@ -160,10 +160,13 @@ class _Rewriting:
 
     def _fraction_by_time(self, tokens: Sequence[Token], k: int) -> tuple[list[Token], int] | None:
         """Return the derivative that begins with the d at k, and where it ends; None where there is none."""
-        token, order, at = tokens[k], 1, k + 1
+        token = tokens[k]
+        order = 1
+        at = k + 1
         if token.text == "d":
             square = next((len(square) for square in _SQUARED if begins_with(tokens, at, *square)), 0)
-            order, at = 1 + bool(square), at + square
+            order = 1 + bool(square)
+            at = at + square
             if end := _end_of_over_time(tokens, at, order):
                 stop = self._operand(tokens, end)
                 self._refuse_unclear_end(tokens, k, end, stop)
@@ -174,7 +177,8 @@ class _Rewriting:
         squared = re.fullmatch(r"d[2d](\w+)", token.text, re.ASCII)
         if squared and self.vocabulary.is_position(squared[1]) and begins_with(tokens, k + 1, "/", "dt2"):
             return derivative_by_time([Token("name", squared[1], token.at)], 2, token.at), k + 3
-        name, end = token.text[1:], _end_of_over_time(tokens, k + 1, 1)
+        name = token.text[1:]
+        end = _end_of_over_time(tokens, k + 1, 1)
         if end and self.vocabulary.is_state(name):
             return derivative_by_time([Token("name", name, token.at)], 1, token.at), end
         return None
@@ -218,8 +222,9 @@ class _Rewriting:
         return plain
 
     def _refuse_shorthand(self, tokens: Sequence[Token], k: int) -> None:
-        """Refuse c (...) where c is a parameter or the cosine, c W where W is no angle, and q1(0)."""
-        name, vocabulary = tokens[k].text, self.vocabulary
+        """Refuse c (...) where c is a parameter or the cosine, c W where W is not an angle, and q1(0)."""
+        name = tokens[k].text
+        vocabulary = self.vocabulary
         behind = [token.text for token in tokens[k + 1 : k + 4]]
         is_exact = vocabulary.is_exactly(name)
         if name in FUNCTION_NAMES and is_exact and behind[:1] == ["("]:
@@ -227,7 +232,7 @@ class _Rewriting:
             self._fail(tokens[k], problem)
         is_shorthand = name in _SHORTHAND and not is_exact and k + 1 < len(tokens) and tokens[k + 1].kind == "name"
         if is_shorthand and not vocabulary.is_position(behind[0]) and vocabulary.is_exactly(behind[0]):
-            self._fail(tokens[k], f"{name} before {behind[0][:40]}, which is no angle,")
+            self._fail(tokens[k], f"{name} before {behind[0][:40]}, which is not an angle,")
         is_number_in_brackets = len(behind) == 3 and behind[0] == "(" and behind[2] == ")" and behind[1].isdecimal()
         if vocabulary.is_state(name) and is_number_in_brackets:
             self._fail(tokens[k], f"{name}({behind[1][:20]}) may be a value at a time, or a product; write which")
@@ -250,7 +255,8 @@ class _Rewriting:
 
     def _split(self, token: Token, is_called: bool) -> list[Token]:
         """Read names that are run together: m2l1, sintheta1, and in front of a bracket l2cos."""
-        vocabulary, at = self.vocabulary, token.at
+        vocabulary = self.vocabulary
+        at = token.at
         name = plain_name(token.text)
         for function in _TRIGONOMETRIC:
             if is_called and name.endswith(function):
@@ -278,16 +284,21 @@ class _Rewriting:
 
     def _function(self, tokens: Sequence[Token], k: int) -> tuple[list[Token], int]:
         """Return the call of the function at k, and where it ends."""
-        token, name, start = tokens[k], tokens[k].text, k + 1
+        token = tokens[k]
+        name = tokens[k].text
+        start = k + 1
         power: list[Token] = []
         if begins_with(tokens, start, "^"):
             end = self._operand(tokens, start + 1)
-            power, start = list(tokens[start:end]), end
+            power = list(tokens[start:end])
+            start = end
             if "".join(x.text for x in power).strip("^()") == "-1":
                 if name in ("sec", "csc", "cot"):
                     self._fail(token, f"{name}^-1 may be the inverse function or 1/{name}")
                 if name in _TRIGONOMETRIC:
-                    name, power = f"a{name}", []  # cos^-1 is the arc cosine
+                    # cos^-1 is the arc cosine
+                    name = f"a{name}"
+                    power = []
         end = self._operand(tokens, start, is_product=True)
         if name == "sqrt" and end - start > 1 and tokens[start].kind == "number":
             both = " ".join(x.text for x in tokens[start:end])

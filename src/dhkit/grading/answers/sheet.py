@@ -139,7 +139,7 @@ def read_sheet(path: Path) -> AnswerSheet:
     Raises
     ------
     AnswerError
-        A file that cannot be read, or is no answer sheet; with the file, the key, what was found and expected.
+        A file that cannot be read, or is not an answer sheet; with the file, the key, what was found and expected.
     """
     return _read(path, "an answer sheet", lambda data: sheet_of(data, str(path)))
 
@@ -150,7 +150,7 @@ def read_task(path: Path) -> AnswerSheet:
     Raises
     ------
     AnswerError
-        A file that cannot be read, or is no task; with the file, the key, what was found and expected.
+        A file that cannot be read, or is not a task; with the file, the key, what was found and expected.
     """
     return _read(path, "a task", lambda data: _sheet(data, _Checker(str(path)), KEYS["task file"]))
 
@@ -202,8 +202,10 @@ def _sheet(data: Mapping[str, object], checker: _Checker, known: Sequence[str]) 
     if data.get("format", FORMAT) != FORMAT:
         raise checker.error("format", data["format"], str(FORMAT))
     answers = checker.table(data, "answer", "")
-    names, task = checker.table(data, "names", ""), checker.table(data, "task", "")
-    table, inverse = checker.table(answers, "dh", "answer."), checker.table(answers, "ik", "answer.")
+    names = checker.table(data, "names", "")
+    task = checker.table(data, "task", "")
+    table = checker.table(answers, "dh", "answer.")
+    inverse = checker.table(answers, "ik", "answer.")
     return AnswerSheet(
         checker.text(data, "robot", ""),
         _names(checker, names),

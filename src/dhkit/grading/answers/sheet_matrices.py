@@ -25,7 +25,7 @@ class SheetMatrices:
     answers
         The sheet's answers by quantity.
     vocabulary
-        What names mean; a name that has a meaning of its own is no matrix.
+        What names mean; a name that has a meaning of its own is not a matrix.
     names
         Which names stand for quantities.
     """
@@ -41,8 +41,9 @@ class SheetMatrices:
         return lambda name: self._matrix(name, quantities)
 
     def _matrix(self, name: str, unknown: tuple[str, ...]) -> Rows | None:
-        vocabulary, quantity = self.vocabulary, self.names.quantity(name)
-        # G is taken for a parameter g only where it is no answer.
+        vocabulary = self.vocabulary
+        quantity = self.names.quantity(name)
+        # G is taken for a parameter g only where it is not an answer.
         is_answer = quantity and quantity in self.answers and not vocabulary.is_own(plain_name(name))
         if vocabulary.knows(name) and not is_answer:
             return None

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Refusal:
-    """Stands in place of a text that a program or a document assigns and that is not to be judged.
+    """Stands instead of a text that a program or a document assigns and that is not to be judged.
 
     Attributes
     ----------

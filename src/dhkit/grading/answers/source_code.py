@@ -43,7 +43,7 @@ def source_code(path: Path) -> SourceCode:
     Raises
     ------
     AnswerError
-        A file that cannot be read, is no notebook, or is too long.
+        A file that cannot be read, is not a notebook, or is too long.
     """
     code = SourceCode(read_text(path, "a program or a paper"), path.suffix.lower(), "line {}".format)
     if code.suffix == ".ipynb":

@@ -77,9 +77,11 @@ def to_ascii(text: str) -> tuple[str, list[int]]:
     places: list[int] = []
     before_raised = False
     for at, character in enumerate(unicodedata.normalize("NFD", text)):
-        piece, raised = character, character in _RAISED
+        piece = character
+        raised = character in _RAISED
         if character in _VULGAR_FRACTIONS and pieces and pieces[-1][-1:].isdigit():
-            whole, part = pieces[-1][-1], _ASCII_TEXTS[character]
+            whole = pieces[-1][-1]
+            part = _ASCII_TEXTS[character]
             fail(text, at, f"{whole}{character} may be {whole} + {part} or {whole}*{part}; write one of them")
         if raised:
             piece = ("" if before_raised else "^") + _RAISED[character]
@@ -109,7 +111,8 @@ def split_tokens(text: str, places: list[int], original: str, allowed: str = "")
         A character that no formula has.
     """
     tokens: list[Token] = []
-    at, end = 0, len(text.rstrip())
+    at = 0
+    end = len(text.rstrip())
     while at < end:
         if match := _TOKEN.match(text, at):
             group = match.lastindex or 1

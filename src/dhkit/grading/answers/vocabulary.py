@@ -152,7 +152,7 @@ class Vocabulary:
         return plain_name(name) in self.aliases
 
     def redefine(self, name: str, meaning: Meaning) -> None:
-        """Give a name a meaning in place of any other."""
+        """Give a name a meaning instead of any other."""
         self.aliases.discard(plain_name(name))
         self.refused.pop(plain_name(name), None)
         self.own[plain_name(name)] = meaning

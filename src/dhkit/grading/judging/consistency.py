@@ -55,7 +55,8 @@ class Consistency:
                 continue
             if not any(self.judged[name].wrong for name in (quantity, *given)):
                 continue
-            own, expected = self.own(quantity), self.derived(quantity)
+            own = self.own(quantity)
+            expected = self.derived(quantity)
             if own is None or expected is None:
                 continue
             agrees = all((a - b).is_zero for a, b in zip(own.flat, expected.flat, strict=True))
@@ -119,7 +120,8 @@ def _gradient(parts: Consistency, V: Elements) -> Elements:
 
 def _hessian(parts: Consistency, K: Elements) -> Elements:
     """Return the second derivatives of K by the rates."""
-    by, n = parts.truth.coordinates.by_rate, parts.n
+    by = parts.truth.coordinates.by_rate
+    n = parts.n
     energy: Element = K.item()
     momenta = [by(energy, i) for i in range(n)]
     return np.array([[by(p, j) for j in range(n)] for p in momenta], dtype=object).reshape(n, n)
@@ -127,7 +129,8 @@ def _hessian(parts: Consistency, K: Elements) -> Elements:
 
 def _velocity_torques(parts: Consistency, M: Elements) -> Elements:
     """Return dM/dt qd - d(qd^T M qd / 2)/dq."""
-    rates, by = parts.rates(Ring.rate), parts.truth.coordinates.by_position
+    rates = parts.rates(Ring.rate)
+    by = parts.truth.coordinates.by_position
     momenta = M @ rates
     K = rates @ momenta / 2
     ring = parts.truth.lagrangian.arm.ring
@@ -155,7 +158,8 @@ def _product(parts: Consistency, *links: Elements) -> Elements:
 
 def _jacobian(parts: Consistency, T: Elements) -> Elements:
     """Return the derivatives of T's origin by the variables, and the axes of dR/dq R^T, shape (6, n)."""
-    by, columns = parts.truth.coordinates.by_position, []
+    by = parts.truth.coordinates.by_position
+    columns = []
     for i in range(parts.n):
         rate = np.array([[by(entry, i) for entry in row] for row in T[:3]], dtype=object)
         turn = rate[:, :3] @ T[:3, :3].T

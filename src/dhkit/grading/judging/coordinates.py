@@ -85,7 +85,8 @@ class Coordinates:
         """Return an element with the joints' rates and accelerations replaced by the variables', for printing."""
         if self.is_relative:
             return element
-        ring, places = element.ring, dict[int, Element]()
+        ring = element.ring
+        places = dict[int, Element]()
         for kind, generator in (("rate", ring.rate), ("acceleration", ring.acceleration)):
             own = self.B @ np.array([generator(i) for i in range(ring.n)], dtype=object)
             places |= {ring.place(kind, i): x for i, x in enumerate(own)}

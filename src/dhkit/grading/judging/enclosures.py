@@ -79,13 +79,15 @@ def enclosed(
     for digits in PRECISIONS:
         if digits > PRECISIONS[0] and parts * digits > BOUNDS.enclosure_work:
             break
-        iv, previous = mpmath.iv, mpmath.iv.dps
+        iv = mpmath.iv
+        previous = mpmath.iv.dps
         iv.dps = digits
         try:
             numbers = {**_units(digits), **{name: iv.mpf(x) for name, x in values.items() if name in used}}
             interval = Evaluation(numbers, partial(_rational, digits=digits), _functions(), _power, _divide).of(tree)
             with mpmath.workdps(digits):
-                middle, width = mpmath.mpf(interval.mid), mpmath.mpf(interval.delta.b)
+                middle = mpmath.mpf(interval.mid)
+                width = mpmath.mpf(interval.delta.b)
             allowed = max(tolerance, abs(middle) * mpmath.mpf(10) ** -RELATIVE_DIGITS) if relative else tolerance
             if mpmath.isfinite(width) and width <= allowed:
                 return middle, digits

@@ -185,7 +185,8 @@ def _difference_texts(
             return plain_text(difference), ""
         short = readable(arm, difference)
         return plain_text(short), latex_text(short)
-    numerator, denominator = answer.numerator_of_difference(truth), answer.denominator
+    numerator = answer.numerator_of_difference(truth)
+    denominator = answer.denominator
     if max(len(numerator), len(denominator)) > BOUNDS.written_terms:
         return None, ""
     numerator, denominator = readable(arm, numerator), readable(arm, denominator)
@@ -206,7 +207,8 @@ def _find_witness(tree: Tree, truth: Element, by: Comparison) -> Witness | None:
 
     All numbers are in SI units and rad.
     """
-    arm, rng = by.arm, np.random.default_rng(7)
+    arm = by.arm
+    rng = np.random.default_rng(7)
     best: tuple[float, Witness] | None = None
     used = names_of(tree) | names_in(truth)
     for k in range(_WITNESS_TRIALS):
@@ -294,7 +296,8 @@ def _first_difference(
     """Return the finding at the first state where answer and truth differ; if none does, the number of states tried."""
     used = names_of(tree) | names_in(truth)
     shift: Any = 0
-    work, constants = 0, list[Tree]()
+    work = 0
+    constants = list[Tree]()
 
     def differs(state: sampling.Sample, value: Any, right: Any, why: str) -> Finding:
         shown = {name: float(x) for name, x in state.names.items() if name in used}

@@ -44,7 +44,8 @@ def judge_function(name: str, function: Callable[..., object], truth: Truth, see
     AnswerError
         The function takes other arguments, fails, hangs, ends its process, or returns another shape.
     """
-    n, shape = truth.description.n, shape_of(name, truth.description.n)
+    n = truth.description.n
+    shape = shape_of(name, truth.description.n)
     count = _argument_count(name, function)
     rng = np.random.default_rng(seed)
     y = [_random_states(rng, n) for _ in _STATES]
@@ -77,7 +78,8 @@ def judge_sampled(name: str, answer: SampledAnswer, truth: Truth, seed: int = 0)
     AnswerError
         It fails, or returns another shape.
     """
-    arm, n = truth.arm(name), truth.description.n
+    arm = truth.arm(name)
+    n = truth.description.n
     shape = shape_of(name, n)
     right = truth.of("h" if name == "C" else name)
     varied = answer.parameters & arm.parameters.keys()
@@ -99,7 +101,7 @@ def judge_sampled(name: str, answer: SampledAnswer, truth: Truth, seed: int = 0)
 
 
 def _own_state(names: Mapping[str, Any], inverse: Array, n: int) -> dict[str, float]:
-    """Return a state with the student's joint variables in place of the robot's."""
+    """Return a state with the student's joint variables instead of the robot's."""
     state = {name: float(value) for name, value in names.items()}
     for kind in _STATES:
         own = inverse @ np.array([state[f"{kind}{i + 1}"] for i in range(n)])
@@ -207,7 +209,8 @@ def _finding(
         return Finding(verdict, statement)
     gap = np.moveaxis(np.abs(values - expected), 0, -1)[place]
     worst = int(np.argmax(np.where(np.isfinite(gap), gap, np.inf)))
-    answer, right = float(values[(worst, *place)]), float(expected[(worst, *place)])
+    answer = float(values[(worst, *place)])
+    right = float(expected[(worst, *place)])
     witness = Witness(dict(state_of(worst)), answer if np.isfinite(answer) else None, right)
     share = f"{int(differs.sum())} of {_SAMPLES} random states show it"
     return Finding(Verdict.WRONG, share, witness=witness)

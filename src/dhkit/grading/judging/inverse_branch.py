@@ -66,7 +66,8 @@ class Branch:
     @cached_property
     def q(self) -> Array:
         """Joint values by the formulas, shape (S, n), rad and m; NaN where they have no value."""
-        values, columns = dict(self.poses.values), np.empty((len(self.poses.T), self.n))
+        values = dict(self.poses.values)
+        columns = np.empty((len(self.poses.T), self.n))
         for k in self.order:
             columns[:, k] = values[f"q{k + 1}"] = self.repaired(k, doubles(self.trees[k], values))
         return columns

@@ -100,7 +100,7 @@ class Lengths:
     parameters
         Names of the robot's parameters.
     trees
-        Possible missing offsets: parameters, and those lengths of table, base and tool that are no parameters; m.
+        Possible missing offsets: parameters, and those lengths of table, base and tool that are not parameters; m.
     values
         Their absolute values, m; may be empty.
     of_tool
@@ -294,7 +294,8 @@ def _with_triangle(
     if not is_revolute or arcs != 1:
         return
     for name in others:
-        c, s = applied("cos", Name(name, 0)), applied("sin", Name(name, 0))
+        c = applied("cos", Name(name, 0))
+        s = applied("sin", Name(name, 0))
         for a, b in permutations(lengths.trees[: BOUNDS.offset_lengths], 2):
             beta = Call("atan2", (times(b, s), Sum(((True, a), (True, times(b, c))))), 0)
             for added in (False, True):

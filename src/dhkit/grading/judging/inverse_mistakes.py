@@ -153,7 +153,8 @@ class Search:
         """Return the changes of a joint's formula that give a solution's values at poses that should be reached."""
         if not mistakes:
             return []
-        formula, agreeing = branch.editable(joint), list[Edit]()
+        formula = branch.editable(joint)
+        agreeing = list[Edit]()
         asked = branch.reachable
         tree = branch.trees[joint]
         equal = equal_parts([tree])
@@ -199,7 +200,8 @@ class Search:
 def lengths_of(description: Description) -> Lengths:
     """Return the lengths that formulas for a robot may contain, m."""
     parameters = tuple(description.parameters)
-    numbers, values = description.numbers, description.numbers.values
+    numbers = description.numbers
+    values = description.numbers.values
     known = [*numbers.d, *numbers.a, *numbers.T_world_base[:3, 3], *numbers.T_last_tool[:3, 3]]
     trees: list[Name | Number] = [Name(name, 0) for name in parameters]
     sizes = [abs(float(values[name])) for name in parameters]
@@ -244,7 +246,8 @@ def _lost_halves(branch: Branch, joint: int, first: int) -> list[tuple[str, Bran
 
     The wrong half may be the value of another solution; a later joint is then the first wrong one.
     """
-    wrong, tree = _wrong(branch, first), branch.trees[joint]
+    wrong = _wrong(branch, first)
+    tree = branch.trees[joint]
     revolute = branch.poses.description.kinds[joint] == "R"
     own = joint == first
     has_arc = has_call(tree, ("acos", "asin", "atan"))

@@ -82,7 +82,8 @@ class Poses:
         lower, upper = _joint_ranges(description)
         if whole_turns:
             turning = ~description.numbers.prismatic
-            lower, upper = np.where(turning, -np.pi, lower), np.where(turning, np.pi, upper)
+            lower = np.where(turning, -np.pi, lower)
+            upper = np.where(turning, np.pi, upper)
         q = np.random.default_rng(seed).uniform(lower, upper, (samples, description.n))
         T = world_to_tool(description, q)
         if classify(description).family is None:

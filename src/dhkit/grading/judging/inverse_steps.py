@@ -1,9 +1,9 @@
 """Judging of inverse kinematics that is handed in step by step: an equation for each joint, and its solution.
 
 An equation is right if it is an identity of the arm: true whenever the pose is that of the joint values. This is proved
-in the exact ring where the ring contains it, else tried. It counts if it is no identity of all poses, and determines
-its joint from those of earlier steps. A solution is tried at random poses, with the joints of earlier steps at their
-true values: a joint that is right in terms of wrong earlier ones is right.
+in the exact ring where the ring contains it, else tried. It counts if it is not an identity of all poses, and
+determines its joint from those of earlier steps. A solution is tried at random poses, with the joints of earlier steps
+at their true values: a joint that is right in terms of wrong earlier ones is right.
 """
 
 from __future__ import annotations

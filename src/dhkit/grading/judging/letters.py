@@ -1,6 +1,6 @@
 """Which letters of a robot's file an answer has as numbers: those whose values are written where the letters stand.
 
-A number may stand for a letter where it is written: 9.81 for g, 0.5 for l1. A letter that is left out is no number,
+A number may stand for a letter where it is written: 9.81 for g, 0.5 for l1. A letter that is left out is not a number,
 though its value is 1, or 2 beside a factor 1/2 of the truth. Numbers that may stand for letters are decimals, and whole
 numbers that are the value of a letter that the sheet has nowhere; 2, 1/2 or 1/3 are also factors of the truth.
 

@@ -84,7 +84,7 @@ class JudgedQuantity:
     def differences(self) -> Mapping[Index, Element] | None:
         """Answer less truth of the entries that were handed in, zero for right ones.
 
-        None if the difference of an entry is no element of the ring.
+        None if the difference of an entry is not an element of the ring.
         """
         differences: dict[Index, Element] = {}
         rows = {index[0] for index in self.wrong_indices if index}
@@ -117,7 +117,7 @@ def judge_quantity(
 ) -> JudgedQuantity:
     """Judge a quantity with its parameters as letters; entries that are wrong so with numbers where they have these.
 
-    A number may stand where it is written, 9.81 for g; a letter that is left out is no number. A sheet without any
+    A number may stand where it is written, 9.81 for g; a letter that is left out is not a number. A sheet without any
     letter is judged at the file's values.
 
     Parameters
@@ -179,7 +179,8 @@ def _contradicts(entry: Given, judged: JudgedQuantity, by: Comparison) -> bool:
                 return True
         except (OutsideTheRingError, AnswerError, RingError):
             values = {**by.arm.parameters, **general_state(by.arm.n)}
-            first, last = float(doubles(side, values)), float(doubles(entry.tree, values))
+            first = float(doubles(side, values))
+            last = float(doubles(entry.tree, values))
             if not abs(first - last) <= _ROUNDED_DECIMALS * max(abs(first), abs(last), 1e-9):
                 return True
     return False
@@ -330,7 +331,8 @@ def _residuals(name: str, task: Requirements) -> Residuals:
 
 def _slopes(answer: Quotient, truth: Element) -> Sequence[Element]:
     """Return the derivatives of the difference by q and qd, times the square of the denominator."""
-    numerator, denominator = answer.numerator_of_difference(truth), answer.denominator
+    numerator = answer.numerator_of_difference(truth)
+    denominator = answer.denominator
     if _accelerates(numerator) or _accelerates(denominator):
         return [numerator]
     slopes = []

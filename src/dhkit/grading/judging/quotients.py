@@ -216,7 +216,8 @@ class RingReader(Algebra[Quotient]):
             self.divisors.append(element)
 
     def _power(self, base: Tree, exponent: int) -> Quotient:
-        quotient, power = self.of(base), abs(exponent)
+        quotient = self.of(base)
+        power = abs(exponent)
         if quotient.bits * power > BOUNDS.coefficient_bits:
             quotient = self._bound_coefficients(
                 Quotient(quotient.numerator, quotient.denominator, BOUNDS.coefficient_bits + 1)
@@ -280,14 +281,14 @@ class RingReader(Algebra[Quotient]):
         Raises
         ------
         OutsideTheRingError
-            The exponent is no whole number, or exceeds ``BOUNDS.exponent``.
+            The exponent is not a whole number, or exceeds ``BOUNDS.exponent``.
         """
         try:
             number = value_of(tree, ()).rational
         except ExpressionError:
             number = None
         if number is None or number.denominator != 1:
-            raise OutsideTheRingError("an exponent that is no whole number")
+            raise OutsideTheRingError("an exponent that is not a whole number")
         if abs(number) > BOUNDS.exponent:
             raise OutsideTheRingError(f"an exponent of {str(number)[:20]}, beyond {BOUNDS.exponent}")
         return int(number)
@@ -316,7 +317,7 @@ class RingReader(Algebra[Quotient]):
             with Budget():
                 expression = exact_angle(value_of(angle, [*symbols, *self._names]))
         except ExpressionError:
-            raise OutsideTheRingError("an angle that is no sum") from None
+            raise OutsideTheRingError("an angle that is not a sum") from None
         if expression not in self._angles:
             self._angles[expression] = self._direction_of(expression)
         return self._angles[expression]
@@ -396,7 +397,7 @@ def varying(element: Element) -> Element:
 
 
 def _rational(element: Element) -> Fraction | None:
-    """Return an element's value; None if it is no number."""
+    """Return an element's value; None if it is not a number."""
     if len(element) != 1:
         return None
     ((monomial, coefficient),) = element.terms.items()

@@ -69,7 +69,8 @@ class _Coefficient:
 
     @classmethod
     def of(cls, value: Fraction, share: Fraction, is_printed: bool = False) -> _Coefficient:
-        size, zero = abs(value), Fraction(0)
+        size = abs(value)
+        zero = Fraction(0)
         return cls(size if value > 0 else zero, size if value < 0 else zero, size * share, share, share, is_printed)
 
     def __add__(self, other: _Coefficient) -> _Coefficient:
@@ -132,11 +133,13 @@ class _Expansion(Algebra[tuple[_Polynomial, _Polynomial]]):
 
     def power(self, tree: Power) -> tuple[_Polynomial, _Polynomial]:
         """Return a power, multiplied out."""
-        base, exponent = self.of(tree.base), self.reader.exponent(tree.exponent)
+        base = self.of(tree.base)
+        exponent = self.reader.exponent(tree.exponent)
         numerator, denominator = base if exponent >= 0 else base[::-1]
         top, bottom = self.one, self.one
         for _ in range(abs(exponent)):
-            top, bottom = self._multiply(top, numerator), self._multiply(bottom, denominator)
+            top = self._multiply(top, numerator)
+            bottom = self._multiply(bottom, denominator)
         return self._normalize(top, bottom)
 
     def product(
@@ -177,7 +180,8 @@ class _Expansion(Algebra[tuple[_Polynomial, _Polynomial]]):
             if not added:
                 numerator = {m: -c for m, c in numerator.items()}
             if bottom != denominator:
-                top, numerator = self._multiply(top, denominator), self._multiply(numerator, bottom)
+                top = self._multiply(top, denominator)
+                numerator = self._multiply(numerator, bottom)
                 bottom = self._multiply(bottom, denominator)
             top = dict(top)
             for m, c in numerator.items():
@@ -284,7 +288,8 @@ def rounding_share(tree: Tree, truth: Element, reader: RingReader, residuals: Re
     columns = [column for column in columns if column]
     if not columns or len(columns) > BOUNDS.rounded_coefficients:
         return None
-    difference, reference = numerator - truth * denominator, truth * denominator
+    difference = numerator - truth * denominator
+    reference = truth * denominator
     is_energy = not is_quotient and not _is_plain(residuals, truth)
     if not _is_small(difference, reference, shares, is_energy):
         return None

@@ -64,9 +64,12 @@ class Overlay:
         They may differ by the file's own numbers, which the answer then leaves to base and tool. A last link of another
         length is wrong in any case if the file gives its length (``strict``).
         """
-        tolerance, standard = SAME * self.truth.scale, self.answer.convention is Convention.STANDARD
-        first, last = self.differences[0], self.differences[-1]
-        numbers, own = self.answer.entries, self.truth.entries
+        tolerance = SAME * self.truth.scale
+        standard = self.answer.convention is Convention.STANDARD
+        first = self.differences[0]
+        last = self.differences[-1]
+        numbers = self.answer.entries
+        own = self.truth.entries
         if strict and standard and abs(abs(numbers[-1, 2]) - abs(own[-1, 2])) > tolerance:
             return False
         # A wrong length is not another zero of a sliding joint, though such a zero could make up for it.
@@ -100,7 +103,7 @@ class Overlay:
     @cached_property
     def changes(self) -> tuple[FrameChange, ...]:
         """Changes of frames and joint variables."""
-        # Lengths are compared as finely as arms are: a wrong number is no choice of frames.
+        # Lengths are compared as finely as arms are: a wrong number is not a choice of frames.
         tolerance = SAME * self.truth.scale
         changes = [change for i, D in enumerate(self.differences) for change in frame_changes(i, D, tolerance)]
         joints = zip(self.truth.kinds, self.senses, self.offsets, strict=True)
@@ -211,13 +214,16 @@ class _Matching:
         Newton's method as in :meth:`solve`, for the two frames together with the axes; None if it does not converge.
         """
         ends = [_nearest_square(D) for D in overlay.differences[[0, -1]]]
-        B, offsets, senses = overlay.B, overlay.offsets, overlay.senses[:, None]
+        B = overlay.B
+        offsets = overlay.offsets
+        senses = overlay.senses[:, None]
         last = self.answer.frames(np.zeros(self.answer.n))[-1]
         later = (np.arange(self.truth.n) > np.arange(self.truth.n)[:, None])[..., None] * senses
         stroke = np.where([kind == "R" for kind in self.truth.kinds], 1, self.scale)
         free = _free(self.answer, self.truth)
         for _ in range(_MAX_STEPS):
-            target, moved = self.truth.screws(offsets, self.scale), self.own @ _adjoint(B, self.scale).T
+            target = self.truth.screws(offsets, self.scale)
+            moved = self.own @ _adjoint(B, self.scale).T
             given = _scaled(np.array([B, B @ last]), self.scale)
             wanted = _scaled(np.array([ends[0], self.truth.frames(offsets)[-1] @ ends[1]]), self.scale)
             gap = np.concatenate([(moved - senses * target).ravel(), (given - wanted).ravel()])
@@ -225,7 +231,8 @@ class _Matching:
                 return replace(overlay, B=B, offsets=offsets)
             turned = -(target @ np.tensordot(target, _BRACKETS, 1)) * later
             at_end = np.array([[0 * wanted[1], -_rate(screw) @ wanted[1]] for screw in target])
-            turned, at_end = turned * free[:, None, None], at_end * free[:, None, None, None]
+            turned = turned * free[:, None, None]
+            at_end = at_end * free[:, None, None, None]
             whole = np.array([_rate(unit) @ given for unit in np.eye(6)])
             columns = np.vstack(
                 [
@@ -265,14 +272,17 @@ def _scaled(T: Array, scale: float) -> Array:
 def _rate(screw: NDArray[np.floating[Any]]) -> Array:
     """Return the matrix of a screw, shape (4, 4): the derivative of a transform along it is the matrix times it."""
     rate = np.zeros((4, 4))
-    rate[:3, :3], rate[:3, 3] = _skew(screw[:3]), screw[3:]
+    rate[:3, :3] = _skew(screw[:3])
+    rate[:3, 3] = screw[3:]
     return rate
 
 
 def _align_ends(overlay: Overlay) -> Overlay:
     """Choose the first and last offset, which base and tool can take up, so that frames 0 and n agree."""
-    truth, n = overlay.truth, overlay.truth.n
-    own, other = truth.frames(overlay.offsets), overlay.B @ overlay.answer.frames(np.zeros(n))
+    truth = overlay.truth
+    n = overlay.truth.n
+    own = truth.frames(overlay.offsets)
+    other = overlay.B @ overlay.answer.frames(np.zeros(n))
     screws = truth.screws(overlay.offsets, 1.0)
     first, last = (_joint_travel(screws[k], own[k], other[k], truth.scale) for k in (0, -1))
     offsets = overlay.offsets.copy()
@@ -295,7 +305,8 @@ def _slide_along_first_axis(overlay: Overlay) -> Overlay:
 
 def _joint_travel(screw: Array, start: Array, end: Array, scale: float) -> float:
     """Return the joint travel, rad or m, that moves a frame's origin, or on the axis its x axis, to another's."""
-    axis, moment = screw[:3], screw[3:]
+    axis = screw[:3]
+    moment = screw[3:]
     if not np.any(axis):
         return float(moment @ (end[:3, 3] - start[:3, 3]))
     point = np.cross(axis, moment)
@@ -316,7 +327,8 @@ def _invariants(screws: Array) -> Array:
 
     The cosines of their angles, their distances times the sines and, for parallel ones, their distances.
     """
-    first, second = screws[:-1], screws[1:]
+    first = screws[:-1]
+    second = screws[1:]
     angle = np.sum(first[:, :3] * second[:, :3], axis=1)
     moment = np.sum(first[:, :3] * second[:, 3:] + first[:, 3:] * second[:, :3], axis=1)
     turning = np.any(first[:, :3], axis=1) & np.any(second[:, :3], axis=1)
@@ -346,16 +358,21 @@ def _adjoint(T: Array, scale: float) -> Array:
 
 def _exponential(screw: NDArray[np.floating[Any]], scale: float) -> Array:
     """Return the motion along a screw (angles in rad; lengths in m over the scale), shape (4, 4), m."""
-    w, v = screw[:3], screw[3:] * scale
+    w = screw[:3]
+    v = screw[3:] * scale
     angle = float(np.linalg.norm(w))
     K = _skew(w)
     if angle < 1e-12:
-        R, V = np.eye(3) + K, np.eye(3) + K / 2
+        R = np.eye(3) + K
+        V = np.eye(3) + K / 2
     else:
-        s, c = np.sin(angle) / angle, (1 - np.cos(angle)) / angle**2
-        R, V = np.eye(3) + s * K + c * K @ K, np.eye(3) + c * K + (1 - s) / angle**2 * K @ K
+        s = np.sin(angle) / angle
+        c = (1 - np.cos(angle)) / angle**2
+        R = np.eye(3) + s * K + c * K @ K
+        V = np.eye(3) + c * K + (1 - s) / angle**2 * K @ K
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = R, V @ v
+    T[:3, :3] = R
+    T[:3, 3] = V @ v
     return T
 
 

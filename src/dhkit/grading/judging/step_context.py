@@ -51,7 +51,10 @@ class StepContext:
     """
 
     def __init__(self, description: Description, poses: Poses, seed: int, explain: bool) -> None:
-        self.description, self.poses, self.seed, self.explain = description, poses, seed, explain
+        self.description = description
+        self.poses = poses
+        self.seed = seed
+        self.explain = explain
 
     @cached_property
     def derivation(self) -> InverseDerivation | None:
@@ -71,7 +74,8 @@ class StepContext:
 
         Lengths of base and tool have no names.
         """
-        names, table = set().union(*map(names_of, trees)), table_lengths(self.description)
+        names = set().union(*map(names_of, trees))
+        table = table_lengths(self.description)
         every = lengths_of(self.description)
         if not names & {*table}:
             return every
@@ -115,7 +119,8 @@ class StepContext:
     def misread(self, poses: Poses) -> Iterator[tuple[str, dict[str, Array | float]]]:
         """Yield mistakes in which the pose is another frame's, each with the values that formulas then mean."""
         numbers = self.description.numbers
-        outside, inside = np.linalg.inv(numbers.T_world_base), np.linalg.inv(numbers.T_last_tool)
+        outside = np.linalg.inv(numbers.T_world_base)
+        inside = np.linalg.inv(numbers.T_last_tool)
         for mistake, before, behind in (
             ("tool_not_taken_off", None, inside),
             ("base_not_taken_off", outside, None),

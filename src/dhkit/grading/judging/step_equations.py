@@ -37,11 +37,11 @@ _FREE_POSES = 32
 _ZERO = 1e-9
 """Largest difference of an equation's sides, relative to their size, that is rounding."""
 _OF_BOTH_SIDES = ("square_forgotten", "square_too_much", "root_forgotten")
-"""Changes of both sides of an equation at once, which are no correction."""
+"""Changes of both sides of an equation at once, which are not correction."""
 _STEP = 1e-6
 """Step of finite differences, rad, and relative to the reach."""
 _WITH_NUMBERS = "proved: an identity of the arm with its own lengths"
-"""Statement on an equation that is no identity whatever the lengths are."""
+"""Statement on an equation that is not an identity whatever the lengths are."""
 _NO_CHANGE = 1e-7
 """Change of an equation, relative to the size of its terms, by a step of one, that is rounding."""
 _SAME_RANK = 1e-5
@@ -52,7 +52,9 @@ class Equations:
     """Judges the equations of one step."""
 
     def __init__(self, context: StepContext, step: GivenStep, before: Sequence[int]) -> None:
-        self.context, self.step, self.before = context, step, before
+        self.context = context
+        self.step = step
+        self.before = before
         self.differences = [Sum(((True, left), (False, right))) for left, right in step.equations]
 
     def part(self) -> Part:
@@ -73,7 +75,8 @@ class Equations:
                 share = self._share_of_a_root(tree)
                 if share is None:
                     return self._wrong(k, tree, difference)
-                found, statement = Verdict.UNDECIDED, "true of one of the joint's roots; tried, not proved"
+                found = Verdict.UNDECIDED
+                statement = "true of one of the joint's roots; tried, not proved"
                 remarks.append(f"the equation is true of one root alone, at {share:.3g} % of the poses tried")
             elif statement == _WITH_NUMBERS and self._is_in_names(tree):
                 remarks.append("the equation is true of this arm alone: it needs lengths that are equal, or zero, here")
@@ -92,14 +95,15 @@ class Equations:
         if (root := self._other_root(used)) is not None:
             return Part(
                 Verdict.INCOMPLETE,
-                f"the equation is right, but has roots that are no solutions, such as {own} = {root:.4g} at a pose "
+                f"the equation is right, but has roots that are not solutions, such as {own} = {root:.4g} at a pose "
                 f"that was tried: it does not determine {own} alone",
             )
         return Part(verdict, f"equation: {statements[0]}", remark="; ".join(dict.fromkeys(remarks)))
 
     def _other_root(self, used: set[str]) -> float | None:
-        """Return a root of the equations that is no solution; None without a closed form, or with later joints."""
-        n, own = self.context.description.n, self.step.joint
+        """Return a root of the equations that is not a solution; None without a closed form, or with later joints."""
+        n = self.context.description.n
+        own = self.step.joint
         poses = self.context.solved_poses
         later = {f"q{j + 1}" for j in range(n) if j != own and j not in self.before}
         if not poses.has_closed_form or used & later:
@@ -132,7 +136,7 @@ class Equations:
         return other_root(poses, own, self.before, residual_on)
 
     def _factor_of_other_roots(self, tree: Tree) -> Part | None:
-        """Return the part of a product that is zero since one factor is, where another has roots that are no solution.
+        """Return the part of a product that is zero since one factor is, where another has roots that are not solution.
 
         The product (c2 - D) (c2 - px) = 0 holds for every solution, as its first factor does alone; the second one adds
         roots, so that the equation does not determine q2. A factor that does not depend on the joint adds none.
@@ -199,7 +203,8 @@ class Equations:
     def _holds_always(self, tree: Tree) -> bool:
         """Whether an equation holds at poses unrelated to the joints; at one of them, if it has roots."""
         rng = np.random.default_rng(5)
-        n, scale = self.context.description.n, self.context.poses.scale
+        n = self.context.description.n
+        scale = self.context.poses.scale
         T = np.tile(np.eye(4), (_FREE_POSES, 1, 1))
         T[:, :3, :3] = Rotation.random(_FREE_POSES, rng=rng).as_matrix()
         T[:, :3, 3] = rng.uniform(-scale, scale, (_FREE_POSES, 3))
@@ -228,7 +233,8 @@ class Equations:
 
     def _determines(self) -> bool:
         """Whether the equations determine the joint where those of earlier steps are known."""
-        n, own = self.context.description.n, self.step.joint
+        n = self.context.description.n
+        own = self.step.joint
         free = [j for j in range(n) if j not in self.before]
         holds = np.all([np.abs(self.residual(tree)) < _ZERO for tree in self.differences], axis=0)
         poses = self.context.poses.at(np.flatnonzero(holds)[:8])
@@ -341,7 +347,7 @@ def _with_a_length(tree: Tree, lengths: Lengths, joint: int) -> Iterator[Edit]:
 
 
 def _inner_angles(tree: Tree, joint: int) -> Iterator[Edit]:
-    """Yield a law of cosines with the angle inside the triangle in place of the joint's, which has the other sign."""
+    """Yield a law of cosines with the angle inside the triangle instead of the joint's, which has the other sign."""
     squares = [part for part in parts_of(tree) if isinstance(part, Power)]
     if len(squares) < 2:
         return

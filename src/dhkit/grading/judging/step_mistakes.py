@@ -42,7 +42,9 @@ class SolutionMistakes:
     """
 
     def __init__(self, context: StepContext, branch: Branch, joint: int) -> None:
-        self.context, self.branch, self.joint = context, branch, joint
+        self.context = context
+        self.branch = branch
+        self.joint = joint
         self.tree = branch.trees[joint]
 
     def mistake(self, is_right_for: Callable[[StepContext], bool]) -> tuple[str, str] | None:
@@ -98,7 +100,8 @@ class SolutionMistakes:
 
     def _forgets_offset(self) -> bool:
         """Whether the formula is that of joint 1 without its offset: the direction of the point, or the opposite."""
-        step, derivation = self.context.derived(self.joint), self.context.derivation
+        step = self.context.derived(self.joint)
+        derivation = self.context.derivation
         if derivation is None or step is None or self.joint != 0 or not isinstance(step.form, Circle):
             return False
         values, _ = next(derivation.candidates(self.branch.poses.T))

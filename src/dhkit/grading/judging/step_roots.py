@@ -1,4 +1,4 @@
-"""Roots of the equations of a step that are no solutions: an equation that has some does not determine its joint."""
+"""Roots of the equations of a step that are not solutions: an equation that has some does not determine its joint."""
 
 from __future__ import annotations
 

@@ -123,7 +123,8 @@ class Solutions:
                 for found in self._divided(hypothesis, self.unsolved)
                 if any(np.any(choice.alive) for choice in found)
             ]
-            self._hypotheses, self.unsolved = following[: BOUNDS.hypotheses], []
+            self._hypotheses = following[: BOUNDS.hypotheses]
+            self.unsolved = []
         return self._hypotheses
 
     def skip(self, joint: int) -> None:
@@ -174,7 +175,9 @@ class Solutions:
             return Part(Verdict.WRONG, f"solution {same}: gives the same as another", [("duplicate_branch", "")]), None
         self._hypotheses = [tuple(chain(*trial.following)) for trial in right]
         self.solved.add(step.joint)
-        tried, where, remark = self.context.within_limits, "", ""
+        tried = self.context.within_limits
+        where = ""
+        remark = ""
         if beyond:
             tried = np.ones_like(tried)
         else:
@@ -188,7 +191,8 @@ class Solutions:
 
     def _unusable(self, step: GivenStep, before: Sequence[int]) -> Part | None:
         """Return why formulas cannot be evaluated in this order; None if they can."""
-        own, poses = step.joint, self.context.poses
+        own = step.joint
+        poses = self.context.poses
         if not poses.isolated:
             raise AnswerError("solution: the joint values of a pose are not isolated; equations alone are judged")
         joints = [f"q{j + 1}" for j in range(self.context.description.n)]
@@ -220,7 +224,8 @@ class Solutions:
 
     def _by_values(self, choice: Choice, joints: Sequence[int]) -> dict[int, Choice]:
         """Return a choice for each set of values of some joints, by the index of a solution that has them."""
-        joints, parts = list(joints), dict[int, Choice]()
+        joints = list(joints)
+        parts = dict[int, Choice]()
         values = self.truths[..., joints]
         for b in range(values.shape[1]):
             gaps = self.context.solved_poses.gaps(values, values[:, b : b + 1], joints)
@@ -300,7 +305,8 @@ class Solutions:
     # Mistakes
 
     def _wrong(self, trial: _Trial, step: GivenStep, before: Sequence[int]) -> Part:
-        own, inside = step.joint, self.context.within_limits
+        own = step.joint
+        inside = self.context.within_limits
         k = int(np.argmin(np.mean(trial.right_within_limits, axis=1)))
         which = f"solution {k + 1}" if len(step.solutions) > 1 else "solution"
         places = [(c, int(s)) for c, one in enumerate(trial.choices) for s in np.flatnonzero(one.rows & inside)]
@@ -313,7 +319,8 @@ class Solutions:
         c, s = places[int(np.argmin(right))]
         pose = {name: float(np.asarray(self.context.solved_poses.values[name])[s]) for name in POSE_NAMES}
         pose |= {f"q{j + 1}": float(trial.choices[c].q[s, j]) for j in before}
-        answer, alive = float(trial.values[k][c][s]), np.flatnonzero(trial.choices[c].alive[s])
+        answer = float(trial.values[k][c][s])
+        alive = np.flatnonzero(trial.choices[c].alive[s])
         truths = self.truths[s, alive, own]
         gaps = self.context.solved_poses.gaps(np.full(len(alive), answer), truths, own)
         truth = float(truths[int(np.argmin(np.nan_to_num(gaps, nan=np.inf)))])
@@ -329,7 +336,8 @@ class Solutions:
 
         Its poses are those of ``places``, each a choice and the index of a pose.
         """
-        n, rows = self.context.description.n, [s for _, s in places]
+        n = self.context.description.n
+        rows = [s for _, s in places]
         known = np.array([self.truths[s, np.argmax(choices[c].alive[s])] for c, s in places])
         known[:, list(before)] = np.array([choices[c].q[s] for c, s in places])[:, list(before)]
         given = [Name(f"{KNOWN}{j + 1}", 0) for j in range(n)]

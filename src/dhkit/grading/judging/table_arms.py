@@ -66,7 +66,9 @@ def link_entries(
     unit
         0 and 1 in the same arithmetic.
     """
-    (c, s), (ca, sa), (zero, one) = theta, alpha, unit
+    (c, s) = theta
+    (ca, sa) = alpha
+    (zero, one) = unit
     rows: list[list[_T]]
     if convention is Convention.STANDARD:
         rows = [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [zero, sa, ca, d]]
@@ -124,7 +126,8 @@ class TableArm:
             named = dict(values) | {f"q{i + 1}": float(x) for i, x in enumerate(q)}
             return np.array([row_numbers(row, named) for row in rows])
 
-        entries, q = at(np.zeros(n)), np.linspace(0.3, 0.9, n)
+        entries = at(np.zeros(n))
+        q = np.linspace(0.3, 0.9, n)
         if not np.all(np.abs(entries) < BOUNDS.table_entry):
             return None
         senses = np.sum((at(np.ones(n)) - entries) * own, axis=1)
@@ -145,7 +148,8 @@ class TableArm:
 
     def frames(self, q: Array) -> Array:
         """Return frames 0 ... n in frame 0, shape (n + 1, 4, 4), m, at joint values of shape (n,), rad and m."""
-        change, turning = self.senses * q, np.array([kind == "R" for kind in self.kinds])
+        change = self.senses * q
+        turning = np.array([kind == "R" for kind in self.kinds])
         theta, d, a, alpha = self.entries.T
         links = link_in_doubles(self.convention, theta + change * turning, d + change * ~turning, a, alpha)
         frames = [np.eye(4)]

@@ -131,7 +131,8 @@ class TableRows:
 
     def row(self, i: int) -> JudgedRow:
         """Judge A_i, i from 0."""
-        entries, written = self.answer.entries[i], self.written(i)
+        entries = self.answer.entries[i]
+        written = self.written(i)
         if None not in entries:
             if self.is_proved(i, self.reference[i]):
                 return JudgedRow(Verdict.CORRECT, f"A{i + 1} is proved")
@@ -247,7 +248,8 @@ def _file_rows(description: Description, convention: Convention) -> tuple[Row, .
         links = [*links[1:], (ZERO, ZERO)] if convention is Convention.STANDARD else [(ZERO, ZERO), *links[:-1]]
     rows: list[Row] = []
     for i, (joint, (a, alpha)) in enumerate(zip(joints, links, strict=True), start=1):
-        q, theta = Expression.symbol(f"q{i}"), exact_angle(joint.theta)
+        q = Expression.symbol(f"q{i}")
+        theta = exact_angle(joint.theta)
         rows.append((theta + q, joint.d, a, alpha) if joint.is_revolute else (theta, joint.d + q, a, alpha))
     return tuple(rows)
 
@@ -270,7 +272,8 @@ class _Reader:
         """
         theta, d, a, alpha = (ZERO if entry is None else self.naming.known(entry) for entry in row)
         ring = self.ring
-        angles, lengths = (self.angle(theta), self.angle(alpha)), (self.length(d), self.length(a))
+        angles = (self.angle(theta), self.angle(alpha))
+        lengths = (self.length(d), self.length(a))
         entries = link_entries(convention, angles[0], *lengths, angles[1], (ring.zero, ring.one))
         return np.array(entries, dtype=object)
 
@@ -282,7 +285,8 @@ class _Reader:
         RingError
             Another variable in the length, or a constant that the ring does not have.
         """
-        ring, total = self.ring, []
+        ring = self.ring
+        total = []
         for monomial, coefficient in length.terms:
             product = ring.number(coefficient)
             for atom, exponent in monomial:
@@ -304,7 +308,9 @@ class _Reader:
         RingError
             Another angle.
         """
-        ring, constant, parts = self.ring, [], []
+        ring = self.ring
+        constant = []
+        parts = []
         for monomial, coefficient in angle.terms:
             joint = self.joints.get(monomial[0][0].text) if len(monomial) == 1 else None
             if joint is None:

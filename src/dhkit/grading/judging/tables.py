@@ -117,7 +117,8 @@ def _judge(table: TableRows, task: Requirements) -> TableJudgement:
         return _judge_in_other_frames(table, rows, wrong, mistakes, overlay, task, notes, at_values)
     diagnosis = tuple(mistake.diagnosis() for mistake in mistakes)
     if _is_of_other_convention(table):
-        other, given = other_convention(table.convention).value, table.convention.value
+        other = other_convention(table.convention).value
+        given = table.convention.value
         detail = f"it is the {other} one, and was handed in as {given}"
         diagnosis = (_diagnosis_of_table("other_convention", entries, detail),)
     return TableJudgement(entries, diagnosis, notes, at_values)
@@ -192,7 +193,8 @@ def _diagnosis_of_table(mistake: str, entries: Sequence[Entry], detail: str) -> 
 
 def _overlay(table: TableRows) -> Overlay | None:
     """Return how the answer's frames lie on the file's; None if the answer is another arm."""
-    strict, kinds = not table.converted, table.description.kinds
+    strict = not table.converted
+    kinds = table.description.kinds
     best: Overlay | None = None
     written = frozenset().union(*(table.written(i) for i in range(table.n)))
     fixed = {name: table.states[0][name] for name in written}

@@ -79,7 +79,7 @@ class Truth:
         return self._values[quantity]
 
     def with_numbers(self, quantity: str, array: Elements, numbers: Collection[str]) -> Elements:
-        """Return elements of a quantity's ring with the file's numbers in place of some parameters."""
+        """Return elements of a quantity's ring with the file's numbers instead of some parameters."""
         ring = self.arm(quantity).ring
         return substituted(array, {p: ring.number(exact_number(self.description, p)) for p in numbers}, ring)
 

@@ -74,7 +74,8 @@ class Variants:
     @cached_property
     def kinematic(self) -> list[Variant]:
         """Possible mistakes in the robot's transforms and Jacobian."""
-        n, truth = self.truth.description.n, self.truth
+        n = self.truth.description.n
+        truth = self.truth
         # Mistakes in the Jacobian first: if it alone is wrong, they are likelier than mistakes in the transforms.
         names = [*JACOBIAN_MISTAKES, *LINK_MISTAKES, *POSE_MISTAKES]
         made = [(MadeAt(name), "") for name in names]
@@ -94,7 +95,7 @@ class Variants:
         return self.in_numbers(quantity, variant.adds_to(_judged_by(quantity), self.truth.coordinates))
 
     def in_numbers(self, quantity: str, array: Elements) -> Elements:
-        """Return elements with the file's numbers in place of the parameters that answers have as numbers."""
+        """Return elements with the file's numbers instead of the parameters that answers have as numbers."""
         return self.truth.with_numbers(quantity, array, self.numbers) if self.numbers else array
 
     # Tables
@@ -115,7 +116,8 @@ class Variants:
                 if key:
                     by_entry.setdefault((place, key), []).append(changed)
         # Stored when complete: a derivation that is too long raises RingError.
-        self._changes[quantity], self._by_entry[quantity] = changes, by_entry
+        self._changes[quantity] = changes
+        self._by_entry[quantity] = by_entry
 
     def whole(self, quantity: str, differences: Differences) -> list[Variant]:
         """Return the mistakes that cause exactly the differences of all entries that were handed in."""
@@ -230,7 +232,9 @@ class _Pairs:
 
     def _both(self, first: Variant, second: Variant) -> dict[Index, _Key]:
         """Return the changes by a derivation with both mistakes."""
-        truth, judged, made = self.tables.truth, _judged_by(self.quantity), {first.made, second.made}
+        truth = self.tables.truth
+        judged = _judged_by(self.quantity)
+        made = {first.made, second.made}
         array: Elements
         if self.quantity in DYNAMICS:
             array = element_array(getattr(derive(truth.description, made), judged))

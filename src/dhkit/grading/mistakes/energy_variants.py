@@ -140,7 +140,8 @@ def _derived(textbook: TextbookDerivation, *made: MadeAt) -> Change:
 
 def _payloads(textbook: TextbookDerivation) -> Iterator[Variant]:
     """Yield mistakes with a link's further bodies: left out, or placed at the first body."""
-    arm, ring = textbook.arm, textbook.arm.ring
+    arm = textbook.arm
+    ring = textbook.arm.ring
     for part in _parts(textbook):
         if part.name is None or part.motion.body is arm.bodies[part.link - 1][0]:
             continue
@@ -201,13 +202,15 @@ def _is_rod(part: _Part) -> bool:
 
 
 def _more_inertia(textbook: TextbookDerivation, parts: Iterable[_Part], share: Fraction) -> Change:
-    ring, motions = textbook.arm.ring, [part.motion for part in parts]
+    ring = textbook.arm.ring
+    motions = [part.motion for part in parts]
     energies = [motion.omega @ motion.body.inertia @ motion.omega * _HALF * share for motion in motions]
     return Change(ring.sum(energies), ring.zero)
 
 
 def _exchanged_moments(textbook: TextbookDerivation, part: _Part, a: int, b: int) -> Change:
-    tensor, omega = part.motion.body.inertia, part.motion.omega
+    tensor = part.motion.body.inertia
+    omega = part.motion.omega
     order = list(range(3))
     order[a], order[b] = b, a
     moments = tensor.diagonal()
@@ -241,7 +244,8 @@ def _exchanged_drives(textbook: TextbookDerivation, i: int, j: int) -> Change:
 
 
 def _inverted_gears(textbook: TextbookDerivation, joints: Iterable[int]) -> Change:
-    arm, energies = textbook.arm, []
+    arm = textbook.arm
+    energies = []
     for i in joints:
         inverse = _inverse(arm.gear[i])
         if inverse is not None:
@@ -251,7 +255,7 @@ def _inverted_gears(textbook: TextbookDerivation, joints: Iterable[int]) -> Chan
 
 
 def _inverse(gear: Element) -> Element | None:
-    """Return the reciprocal of a gear ratio; None if the ratio is no number."""
+    """Return the reciprocal of a gear ratio; None if the ratio is not a number."""
     terms = gear.terms
     if len(terms) != 1 or any(any(monomial) for monomial in terms):
         return None
@@ -279,7 +283,8 @@ def _slides(textbook: TextbookDerivation) -> Iterator[Variant]:
 
 def _without_slide(textbook: TextbookDerivation, motions: Iterable[BodyMotion], k: int) -> Change:
     """Return the change if a sliding joint is fixed at zero in the positions of bodies, not in their orientations."""
-    arm, ring = textbook.arm, textbook.arm.ring
+    arm = textbook.arm
+    ring = textbook.arm.ring
     K, V = ring.zero, ring.zero
     for motion in motions:
         place = element_array([translated(x, ring, {ring.place("position", k): ring.zero}) for x in motion.com])
@@ -347,7 +352,8 @@ def _of_description(textbook: TextbookDerivation, description: Description) -> C
     ring = textbook.arm.ring
     try:
         wrong = derive(description, symbols=textbook.arm.symbols)
-        K, V = translated(wrong.K, ring, {}), translated(wrong.V, ring, {})
+        K = translated(wrong.K, ring, {})
+        V = translated(wrong.V, ring, {})
     except (KeyError, DhkitError):
         return Change(ring.zero, ring.zero)
     return Change(K - textbook.K, V - textbook.V)

@@ -27,7 +27,8 @@ _MAX_NAMED_TERMS = 3
 
 def slip_of(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None:
     """Return the slip in a term of a wrong entry; None if there is none, or more than one."""
-    difference, right = quantity.findings[index].difference, quantity.right(index)
+    difference = quantity.findings[index].difference
+    right = quantity.right(index)
     if difference is None or difference.is_zero or len(difference) > BOUNDS.compared_terms:
         return None
     arm = truth.arm(quantity.name)
@@ -116,7 +117,8 @@ def mirrored(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
 
 def whole_factor(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
     """Return the diagnosis of an entry that is the right one times -1, 1/2, 2 or 0; None for other entries."""
-    difference, right = quantity.findings[index].difference, quantity.right(index)
+    difference = quantity.findings[index].difference
+    right = quantity.right(index)
     if difference is None or not right:
         return None
     for name, factor in FACTORS.items():
@@ -127,8 +129,10 @@ def whole_factor(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
 
 def described(truth: Truth, quantity: JudgedQuantity, index: Index) -> Diagnosis:
     """Return a diagnosis without a mistake, which compares the terms of a wrong entry with the right ones."""
-    finding, right = quantity.findings[index], quantity.right(index)
-    entry, terms = entry_name(quantity.name, index), ""
+    finding = quantity.findings[index]
+    right = quantity.right(index)
+    entry = entry_name(quantity.name, index)
+    terms = ""
     element = finding.answer.element() if finding.answer is not None else None
     if element is None:
         text = finding.statement
@@ -153,7 +157,9 @@ def compare_terms(arm: ExactArm, answer: Element, truth: Element) -> tuple[str, 
     """
     # All three in the angles in which they differ least: c12 is one term, c1*c2 - s1*s2 are two.
     truth, answer, _ = shortened_alike(arm, [truth, answer, answer - truth])
-    ours, theirs, ring = truth.terms, answer.terms, truth.ring
+    ours = truth.terms
+    theirs = answer.terms
+    ring = truth.ring
 
     def text(terms: dict[tuple[int, ...], Fraction]) -> str:
         return plain_text(ring.from_terms(terms))

@@ -64,7 +64,8 @@ def _signs(truth: Truth) -> Iterator[Variant]:
 
 def _steps(truth: Truth) -> Iterator[Variant]:
     """Yield the mistakes that change h or g alone."""
-    lag, n = truth.lagrangian, truth.description.n
+    lag = truth.lagrangian
+    n = truth.description.n
     momenta = element_array([lag.K.by_rate(i) for i in range(n)])
     yield Variant(MadeAt("potential_gradient_sign"), changed_only(lag, "g", lambda: -2 * lag.g))
     for name in MISTAKES:
@@ -97,7 +98,9 @@ def _velocity_change(truth: Truth, momenta: Elements, name: str) -> Make:
 
 def _scaled_in_y(truth: Truth, squares: bool, factor: Fraction) -> Elements:
     """Return the change of the robot's h if products of the student's own rates have another factor."""
-    ring, coordinates, n = truth.lagrangian.arm.ring, truth.coordinates, truth.description.n
+    ring = truth.lagrangian.arm.ring
+    coordinates = truth.coordinates
+    n = truth.description.n
     rates = element_array([ring.rate(i) for i in range(n)])
     in_y = {ring.place("rate", i): rate for i, rate in enumerate(coordinates.B @ rates)}
     back = {ring.place("rate", i): rate for i, rate in enumerate(coordinates.S @ rates)}
@@ -118,7 +121,8 @@ def _gravity_torques(truth: Truth) -> Iterator[Variant]:
 
 def _own_angle_change(textbook: TextbookDerivation, i: int) -> Elements:
     """Return the change of g if the weight of link i, from 0, is computed without the angles of preceding joints."""
-    arm, link = textbook.arm, textbook.links[i]
+    arm = textbook.arm
+    link = textbook.links[i]
     ring = arm.ring
     joint = textbook.links[i - 1].origin if arm.is_standard else link.origin
     height = -ring.sum(body.body.mass * (arm.gravity @ (body.com - joint)) for body in link.bodies)
@@ -151,7 +155,8 @@ def _heights(truth: Truth) -> Iterator[Variant]:
 
 
 def _matrices(truth: Truth) -> Iterator[Variant]:
-    lag, n = truth.lagrangian, truth.description.n
+    lag = truth.lagrangian
+    n = truth.description.n
     rates = element_array([lag.arm.ring.rate(i) for i in range(n)])
     if n > 1:
         yield Variant(MadeAt("coriolis_transposed"), changed_only(lag, "h", lambda: lag.C.T @ rates - lag.h))
@@ -223,7 +228,8 @@ def _declared(truth: Truth, meant: Coordinates, matrix: Elements, quantity: str)
     The answer is right in the coordinates ``meant``; its variables are read as ``matrix`` times the robot's.
     """
     lag = truth.lagrangian
-    ring, n = lag.arm.ring, lag.n
+    ring = lag.arm.ring
+    n = lag.n
     answer = element_array(meant.in_y(quantity, right_value(lag, quantity)))
     places: dict[int, Element] = {}
     for i in range(n):

@@ -141,7 +141,8 @@ def _fewest(candidates: Mapping[Any, list[Variant]]) -> dict[tuple[Any, ...], li
 
     By the names that it explains, each mistake comes first in the list of those that explain the same.
     """
-    left, chosen = dict(candidates), dict[tuple[Any, ...], list[Variant]]()
+    left = dict(candidates)
+    chosen = dict[tuple[Any, ...], list[Variant]]()
     while any(left.values()):
         explains: dict[tuple[str, str], list[Any]] = {}
         listed: dict[tuple[str, str], Variant] = {}
@@ -305,7 +306,8 @@ def _split_in_parts(truth: Truth, name: str, differences: Differences) -> Mappin
         moving = {m: c for m, c in element.terms.items() if any(m[k] for k in rates)}
         resting = {m: c for m, c in element.terms.items() if not any(m[k] for k in (*rates, *accelerations))}
         if name == "L":
-            parts["K"][index], parts["V"][index] = ring.from_terms(moving), -ring.from_terms(resting)
+            parts["K"][index] = ring.from_terms(moving)
+            parts["V"][index] = -ring.from_terms(resting)
             continue
         parts["h"][index], parts["g"][index] = ring.from_terms(moving), ring.from_terms(resting)
         by_joint = [_coefficient(element, k) for k in accelerations]

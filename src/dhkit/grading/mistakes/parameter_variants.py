@@ -69,7 +69,9 @@ def _tilts(truth: Truth) -> Iterator[Variant]:
     for cosine in ring.constants:
         if not cosine.startswith("cos(") or (sine := f"sin{cosine[3:]}") not in ring.constants:
             continue
-        c, s, place = ring.constant(cosine), ring.constant(sine), cosine[4:-1]
+        c = ring.constant(cosine)
+        s = ring.constant(sine)
+        place = cosine[4:-1]
         for identity, values in (
             ("parameter_forgotten", {cosine: ring.one, sine: ring.zero}),
             ("parameter_sign", {sine: -s}),

@@ -16,7 +16,7 @@ from dhkit.symbolic.ring.elements import PolynomialRing
 
 _Terms = Mapping[tuple[int, ...], Fraction]
 _UNITS = frozenset((Fraction(1000), Fraction(1000) ** 2, Fraction(1, 1000), Fraction(1, 1000) ** 2))
-"""Factors of terms with lengths in mm in place of m, or the reverse."""
+"""Factors of terms with lengths in mm instead of m, or the reverse."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,9 @@ def _listed(called: str, numbers: Sequence[int]) -> str:
 
 
 def _slip(answer: Element, truth: Element) -> Slip | None:
-    ring, right, wrong = truth.ring, truth.terms, answer.terms
+    ring = truth.ring
+    right = truth.terms
+    wrong = answer.terms
     changed = {m: wrong.get(m, Fraction(0)) - right.get(m, Fraction(0)) for m in {*right, *wrong}}
     changed = {m: c for m, c in changed.items() if c}
     if not changed or len(changed) > BOUNDS.changed_terms:
@@ -160,7 +162,7 @@ def _replaced(ring: PolynomialRing, missing: _Terms, new: _Terms) -> Slip | None
 def _of_pairs(
     ring: PolynomialRing, pairs: Mapping[tuple[int, ...], tuple[int, ...]], missing: _Terms, new: _Terms
 ) -> Slip | None:
-    """Return the slip if new terms stand in place of missing ones by the same exchange of generators."""
+    """Return the slip if new terms stand instead of missing ones by the same exchange of generators."""
     exchanges = {tuple(b - a for a, b in zip(old, new, strict=True)) for old, new in pairs.items()}
     if len(exchanges) != 1:
         return None

@@ -56,7 +56,8 @@ def sums_of_angles(arm: ExactArm, right: Make, is_kinematic: bool = False) -> It
 
 def derivatives_of_cosines(truth: Truth) -> Variant:
     """Return the mistake d/dq cos(q) = sin(q) in the linear half of the Jacobian."""
-    arm, kinematics = truth.kinematics.arm, truth.kinematics
+    arm = truth.kinematics.arm
+    kinematics = truth.kinematics
 
     def change(quantity: str) -> Elements:
         right = kinematic_quantity(kinematics, quantity)
@@ -109,7 +110,8 @@ def _in_angles(arm: ExactArm, element: Element, formula: _Formula) -> Element:
     ring = arm.ring
     single: dict[int, Element] = {}
     for sine, cosine, joints in element.ring.turning:
-        c, s = ring.cosine(joints[0]), ring.sine(joints[0])
+        c = ring.cosine(joints[0])
+        s = ring.sine(joints[0])
         for joint in joints[1:]:
             c, s = formula(c, s, ring.cosine(joint), ring.sine(joint))
         single |= {sine: s, cosine: c}
@@ -123,8 +125,10 @@ def _in_sums(arm: ExactArm, array: Elements) -> Elements:
     turned: dict[int, Element] = {}
     for run in parallel_runs(arm):
         for previous, joint in pairwise(run):
-            c, s = ring.cosine(joint), ring.sine(joint)
-            x, y = ring.cosine(previous), ring.sine(previous)
+            c = ring.cosine(joint)
+            s = ring.sine(joint)
+            x = ring.cosine(previous)
+            y = ring.sine(previous)
             turned[arm.ring.place("cosine", joint)] = c * x + s * y
             turned[arm.ring.place("sine", joint)] = s * x - c * y
     return translated_array(array, turned, ring)

@@ -59,7 +59,7 @@ def read_reports(path: Path) -> Iterator[GradeReport]:
     except DescriptionError as error:
         raise AnswerError(str(error).replace("expected a robot file", "expected reports")) from None
     except UnicodeDecodeError as error:
-        raise AnswerError(f"{path}: byte {error.start} is no UTF-8; expected reports in JSON") from None
+        raise AnswerError(f"{path}: byte {error.start} is not UTF-8; expected reports in JSON") from None
     lines = [text] if _is_json(text) else text.splitlines()
     for number, line in enumerate(lines, start=1):
         if line.strip():

@@ -38,7 +38,7 @@ def mathml(latex: str) -> str | None:
     try:
         root = fromstring(convert(latex, display="block"))  # noqa: S314 - no "<" in it: no declarations
         return tostring(_copy_harmless(root, None), encoding="unicode", short_empty_elements=False)
-    except Exception:  # latex2mathml raises IndexError and others for text that is no LaTeX
+    except Exception:  # latex2mathml raises IndexError and others for text that is not LaTeX
         return None
 
 

@@ -66,7 +66,8 @@ def summary(report: GradeReport, marks: Marks) -> str:
 
 def fault_of(report: GradeReport) -> str:
     """Return which sheet could not be judged, and why; the sheet is named once, though the error may name it too."""
-    error, sheet = plain(report.error, 1000), plain(report.sheet or "")
+    error = plain(report.error, 1000)
+    sheet = plain(report.sheet or "")
     return error if not sheet or error.startswith(sheet) else f"{sheet}: {error}"
 
 

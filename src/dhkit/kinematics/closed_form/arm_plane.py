@@ -69,7 +69,8 @@ class ArmPlane:
     def T(self) -> Array:
         """Pose of the world in this frame, shape (4, 4), m."""
         T = np.eye(4)
-        T[:3, :3], T[:3, 3] = self.R, -self.R @ self.origin
+        T[:3, :3] = self.R
+        T[:3, 3] = -self.R @ self.origin
         return T
 
 
@@ -143,7 +144,7 @@ def ordered_shoulders(p: Mapping[str, SX], position: Vector, pose: PoseSymbols) 
 def branch_names(offset: Any, *choices: Sequence[str]) -> tuple[str, ...]:
     """Return the names of branches: the shoulder's side with every combination of the other choices.
 
-    With offset 0 the shoulders are called front and back in place of left and right.
+    With offset 0 the shoulders are called front and back instead of left and right.
     """
     sides = ("left", "right") if offset else ("front", "back")
     return tuple(" ".join(words) for words in product(sides, *choices))
@@ -152,7 +153,9 @@ def branch_names(offset: Any, *choices: Sequence[str]) -> tuple[str, ...]:
 def to_arm_frame(vector: Vector, q1: Pair, rho: Pair = (1.0, 0.0)) -> Vector:
     """Return a vector in the axes of the arm's plane at joint 1 = q1, then rotated by -rho about v."""
     c, s = q1
-    x, u, v = c * vector[0] - s * vector[2], vector[1], c * vector[2] + s * vector[0]
+    x = c * vector[0] - s * vector[2]
+    u = vector[1]
+    v = c * vector[2] + s * vector[0]
     return rho[0] * x + rho[1] * u, rho[0] * u - rho[1] * x, v
 
 

@@ -85,7 +85,7 @@ class Family:
     name: str
     """An identifier."""
     fit: Callable[[Axes], Fit | None]
-    """Returns an arm's fit from its axes at zero joint positions; None if it is no member."""
+    """Returns an arm's fit from its axes at zero joint positions; None if it is not a member."""
     formulas: Callable[[Mapping[str, SX], PoseSymbols], list[Branch]]
     """Returns the branches in the order of ``Fit.branches``, from named parameters and the pose."""
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 SX: TypeAlias = Any
-"""A CasADi SX scalar, or a number in place of one."""
+"""A CasADi SX scalar, or a number instead of one."""
 Pair: TypeAlias = tuple[SX, SX]
 """Cosine and sine of an angle."""
 
@@ -154,7 +154,8 @@ def two_link(x: SX, y: SX, L1: SX, L2: SX, scale: SX) -> TwoLink:
         Size of the numbers from which x and y were computed, m; rounding is a share of it.
     """
     R = hypot(x, y)
-    reach, gap = L1 + L2, fabs(L1 - L2)
+    reach = L1 + L2
+    gap = fabs(L1 - L2)
     excess = fmax(R - reach, gap - R)
     beyond = excess > BOUNDARY_SHARE * scale
     # 1 + cos b and 1 - cos b as products, so that nothing cancels near the stretched and the folded arm.

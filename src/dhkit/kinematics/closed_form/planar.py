@@ -67,7 +67,8 @@ def chain_fit(axes: Axes) -> Fit | None:
     tool = R @ (axes.T_world_tool[:3, 3] - origin)
     elbow = R @ (axes.point(revolute[1]) - origin)
     end = R @ (axes.point(revolute[2]) - origin) if len(revolute) == 3 else tool
-    upper, fore = elbow[:2], end[:2] - elbow[:2]
+    upper = elbow[:2]
+    fore = end[:2] - elbow[:2]
     if min(np.linalg.norm(upper), np.linalg.norm(fore)) <= axes.tolerance * axes.scale:
         return None
     seen = R @ axes.T_world_tool[:3, :3]
@@ -113,7 +114,8 @@ def chain_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     branches = []
     for side in (0, 1):
         # Seen from above, the elbow is on the left if v points up; otherwise left and right are exchanged.
-        upright, other = p["up"] > 0, 1 - side
+        upright = p["up"] > 0
+        other = 1 - side
         qa = add_angles(select_pair(upright, arm.first[side], arm.first[other]), p["upper"], -1.0)
         qb = add_angles(select_pair(upright, arm.between[side], arm.between[other]), p["bend"], -1.0)
         turns = iter((qa, qb, add_angles(add_angles(rho, qa, -1.0), qb, -1.0)))
@@ -129,8 +131,10 @@ def polar_fit(axes: Axes) -> Fit | None:
     """Recognize a revolute joint with a slide across its axis."""
     if axes.kinds != "RP" or not axes.perpendicular(1, 2):
         return None
-    R, origin = _across(axes.direction(1)), axes.point(1)
-    tool, along = R @ (axes.T_world_tool[:3, 3] - origin), R @ axes.direction(2)
+    R = _across(axes.direction(1))
+    origin = axes.point(1)
+    tool = R @ (axes.T_world_tool[:3, 3] - origin)
+    along = R @ axes.direction(2)
     return Fit(
         geometry="a slide at right angles to a revolute axis",
         parameters={
@@ -149,7 +153,8 @@ def polar_fit(axes: Axes) -> Fit | None:
 def polar_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     """Return two branches: the prismatic joint extended in its positive direction, then in its negative."""
     x, u, v = pose.seen(p["T_plane_world"], _IDENTITY).position
-    R, lift = hypot(x, u), fabs(p["lift"])
+    R = hypot(x, u)
+    lift = fabs(p["lift"])
     beyond = lift - R > BOUNDARY_SHARE * pose.scale
     square = (R - lift) * (R + lift)
     length = sqrt(positive_part(square))
@@ -179,7 +184,8 @@ def slider_fit(axes: Axes) -> Fit | None:
     if axes.kinds != "PR" or not axes.perpendicular(1, 2):
         return None
     v, x = axes.direction(2), axes.direction(1)
-    R, origin = np.stack([x, np.cross(v, x), v]) + 0.0, axes.point(2)
+    R = np.stack([x, np.cross(v, x), v]) + 0.0
+    origin = axes.point(2)
     tool = R @ (axes.T_world_tool[:3, 3] - origin)
     length = float(np.linalg.norm(tool[:2]))
     if length <= axes.tolerance * axes.scale:

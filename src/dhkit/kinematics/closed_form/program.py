@@ -23,7 +23,8 @@ def program(family: Family, fit: Fit, prismatic: Sequence[bool]) -> Graph:
 
     The program's parameters are ``fit.vector()`` followed by ``limit_parameters``.
     """
-    symbols, limits = ca.SX.sym("p", len(fit.vector())), ca.SX.sym("limits", 2 * len(prismatic))
+    symbols = ca.SX.sym("p", len(fit.vector()))
+    limits = ca.SX.sym("limits", 2 * len(prismatic))
     return _graph(family, fit, prismatic, fit.named(symbols), limits, {"parameters": ca.vertcat(symbols, limits)})
 
 

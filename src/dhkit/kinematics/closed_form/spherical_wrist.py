@@ -109,7 +109,8 @@ def slide_fit(axes: Axes) -> Fit | None:
     if centre is None:
         return None
     plane = ArmPlane.of(axes)
-    second, wrist = plane.coordinates(axes.point(2)), plane.coordinates(centre)
+    second = plane.coordinates(axes.point(2))
+    wrist = plane.coordinates(centre)
     along = plane.R @ axes.direction(3)
     lever = wrist[:2] - second[:2]
     geometry = {
@@ -133,8 +134,10 @@ def slide_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     T = pose.seen(p["T_plane_world"], p["T_tool_wrist"])
     branches = []
     for shoulder in ordered_shoulders(p, T.position, pose):
-        x, u = shoulder.x - p["a1"], T.position[1]
-        R, lift = hypot(x, u), fabs(p["lift"])
+        x = shoulder.x - p["a1"]
+        u = T.position[1]
+        R = hypot(x, u)
+        lift = fabs(p["lift"])
         short = lift - R
         beyond = short > BOUNDARY_SHARE * pose.scale
         square = (R - lift) * (R + lift)
@@ -171,7 +174,8 @@ def _with_wrist(
 
     Where axes 4 and 6 coincide, as exactly as the pose is known, q4 is the free joint's angle.
     """
-    q1, rho = region.shoulder.q1, region.rho
+    q1 = region.shoulder.q1
+    rho = region.rho
     wrist = wrist_axes(p, (to_arm_frame(axis, q1, rho) for axis in rotation))
     q4 = unit_pair(wrist.a[0], wrist.a[1], ill_determined(pose), pose.free)
     roll = angle(q4)

@@ -66,7 +66,8 @@ def three_parallel_fit(axes: Axes) -> Fit | None:
     links = link_parameters(axes, plane, axes.point(4))
     if links is None:
         return None
-    fourth, end = plane.coordinates(axes.point(4)), plane.coordinates(meeting)
+    fourth = plane.coordinates(axes.point(4))
+    end = plane.coordinates(meeting)
     own: dict[str, Parameter] = {
         "offset": axes.snapped(end[2]),
         "lever": end[:2] - fourth[:2],
@@ -119,8 +120,10 @@ def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX, p
     misses by less. Where rho is free, it is not changed for the flip alone.
     """
     lever = p["lever"]
-    x, u = position[0] - p["a1"], position[1]
-    reach, gap = p["L2"] + p["L3"], fabs(p["L2"] - p["L3"])
+    x = position[0] - p["a1"]
+    u = position[1]
+    reach = p["L2"] + p["L3"]
+    gap = fabs(p["L2"] - p["L3"])
     reached = add_angles(rho, lever)
 
     def end(sense: float) -> tuple[SX, SX]:
@@ -128,7 +131,8 @@ def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX, p
         distance = hypot(x - sense * reached[0], u - sense * reached[1])
         return distance, if_else(distance > reach, reach, fmax(distance, gap))
 
-    unflipped, flipped = end(1.0), end(-1.0)
+    unflipped = end(1.0)
+    flipped = end(-1.0)
     excess = fabs(unflipped[0] - unflipped[1])
     excess_of_flip = fabs(flipped[0] - flipped[1])
     is_determined = swing > MIN_DIRECTION * ill_determined(pose)
@@ -138,10 +142,12 @@ def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX, p
     wanted = if_else(of_flip, flipped[1], unflipped[1])
 
     # The triangle of axis 2, axis 4 and the meeting point: its angle at the latter by the law of cosines.
-    far, arm = hypot(x, u), hypot(lever[0], lever[1])
+    far = hypot(x, u)
+    arm = hypot(lever[0], lever[1])
     area = 2.0 * far * arm
     cosine = (far * far + arm * arm - wanted * wanted) / if_else(area > 0, area, 1.0)
-    to_end, to_lever = unit_pair(x, u), unit_pair(lever[0], lever[1])
+    to_end = unit_pair(x, u)
+    to_lever = unit_pair(lever[0], lever[1])
     side = sign(sense * add_angles(add_angles(rho, to_lever), to_end, -1.0)[1])
     corner = unit_pair(cosine, side * sqrt(positive_part(1.0 - cosine * cosine)))
     turned = add_angles(add_angles(to_end, corner), to_lever, -1.0)
@@ -162,7 +168,8 @@ def _elbows(
     scale: SX,
 ) -> tuple[Branch, Branch]:
     reached = add_angles(rho, p["lever"])
-    x, u = position[0] - p["a1"] - reached[0], position[1] - reached[1]
+    x = position[0] - p["a1"] - reached[0]
+    u = position[1] - reached[1]
 
     def branch(elbow: Elbow) -> Branch:
         rest = add_angles(rho, elbow.rotation, -1.0)

@@ -38,7 +38,8 @@ def pan_tilt_fit(axes: Axes) -> Fit | None:
     if axes.kinds != "RR" or not axes.perpendicular(1, 2):
         return None
     plane = ArmPlane.of(axes)
-    second, tool = plane.coordinates(axes.point(2)), plane.coordinates(axes.T_world_tool[:3, 3])
+    second = plane.coordinates(axes.point(2))
+    tool = plane.coordinates(axes.T_world_tool[:3, 3])
     lever = tool[:2] - second[:2]
     if np.linalg.norm(lever) <= axes.tolerance * axes.scale:
         return None
@@ -55,7 +56,8 @@ def pan_tilt_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     position = pose.seen(p["T_plane_world"], _IDENTITY).position
     branches = []
     for shoulder in ordered_shoulders(p, position, pose):
-        x, u = shoulder.x - p["a1"], position[1]
+        x = shoulder.x - p["a1"]
+        u = position[1]
         tilt = add_angles(unit_pair(x, u, pose.scale), p["lever"], -1.0)
         branches.append(
             Branch(
@@ -129,7 +131,8 @@ def yaw_three_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
         wanted = to_arm_frame(weighted_sum(p["axis"], T.rotation), shoulder.q1)
         rho = add_angles(unit_pair(wanted[0], wanted[1]), p["pointing"], -1.0)
         reached = add_angles(rho, p["lever"])
-        x, u = shoulder.x - p["a1"] - reached[0], T.position[1] - reached[1]
+        x = shoulder.x - p["a1"] - reached[0]
+        u = T.position[1] - reached[1]
         sideways = hypot(wanted[0], wanted[1]) < SINGULAR
         branches += _branches(p, shoulder, x, u, pose.scale, rho, sideways)
     return branches

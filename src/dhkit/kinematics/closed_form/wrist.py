@@ -80,7 +80,9 @@ def joints_5_and_6(p: Mapping[str, SX], wrist: Wrist, roll: Pair) -> tuple[tuple
 
     Both follow from the rotation that remains after the roll about the first axis, so that any roll closes the pose.
     """
-    a, n, m = wrist.a, wrist.n, wrist.m
+    a = wrist.a
+    n = wrist.n
+    m = wrist.m
     bend = unit_pair(roll[0] * a[0] + roll[1] * a[1], a[2])
     q5 = angle(add_angles((bend[1], bend[0]), p["wrist"], -1.0))
     q6 = angle(unit_pair(roll[0] * n[1] - roll[1] * n[0], roll[1] * m[0] - roll[0] * m[1]))

@@ -25,7 +25,7 @@ from dhkit.description import Array
 _ENTRY_COST = 1000.0
 """Cost of an entry that is not zero: more than all other preferences of a table together."""
 _OBLIQUE_COST, _STRAIGHT_COST, _NEGATIVE_COST = 20.0, 2.0, 1.0
-"""Extra costs of an angle that is no multiple of 90 degrees, of one of 180 degrees, and of a negative number."""
+"""Extra costs of an angle that is not a multiple of 90 degrees, of one of 180 degrees, and of a negative number."""
 _LONG, _TOO_LONG_COST = 2.0, 1e5
 """Length, in units of the longest step, from which an entry is too long, and the cost of each unit beyond it: no entry
 that is saved is worth a long one."""
@@ -85,7 +85,8 @@ class Axes:
 
         They are ``on_axis``, a point on the axis, shape (3,), nearby frames, base, tip, and feet on the axis.
         """
-        z, feet = self.directions[i], self.feet
+        z = self.directions[i]
+        feet = self.feet
         if len(feet):
             feet = feet[np.linalg.norm(np.cross(feet - on_axis, z), axis=1) < _ON_AXIS_DISTANCE]
         return np.vstack(
@@ -222,9 +223,11 @@ def tidiest_normals(axes: Axes, begin: Callable[[Normal], Choice], finish: Calla
 
 def _extended(axes: Axes, i: int, path: Path) -> list[Path]:
     """Return a path with each possible normal from axis i to axis i + 1 (from 0)."""
-    previous, z = path.normals[-1], axes.directions[i]
+    previous = path.normals[-1]
+    z = axes.directions[i]
     normals = _normals_after(axes, i, previous.end, previous.x)
-    x, start = np.array([normal.x for normal in normals]), np.array([normal.start for normal in normals])
+    x = np.array([normal.x for normal in normals])
+    start = np.array([normal.start for normal in normals])
     d = (start - previous.end) @ z
     theta = angle_about(z, previous.x, x)
     a, alpha = np.array([[normal.length, _alpha(axes, i, normal)] for normal in normals]).T
@@ -262,7 +265,8 @@ def _normals_after(axes: Axes, i: int, on_axis: Array, previous: Array | None) -
     previous
         The unit vector of the previous normal, if there is one.
     """
-    z, z_next = axes.directions[i], axes.directions[i + 1]
+    z = axes.directions[i]
+    z_next = axes.directions[i + 1]
     lines = axes.axis_points(i + 1, on_axis) if axes.prismatic[i + 1] else axes.points[i + 1][None]
     cross = np.cross(z, z_next)
     sine = float(np.linalg.norm(cross))
@@ -280,7 +284,8 @@ def nearest_points(point: Array, z: Array, other: Array, z_other: Array) -> tupl
     A line has a point, shape (3,), m, and a unit vector. Cross products keep the digits that a difference of scalar
     products loses for nearly parallel lines.
     """
-    gap, cross = other - point, np.cross(z, z_other)
+    gap = other - point
+    cross = np.cross(z, z_other)
     square = float(cross @ cross)
     along = float(np.cross(gap, z_other) @ cross) / square
     along_other = float(np.cross(gap, z) @ cross) / square
@@ -289,7 +294,8 @@ def nearest_points(point: Array, z: Array, other: Array, z_other: Array) -> tupl
 
 def _parallel_normals(axes: Axes, i: int, on_axis: Array, line: Array, previous: Array | None) -> list[Normal]:
     """Return normals between parallel axes, at known points' heights; of coincident ones in known directions."""
-    z, gap = axes.directions[i], line - on_axis
+    z = axes.directions[i]
+    gap = line - on_axis
     gap = gap - (gap @ z) * z
     distance = float(np.linalg.norm(gap))
     if distance > ZERO:

@@ -80,7 +80,8 @@ class Rounding:
         last_decimal = 0.0 if self.decimals is None else 10.0**-self.decimals
         if np.hypot(T[0, 0], T[1, 0]) < max(_MAX_LOCKED_COSINE, last_decimal):
             # At gimbal lock, rounding errors alone would decide how roll and yaw share the angle.
-            roll, yaw = np.arctan2(-T[1, 2], T[1, 1]), 0.0
+            roll = np.arctan2(-T[1, 2], T[1, 1])
+            yaw = 0.0
         r, p, y = (self.angle(float(value)) for value in (roll, pitch, yaw))
         return Placement(self.vector(xyz), (r, p, y))
 
@@ -119,7 +120,8 @@ class Draft:
 
     def description(self, table: Table, rounding: Rounding) -> Description:
         """Return the description of a table, its numbers rounded."""
-        chain, bare = self.chain, self._without_bodies(table, rounding)
+        chain = self.chain
+        bare = self._without_bodies(table, rounding)
         # Bodies and shapes are placed in the frames of the rounded table.
         frames = world_to_frames(bare, np.zeros(bare.n))
         tool_pose = np.linalg.inv(frames[-1]) @ chain.zero_poses[chain.tip]
@@ -156,8 +158,11 @@ class Draft:
 
     def _body(self, i: int, T_base_frame: Array, rounding: Rounding) -> Body:
         """Return the links that move with joint i (0: the base) as one body in a frame."""
-        chain, to_frame = self.chain, np.linalg.inv(T_base_frame)
-        mass, moment, second = 0.0, np.zeros(3), np.zeros((3, 3))
+        chain = self.chain
+        to_frame = np.linalg.inv(T_base_frame)
+        mass = 0.0
+        moment = np.zeros(3)
+        second = np.zeros((3, 3))
         parts = []
         for link in chain.groups[i]:
             inertial = chain.tree.links[link].inertial
@@ -166,7 +171,8 @@ class Draft:
             T = to_frame @ chain.zero_poses[link]
             com = T[:3, :3] @ inertial.com + T[:3, 3]
             parts.append((inertial.mass, com, T[:3, :3] @ inertial.inertia @ T[:3, :3].T))
-            mass, moment = mass + inertial.mass, moment + inertial.mass * com
+            mass = mass + inertial.mass
+            moment = moment + inertial.mass * com
         center = moment / mass if mass else np.zeros(3)
         for weight, com, inertia in parts:
             arm = com - center
@@ -174,7 +180,8 @@ class Draft:
         return rounding.body(mass, center, second)
 
     def _placed_shapes(self, i: int, T_base_frame: Array) -> tuple[Shape, ...]:
-        to_frame, rounding = np.linalg.inv(T_base_frame), Rounding(_SHAPE_DECIMALS)
+        to_frame = np.linalg.inv(T_base_frame)
+        rounding = Rounding(_SHAPE_DECIMALS)
         return tuple(replace(shape, placement=rounding.placement(to_frame @ T)) for shape, T in self.shapes[i])
 
 
@@ -213,7 +220,8 @@ def _joint_names(names: Sequence[str]) -> list[str]:
         name = allowed_name(original, f"joint{number}")
         if RESERVED_NAME.fullmatch(name):
             name = f"{name}_joint"
-        stem, count = name, 1
+        stem = name
+        count = 1
         while name in allowed:
             count += 1
             name = f"{stem[: BOUNDS.name_characters - 4]}_{count}"

@@ -34,7 +34,10 @@ def frame(x: Array, z: Array, origin: Array) -> Array:
     x = x - (x @ z) * z
     x = x / np.linalg.norm(x)
     T = np.eye(4)
-    T[:3, 0], T[:3, 1], T[:3, 2], T[:3, 3] = x, np.cross(z, x), z, origin
+    T[:3, 0] = x
+    T[:3, 1] = np.cross(z, x)
+    T[:3, 2] = z
+    T[:3, 3] = origin
     return T
 
 
@@ -63,13 +66,15 @@ def first_row(convention: Convention, normal: Normal, z: Array) -> Choice:
     z is the axis' unit vector, shape (3,); lengths are in units of about the arm's size.
     """
     T = frame(normal.x, z, normal.start)
-    R, t = T[:3, :3], T[:3, 3]
+    R = T[:3, :3]
+    t = T[:3, 3]
     thetas = [0.0]
     thetas += _and_opposite(np.arctan2(R[1, 0], R[1, 1]))  # the base's yaw is 0
     thetas += _and_opposite(np.arctan2(R[2, 0], R[2, 1]))  # its pitch
     thetas += _and_opposite(np.arctan2(-R[2, 1], R[2, 0]))  # its roll
     if convention is Convention.STANDARD:
-        angles, shifts = np.array(thetas), np.array([0.0, *_zeroing_shifts(t, z)])
+        angles = np.array(thetas)
+        shifts = np.array([0.0, *_zeroing_shifts(t, z)])
         turns = angle_costs(angles) + _outside_costs(angle_costs(_roll_pitch_yaw(R @ _rotations(2, -angles))))
         lengths = length_costs(shifts) + _outside_costs(length_costs(t - shifts[:, None] * z))
         k, j = int(np.argmin(turns)), int(np.argmin(lengths))
@@ -137,12 +142,14 @@ def _standard_ends(R: Array, t: Array, with_theta: bool) -> Iterator[Choice]:
         turns = float(angle_costs(np.array([theta]))[0]) + angle_costs(alphas) + _outside_costs(angle_costs(tool_turns))
         # x is the entry a; d and the tool share y and z.
         costs = turns + float(length_costs(p[:1])[0])
-        c, s = np.cos(alphas), np.sin(alphas)
+        c = np.cos(alphas)
+        s = np.sin(alphas)
         with np.errstate(divide="ignore", invalid="ignore"):
             offsets = [np.zeros_like(alphas), np.full_like(alphas, p[2]), p[2] - s / c * p[1], p[2] + c / s * p[1]]
         for d in offsets if with_theta else offsets[:1]:
             d = np.where(np.isfinite(d) & (np.abs(d) < _MAX_OFFSET), d, 0.0)
-            y, z = c * p[1] + s * (p[2] - d), -s * p[1] + c * (p[2] - d)
+            y = c * p[1] + s * (p[2] - d)
+            z = -s * p[1] + c * (p[2] - d)
             total = costs + length_costs(d) + _outside_costs(length_costs(np.stack([y, z], axis=-1)))
             k = int(np.argmin(total))
             yield float(total[k]), EndRow(float(theta), float(d[k]), float(alphas[k]), float(p[0]))

@@ -151,7 +151,8 @@ def extracted(
     if not 1 <= len(chain.joints) <= ROBOT_BOUNDS.joints:
         raise ModelError(f"{chain.path}: {len(chain.joints)} joints; expected 1 to {ROBOT_BOUNDS.joints}")
     notes = [*chain.notes]
-    original, changes = Original(chain), chain.tree.changes
+    original = Original(chain)
+    changes = chain.tree.changes
     if not changes:
         original.check_reading()
     meshes = MeshFinder(chain.path, package_dirs)
@@ -203,7 +204,8 @@ def _link_shapes(
     chain: Chain, name: str, meshes: MeshFinder, left_out: list[str], has_visuals: bool
 ) -> Iterator[tuple[Shape, Array]]:
     """Yield a link's visual shapes, or its collision shapes if no link has visual ones."""
-    link, folder = chain.tree.links[name], meshes.mesh_folder
+    link = chain.tree.links[name]
+    folder = meshes.mesh_folder
     for shape in link.visuals if has_visuals else link.collisions:
         geometry = shape.geometry
         if isinstance(geometry, Mesh):

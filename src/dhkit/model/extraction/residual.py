@@ -99,7 +99,8 @@ class Original:
         weight = float(np.nansum(numbers.mass)) * float(np.linalg.norm(numbers.gravity))
         reach = max(description.reach, float(np.abs(self.tool[:, :3, 3]).max()))
         scales = float(np.abs(self.M).max()), max(float(np.abs(self.g).max()), _MIN_GRAVITY_SHARE * weight * reach)
-        M_error, g_error = float(np.abs(M - self.M).max()), float(np.abs(g - self.g).max())
+        M_error = float(np.abs(M - self.M).max())
+        g_error = float(np.abs(g - self.g).max())
         return Residual(tool, M_error / (scales[0] or 1.0), g_error / (scales[1] or 1.0), len(self.q))
 
     def _tools(self) -> Iterator[Array]:
@@ -132,8 +133,10 @@ def _dynamics(model: PinocchioModel, q: Array) -> tuple[Array, Array]:
     """Return M, shape (N, n, n), and g, shape (N, n)."""
     import pinocchio as pin
 
-    data, n = model.createData(), model.nv
-    M, g = np.empty((len(q), n, n)), np.empty((len(q), n))
+    data = model.createData()
+    n = model.nv
+    M = np.empty((len(q), n, n))
+    g = np.empty((len(q), n))
     for k, state in enumerate(q):
         upper = np.triu(np.reshape(np.array(pin.crba(model, data, state)), (n, n)))
         M[k] = upper + np.triu(upper, 1).T

@@ -143,7 +143,8 @@ def _unit_table(axes: Axes, convention: Convention) -> Table:
             lambda normal: first_row(convention, normal, z[0]),
             lambda normal: last_row(convention, normal, z[-1], axes.T_base_tip),
         )
-    first, start = path.normals[0], path.start
+    first = path.normals[0]
+    start = path.start
     T = frame(first.x, z[0], first.start) @ np.linalg.inv(screw(2, start.theta, start.d))
     if convention is Convention.MODIFIED:
         T = T @ np.linalg.inv(screw(0, start.alpha, start.a))
@@ -152,8 +153,12 @@ def _unit_table(axes: Axes, convention: Convention) -> Table:
 
 def _rows(axes: Axes, convention: Convention, path: Path) -> Array:
     """Return theta, d, a, alpha of each row of the convention, shape (n, 4)."""
-    z, n, start, end = axes.directions, axes.n, path.start, path.end or path.start
-    along, across = np.zeros((n, 2)), np.zeros((n + 1, 2))
+    z = axes.directions
+    n = axes.n
+    start = path.start
+    end = path.end or path.start
+    along = np.zeros((n, 2))
+    across = np.zeros((n + 1, 2))
     along[-1] = end.theta, end.d
     along[0] = start.theta, start.d
     across[0], across[n] = (start.a, start.alpha), (end.a, end.alpha)
@@ -170,7 +175,8 @@ def _rows(axes: Axes, convention: Convention, path: Path) -> Array:
 
 def _single_joint_paths(axes: Axes, convention: Convention) -> Iterator[Path]:
     """Yield tables of one joint: a normal of length zero at a known point's height, in a known direction."""
-    z, parts = axes.directions[0], axes.perpendicular(0, None)
+    z = axes.directions[0]
+    parts = axes.perpendicular(0, None)
     for x in (*parts, *-parts):
         for point in axes.start_points(0, axes.points[0]):
             origin = point if axes.prismatic[0] else axes.points[0] + ((point - axes.points[0]) @ z) * z

@@ -49,7 +49,7 @@ class CasadiFunctions:
     DescriptionError
         By the functions of dynamics: a link without a body.
     TypeError
-        ``friction`` is neither a bool nor a :class:`Friction`, or another layer is no bool.
+        ``friction`` is neither a bool nor a :class:`Friction`, or another layer is not a bool.
 
     Examples
     --------
@@ -86,13 +86,15 @@ class CasadiFunctions:
     @cached_property
     def fk(self) -> casadi.Function:
         """The tool in the world, q -> T, 4 x 4."""
-        table, q = SymbolicTable.of(self._description), self._q
+        table = SymbolicTable.of(self._description)
+        q = self._q
         return _function("fk", {"q": q}, {"T": table.world_to_tool(q)})
 
     @cached_property
     def jacobian(self) -> casadi.Function:
         """The tool's Jacobian, q -> J, 6 x n: linear, then angular velocity, world axes."""
-        table, q = SymbolicTable.of(self._description), self._q
+        table = SymbolicTable.of(self._description)
+        q = self._q
         return _function("jacobian", {"q": q}, {"J": jacobian(table, q)})
 
     # Dynamics

@@ -155,7 +155,8 @@ def _wrench_at_each_joint(frames: list[EquationFrame], j: int, wrench: _Wrench) 
     force, moment = wrench
     for i in reversed(range(j + 1)):
         yield i, (force, moment)
-        force, moment = frames[i].to_previous(force), frames[i].to_previous(moment)
+        force = frames[i].to_previous(force)
+        moment = frames[i].to_previous(moment)
         moment = plus(moment, cross(frames[i].lever, force))
 
 

@@ -79,7 +79,8 @@ def lagrange_gravity_torque(table: InertialTable, q: casadi.SX) -> casadi.SX:
 
 def lagrange_inverse_dynamics(table: InertialTable, q: casadi.SX, qd: casadi.SX, qdd: casadi.SX) -> casadi.SX:
     """Return tau = M qdd + C qd + g, n x 1, N m and N, from the matrices."""
-    M, C = lagrange_mass_matrix(table, q), lagrange_coriolis_matrix(table, q, qd)
+    M = lagrange_mass_matrix(table, q)
+    C = lagrange_coriolis_matrix(table, q, qd)
     return M @ qdd + C @ qd + lagrange_gravity_torque(table, q)
 
 

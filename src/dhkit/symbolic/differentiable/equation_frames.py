@@ -72,9 +72,14 @@ def equation_frames(table: InertialTable, q: casadi.SX) -> list[EquationFrame]:
         rotation = _cos_sin(angles)
         stays_twisted = i + 1 == len(table.rows) or is_zero(table.rows[i + 1].sin_alpha)
         if stays_twisted:
-            shown, moments, link_rotation = (1.0, 0.0), link.about_z(*rotation), rotation
+            shown = (1.0, 0.0)
+            moments = link.about_z(*rotation)
+            link_rotation = rotation
         else:
-            shown, moments, link_rotation, angles = rotation, link, (1.0, 0.0), (0.0, 1.0, 0.0)
+            shown = rotation
+            moments = link
+            link_rotation = (1.0, 0.0)
+            angles = (0.0, 1.0, 0.0)
         frames.append(EquationFrame(row.prismatic, row.cos_alpha, row.sin_alpha, lever, shown, moments))
     return frames
 
@@ -89,7 +94,8 @@ def link_velocities(frames: list[EquationFrame], qd: casadi.SX) -> list[tuple[Ve
     qd
         Joint velocities, n x 1.
     """
-    w, v = ZERO_VECTOR, ZERO_VECTOR
+    w = ZERO_VECTOR
+    v = ZERO_VECTOR
     velocities = []
     for i, frame in enumerate(frames):
         v = frame.to_twisted(plus(v, cross(w, frame.lever)))
@@ -119,5 +125,6 @@ def _cos_sin(angles: tuple[Scalar, Scalar, Scalar]) -> tuple[Scalar, Scalar]:
     angle, c, s = angles
     if isinstance(angle, float):
         return c, s
-    cos_q, sin_q = casadi.cos(angle), casadi.sin(angle)
+    cos_q = casadi.cos(angle)
+    sin_q = casadi.sin(angle)
     return cos_q * c - sin_q * s, sin_q * c + cos_q * s

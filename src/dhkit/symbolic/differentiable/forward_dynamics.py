@@ -26,7 +26,8 @@ def solve_for_acceleration(M: casadi.SX, torque: casadi.SX) -> casadi.SX:
 
     n = M.shape[0]
     least = SINGULAR * reduce(casadi.fmax, [M[k, k] for k in range(n)])
-    pivots, regular = [casadi.SX(0)] * n, casadi.SX(1)
+    pivots = [casadi.SX(0)] * n
+    regular = casadi.SX(1)
     A = [[M[min(i, j), max(i, j)] for j in range(n)] for i in range(n)]
     b = [torque[i] for i in range(n)]
     factors = [[casadi.SX(0)] * n for _ in range(n)]

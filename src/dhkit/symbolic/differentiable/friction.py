@@ -80,9 +80,11 @@ def friction_torque(qd: casadi.SX, parameters: casadi.SX, *, smooth: bool) -> ca
     n = qd.numel()
     torques = []
     for i in range(n):
-        speed, width = qd[i], parameters[3 * n]
+        speed = qd[i]
+        width = parameters[3 * n]
         s = speed / casadi.sqrt(speed * speed + width * width) if smooth else casadi.sign(speed)
-        positive, negative = parameters[n + 2 * i], parameters[n + 2 * i + 1]
+        positive = parameters[n + 2 * i]
+        negative = parameters[n + 2 * i + 1]
         dry = (positive - negative) / 2 * s + (positive + negative) / 2 * (s * s)
         torques.append(parameters[i] * speed + dry)
     return casadi.vertcat(*torques)

@@ -162,7 +162,8 @@ def exact_moments(description: Description) -> list[Moments]:
         com: Vector3 = (x, y, z)
         if standard:
             # The transform from the joint frame to DH frame i is Tx(a) Rx(alpha).
-            c, s = Fraction(float(numbers.cos_alpha[i])), Fraction(float(numbers.sin_alpha[i]))
+            c = Fraction(float(numbers.cos_alpha[i]))
+            s = Fraction(float(numbers.sin_alpha[i]))
             com = plus((Fraction(float(numbers.a[i])), 0, 0), about_x(c, s, com))
             half = [about_x(c, s, (row[0], row[1], row[2])) for row in inertia]
             inertia = [list(about_x(c, s, (col[0], col[1], col[2]))) for col in zip(*half, strict=True)]

@@ -36,7 +36,9 @@ def joint_rows(description: Description) -> list[JointRow]:
     columns = (numbers.a, numbers.cos_alpha, numbers.sin_alpha)
     a, cos_alpha, sin_alpha = (column.tolist() for column in columns)
     if description.convention is Convention.STANDARD:
-        a, cos_alpha, sin_alpha = [0.0, *a[:-1]], [1.0, *cos_alpha[:-1]], [0.0, *sin_alpha[:-1]]
+        a = [0.0, *a[:-1]]
+        cos_alpha = [1.0, *cos_alpha[:-1]]
+        sin_alpha = [0.0, *sin_alpha[:-1]]
     return [
         JointRow(*entries)
         for entries in zip(

@@ -24,7 +24,7 @@ class Moments:
     first: Vector3
     """Mass times centre of mass, kg m."""
     difference: Scalar
-    """S_xx - S_yy, kg m^2. It stands in place of S_xx because it is 0 for links that are symmetric about their axis."""
+    """S_xx - S_yy, kg m^2. It stands instead of S_xx because it is 0 for links that are symmetric about their axis."""
     yy: Scalar
     """S_yy, kg m^2; likewise the next four."""
     zz: Scalar
@@ -81,7 +81,7 @@ class Moments:
         """Return the moments in axes in which this frame is turned about z by the angle of cosine c and sine s."""
         x, y, z = about_z(c, s, self.first)
         xz, yz, _ = about_z(c, s, (self.xz, self.yz, 0))
-        # S_xx' = S_yy + c t, S_xy' = S_xy + s t with t = c (S_xx - S_yy) - 2 s S_xy: four products in place of eight.
+        # S_xx' = S_yy + c t, S_xy' = S_xy + s t with t = c (S_xx - S_yy) - 2 s S_xy: four products instead of eight.
         t = c * self.difference - s * (2 * self.xy)
         ct = c * t
         return Moments(self.mass, (x, y, z), ct + ct - self.difference, self.xx - ct, self.zz, self.xy + s * t, xz, yz)

@@ -99,7 +99,8 @@ def recursive_inverse_dynamics(
             a = a[0] + double * motion.w[1], a[1] - double * motion.w[0], a[2] + qdd[i]
         else:
             motion = motion.with_joint_motion(qd[i], qdd[i])
-        a, motion = frame.from_twisted(a), motion.in_link_axes(frame)
+        a = frame.from_twisted(a)
+        motion = motion.in_link_axes(frame)
         own = frame.moments
         wrenches.append(
             (plus(times(own.mass, a), motion.times(own.first)), plus(motion.moment(own), cross(own.first, a)))

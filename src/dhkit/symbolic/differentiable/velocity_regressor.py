@@ -121,7 +121,8 @@ class _FrameStep:
         if table.prismatic[i]:
             d = d + q
         else:
-            cos_q, sin_q = casadi.cos(q), casadi.sin(q)
+            cos_q = casadi.cos(q)
+            sin_q = casadi.sin(q)
             c, s = cos_q * c - sin_q * s, sin_q * c + cos_q * s
         standard = table.convention is Convention.STANDARD
         lever: Vector3 = (a, sin_alpha * d, cos_alpha * d) if standard else (a * c, -a * s, d)

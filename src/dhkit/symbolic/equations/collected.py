@@ -151,13 +151,15 @@ def _factored(order: _Order, terms: Sequence[_Term], motion: Sum = ()) -> Produc
     products = _sum(order, rest)
     takes_sign = all(abs(coefficient) == size for _, coefficient in terms)
     if all(product.coefficient < 0 for product in products[: 1 if takes_sign else None]):
-        size, products = -size, tuple(_negative(product) for product in products)
+        size = -size
+        products = tuple(_negative(product) for product in products)
     return Product(size, front, products, motion)
 
 
 def _sum(order: _Order, terms: Sequence[_Term]) -> Sum:
     """Return a sum of terms without common factor, grouped by constants that never occur together."""
-    products, rest = [], list(terms)
+    products = []
+    rest = list(terms)
     for position in _family(order, terms):
         group = [term for term in rest if _has(term, position)]
         rest = [term for term in rest if not _has(term, position)]
@@ -239,7 +241,7 @@ def _key(order: _Order, product: Product) -> tuple[int, int, list[int], list[int
 
 
 def _in_places(order: _Order, product: Product) -> Product:
-    """Return a product with indices in the ring in place of positions in the written order."""
+    """Return a product with indices in the ring instead of positions in the written order."""
 
     def placed(powers: Powers) -> Powers:
         return tuple((order.places[position], exponent) for position, exponent in powers)

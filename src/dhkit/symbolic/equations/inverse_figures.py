@@ -59,7 +59,8 @@ class _Drawing:
 
     def svg(self, title: str) -> str:
         """Return the picture."""
-        low, high = np.min(self.points, axis=0), np.max(self.points, axis=0)
+        low = np.min(self.points, axis=0)
+        high = np.max(self.points, axis=0)
         size = np.maximum(high - low, max(float((high - low).max()), 1e-9) * 0.05)
         scale = float(min((_WIDTH - 2 * _MARGIN) / size[0], (_HEIGHT - 2 * _MARGIN) / size[1]))
         middle = (low + high) / 2
@@ -82,7 +83,8 @@ class _Drawing:
                 width = 1.2 if text == "dashed" else 3
                 parts.append(f'<path d="M{x1} {y1}L{x2} {y2}" stroke="{colour}" stroke-width="{width}"{dash}/>')
             elif kind == "circle":
-                (x, y), radius = places[0], round(float(points[1][0]) * scale, 1)
+                (x, y) = places[0]
+                radius = round(float(points[1][0]) * scale, 1)
                 parts.append(
                     f'<circle cx="{x}" cy="{y}" r="{radius}" fill="none" stroke="{colour}" stroke-dasharray="3 3"/>'
                 )
@@ -112,7 +114,8 @@ def _named_roots(step: Step, form: Form, values: Values) -> list[tuple[float, st
     """Return the two roots of a step at the pose: value, name, and the values of the factors of the rule."""
     if step.choice is None:
         return []
-    letters, roots = {k: np.array(v) for k, v in _letters(form, values).items()}, []
+    letters = {k: np.array(v) for k, v in _letters(form, values).items()}
+    roots = []
     for sign in (1.0, -1.0):
         found, _ = form.solve(letters, sign)
         values.set_unknown(form.unknown, np.ravel(found))
@@ -146,7 +149,9 @@ def _letters(form: Form, values: Values) -> dict[str, float]:
 
 
 def _top(derivation: InverseDerivation, step: Step, form: Form, values: Values) -> _Drawing:
-    drawing, letters, origin = _Drawing(), _letters(form, values), np.zeros(2)
+    drawing = _Drawing()
+    letters = _letters(form, values)
+    origin = np.zeros(2)
     axis, who = _labels(step)
     is_beside = isinstance(form, Circle)
     point = np.array([letters["B"], -letters["A"]] if is_beside else [letters["X"], letters["Y"]])
@@ -180,9 +185,12 @@ def _place(derivation: InverseDerivation, values: Values) -> Array:
 
 
 def _triangle(derivation: InverseDerivation, step: Step, form: Form, values: Values) -> _Drawing:
-    drawing, letters, origin = _Drawing(), _letters(form, values), np.zeros(2)
+    drawing = _Drawing()
+    letters = _letters(form, values)
+    origin = np.zeros(2)
     point = _place(derivation, values)
-    R, N = float(np.linalg.norm(point)), float(np.hypot(letters["A"], letters["B"]))
+    R = float(np.linalg.norm(point))
+    N = float(np.hypot(letters["A"], letters["B"]))
     L1 = float(np.hypot(*(np.ravel(values.of(element))[0] for element in (step.figure.first if step.figure else ()))))
     L2 = N / (2 * L1)
     opening = np.arccos(np.clip((L1 * L1 + R * R - L2 * L2) / (2 * L1 * R), -1.0, 1.0))
@@ -192,7 +200,8 @@ def _triangle(derivation: InverseDerivation, step: Step, form: Form, values: Val
     elbows = {name: _turned(point, opening if side > 0 else -opening) * L1 / R for _, name, (side, *_) in roots}
     if "up" in elbows and "down" in elbows and elbows["up"][1] < elbows["down"][1]:
         # The plane's y axis points down: the figure is seen from the other side of y.
-        point, elbows = point * [1, -1], {name: elbow * [1, -1] for name, elbow in elbows.items()}
+        point = point * [1, -1]
+        elbows = {name: elbow * [1, -1] for name, elbow in elbows.items()}
     for (name, elbow), colour in zip(elbows.items(), (_FIRST, _SECOND), strict=True):
         drawing.line(origin, elbow, colour)
         drawing.line(elbow, point, colour)
@@ -205,9 +214,12 @@ def _triangle(derivation: InverseDerivation, step: Step, form: Form, values: Val
 
 
 def _slide(derivation: InverseDerivation, step: Step, form: Form, values: Values) -> _Drawing:
-    drawing, letters, origin = _Drawing(), _letters(form, values), np.zeros(2)
+    drawing = _Drawing()
+    letters = _letters(form, values)
+    origin = np.zeros(2)
     point = _place(derivation, values)
-    R, near = float(np.linalg.norm(point)), float(np.sqrt(max(letters["Q"] - letters["S"], 0.0)))
+    R = float(np.linalg.norm(point))
+    near = float(np.sqrt(max(letters["Q"] - letters["S"], 0.0)))
     axis, who = _labels(step)
     if near > _SHORT * R:
         for sign, colour in ((1.0, _FIRST), (-1.0, _SECOND)):
@@ -224,7 +236,8 @@ def _slide(derivation: InverseDerivation, step: Step, form: Form, values: Values
 
 
 def _turned(vector: Array, angle: float) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
+    c = np.cos(angle)
+    s = np.sin(angle)
     return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]])
 
 
@@ -241,9 +254,11 @@ def _text(at: _Pixel, text: str, colour: str, lines: Sequence[Sequence[_Pixel]])
 
 def _beside(a: _Pixel, b: _Pixel, text: str, colour: str) -> str:
     """Return a text beside the middle of a line, on its right where it rises and on its left where it falls."""
-    (x1, y1), (x2, y2) = a, b
+    (x1, y1) = a
+    (x2, y2) = b
     x, y = (x1 + x2) / 2, (y1 + y2) / 2
     length = max(float(np.hypot(x2 - x1, y2 - y1)), 1.0)
-    nx, ny = 12 * (y2 - y1) / length, -12 * (x2 - x1) / length
+    nx = 12 * (y2 - y1) / length
+    ny = -12 * (x2 - x1) / length
     anchor = "start" if nx > 4 else "end" if nx < -4 else "middle"
     return f'<text x="{x + nx:.1f}" y="{y + ny + 4:.1f}" text-anchor="{anchor}" fill="{colour}">{escape(text)}</text>'

@@ -40,7 +40,8 @@ def inverse_page(derivation: InverseDerivation) -> str:
 
 def _body(derivation: InverseDerivation) -> str:
     """Return a derivation as HTML to stand inside a page or a notebook."""
-    write, T = Phrases(derivation, latex=True), sample_pose(derivation)
+    write = Phrases(derivation, latex=True)
+    T = sample_pose(derivation)
     first, given, angles = introduction(derivation)
     parts = [_STYLE, f"<p>{escape(first)} {escape(given or GIVEN)}</p>", f"<p>{_words(angles)}</p>"]
     for number, step in enumerate(derivation.steps, start=1):
@@ -100,7 +101,8 @@ def _inline(latex: str) -> str:
 
 def _words(text: str) -> str:
     """Return words with the names of angles as MathML."""
-    parts, at = [], 0
+    parts = []
+    at = 0
     for match in _ANGLE.finditer(text):
         parts += [escape(text[at : match.start()]), _inline(rf"\theta_{{{match[2]}}}" if match[1] else r"\varphi")]
         at = match.end()

@@ -75,7 +75,7 @@ class InverseProgram:
 
 ABOUT = (
     "The joint values that bring the tool to a pose T, branch by branch: SI units and radians in (-pi, pi].",
-    "Branches that do not reach the pose have status 0, the others 1; all have 0 where T is no pose.",
+    "Branches that do not reach the pose have status 0, the others 1; all have 0 where T is not a pose.",
     "At singular poses, where solutions coincide or are not unique, one of them is returned.",
 )
 """What the generated functions' comments say."""
@@ -85,7 +85,8 @@ class _CodeWriter:
     """Writes expressions with ``+ - * /`` and calls, which all languages share."""
 
     def __init__(self, syntax: Syntax, names: dict[str, str]) -> None:
-        self._syntax, self._names = syntax, names
+        self._syntax = syntax
+        self._names = names
 
     def symbol(self, name: str) -> str:
         return self._names[name]
@@ -123,7 +124,9 @@ def inverse_program(derivation: InverseDerivation, syntax: Syntax) -> InversePro
 
 class _Statements:
     def __init__(self, derivation: InverseDerivation, syntax: Syntax) -> None:
-        self.derivation, self.chain, self.syntax = derivation, derivation.chain, syntax
+        self.derivation = derivation
+        self.chain = derivation.chain
+        self.syntax = syntax
         elements = self._elements()
         ring = self.chain.ring
         variables = {g.text for g in ring.generators if g.kind != "constant"}

@@ -31,7 +31,8 @@ def inverse_text(derivation: InverseDerivation) -> str:
     if joints:
         lines += ["", "Joint values, turned into (-pi, pi]", *(f"   {name} = {value}" for name, value in joints)]
     for condition in derivation.conditions:
-        left, right = write.element(condition.left), write.element(condition.right)
+        left = write.element(condition.left)
+        right = write.element(condition.right)
         lines += ["", *textwrap.wrap(condition.look, WIDTH), *broken_lines(f"   {left} = ", right)]
     lines += ["", *textwrap.wrap(branches_sentence(derivation), WIDTH)]
     for note in derivation.notes:

@@ -18,7 +18,7 @@ from dhkit.symbolic.ring import Element
 from dhkit.symbolic.ring.notation import Notation, notation, symbols_of
 
 _INLINE = 70
-"""Longest text of what stands in a solution in place of its letters; longer ones are listed behind it."""
+"""Longest text of what stands in a solution instead of its letters; longer ones are listed behind it."""
 PLACEHOLDER = re.compile(r"<(\w+)>")
 _ANGLE = re.compile(r"\b(theta|phi)(\d*)\b")
 
@@ -54,7 +54,8 @@ class Phrases:
     """
 
     def __init__(self, derivation: InverseDerivation, *, latex: bool) -> None:
-        self.derivation, self.is_latex = derivation, latex
+        self.derivation = derivation
+        self.is_latex = latex
         ring = derivation.chain.ring
         self._printer: Printer[str]
         if latex:
@@ -186,7 +187,8 @@ def _phi_latex(function: str, derivation: InverseDerivation) -> str:
 
 def _written_names(derivation: InverseDerivation) -> Notation:
     """Return the printed names of the ring's constants: c23 for the cosine of phi."""
-    own, label = notation(derivation.chain.ring), phi_label(derivation)
+    own = notation(derivation.chain.ring)
+    label = phi_label(derivation)
     names = {derivation.chain.names[f"{k}phi"]: f"{k}{label}" for k in "cs"} if derivation.sum else {}
     return Notation(own.names | names)
 
@@ -208,7 +210,8 @@ def solved_before(derivation: InverseDerivation, step: Step) -> list[str]:
 
 def _joints_of_quantities(derivation: InverseDerivation, step: Step) -> dict[str, set[int]]:
     """Return the joints behind each quantity that steps before one define, or find as phi, by name."""
-    names, found = derivation.chain.names, dict[str, set[int]]()
+    names = derivation.chain.names
+    found = dict[str, set[int]]()
     for earlier in derivation.steps:
         if earlier is step:
             break

@@ -213,14 +213,16 @@ def _symbols(latex: str) -> int:
 
 def _lines(marked: str, room: int) -> list[str]:
     """Break a sum in front of terms, and inside those that are longer than a line."""
-    lines, line = [], ""
+    lines = []
+    line = ""
     for term in _terms(marked):
         whole = term.replace(_BREAK, "")
         if not line or _symbols(line + whole) <= room:
             pieces = [whole] if _symbols(line + whole) <= room else term.split(_BREAK)
         elif _symbols(whole) <= room:
             lines.append(line)
-            line, pieces = "", [whole]
+            line = ""
+            pieces = [whole]
         else:
             pieces = term.split(_BREAK)
         for piece in pieces:
@@ -233,7 +235,8 @@ def _lines(marked: str, room: int) -> list[str]:
 
 def _terms(marked: str) -> list[str]:
     """Split a sum in front of the signs outside of brackets; breaks inside stay marked."""
-    terms, depth = [], 0
+    terms = []
+    depth = 0
     for piece in marked.split(_BREAK):
         if depth == 0:
             terms.append(piece)

@@ -29,7 +29,8 @@ def latex_names(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, st
         by letter.
     """
     listed = list(names)
-    used, written = set(taken), {}
+    used = set(taken)
+    written = {}
     counts: dict[str, int] = {}
     for name in listed:
         counts[_nice(name)] = counts.get(_nice(name), 0) + 1

@@ -48,7 +48,8 @@ class TextWriter:
     def product(self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]) -> str:  # noqa: D102
         decimal = readable_decimal(coefficient)
         if decimal is not None:
-            factors, divisors = [decimal, *numerator], list(denominator)
+            factors = [decimal, *numerator]
+            divisors = list(denominator)
         else:
             over, under = coefficient.numerator, coefficient.denominator
             factors = [*([str(over)] if over != 1 or not numerator else []), *numerator]
@@ -108,7 +109,8 @@ def _entry_lines(quantity: Quantity) -> list[str]:
 
 def broken_lines(head: str, text: str) -> list[str]:
     """Return a sum behind a head, broken in front of terms, and inside those that are longer than a line."""
-    lines, line = [], head
+    lines = []
+    line = head
     for term in _terms(text):
         room = WIDTH - len(line)
         if len(term) <= room:
@@ -128,7 +130,8 @@ def broken_lines(head: str, text: str) -> list[str]:
 
 def _terms(text: str) -> list[str]:
     """Split a sum in front of the signs outside of brackets."""
-    terms, depth = [""], 0
+    terms = [""]
+    depth = 0
     for piece in re.split(r"(?= [+-] )", text):
         if depth == 0:
             terms.append("")
@@ -139,7 +142,8 @@ def _terms(text: str) -> list[str]:
 
 def _filled_lines(head: str, words: Sequence[str], tail: str = "", separator: str = ", ") -> list[str]:
     """Return words behind a head, with as many on a line as it holds."""
-    lines, line = [], head + words[0]
+    lines = []
+    line = head + words[0]
     for word in [*words[1:], *([tail] if tail else [])]:
         if len(line) + len(separator) + len(word) > WIDTH:
             lines.append(line + separator.rstrip())

@@ -84,7 +84,8 @@ class Printer(Generic[T]):
 
     def expression(self, expression: Expression) -> T:
         """Return an expression of constants."""
-        writer, terms = self.writer, []
+        writer = self.writer
+        terms = []
         for monomial, coefficient in expression.terms:
             numerator = [self._power(self.atom(atom), e) for atom, e in monomial if e > 0]
             denominator = [self._power(self.atom(atom), -e) for atom, e in monomial if e < 0]
@@ -106,7 +107,7 @@ class Printer(Generic[T]):
         return base if exponent == 1 else self.writer.power(base, exponent)
 
     def _generator(self, place: int) -> T:
-        """Return a generator; a reciprocal's denominator in place of the reciprocal."""
+        """Return a generator; a reciprocal's denominator instead of the reciprocal."""
         if place not in self._written:
             generator = self._generators[place]
             if generator.kind != "constant":

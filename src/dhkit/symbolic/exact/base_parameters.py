@@ -81,7 +81,8 @@ class BaseParameters:
 
         M and g are compared; C consists of derivatives of M.
         """
-        short, ring = self.lagrangian, self.full.arm.ring
+        short = self.lagrangian
+        ring = self.full.arm.ring
         places = {short.arm.ring.place("constant", name): element for name, element in self.definitions.items()}
         back = _mapped(np.column_stack([short.M, short.g]), ring, places)
         difference = back - np.column_stack([self.full.M, self.full.g])
@@ -98,7 +99,7 @@ def base_parameters(description: Description) -> BaseParameters:
     DescriptionError
         A link has no body.
     RingError
-        The equations are too long, or a dependency between parameters is no polynomial.
+        The equations are too long, or a dependency between parameters is not a polynomial.
 
     Examples
     --------
@@ -129,7 +130,8 @@ def base_parameters(description: Description) -> BaseParameters:
 
 def _regroup(arm: ExactArm) -> dict[str, Element]:
     """Return the parameters that remain after moving shared moments to the links before, by name."""
-    bodies, steps = composite.joint_bodies(arm), composite.joint_steps(arm)
+    bodies = composite.joint_bodies(arm)
+    steps = composite.joint_steps(arm)
     for j in range(arm.n - 1, 0, -1):
         moving, bodies[j] = _split(arm.ring, arm.ring.kinds[j], bodies[j])
         bodies[j - 1] = bodies[j - 1] + moving.moved(_at_rest(arm, j, steps[j]))
@@ -153,7 +155,8 @@ def _ending(arm: ExactArm) -> str:
 def _split(ring: Ring, kind: str, body: RigidBody) -> tuple[RigidBody, RigidBody]:
     """Return the part of a link that the link before may hold as well, and the rest."""
     zero = ring.zero
-    moment, second = np.array([zero] * 3, dtype=object), np.full((3, 3), zero, dtype=object)
+    moment = np.array([zero] * 3, dtype=object)
+    second = np.full((3, 3), zero, dtype=object)
     if kind != "R":
         return RigidBody(zero, moment, body.second), RigidBody(body.mass, body.moment, second)
     moment[2] = body.moment[2]
@@ -211,7 +214,8 @@ def _equations(arm: ExactArm, definitions: Mapping[str, Element]) -> Lagrangian:
         inertial=tuple(definitions),
     )
     bodies = [body(j) for j in range(1, arm.n + 1)]
-    M, V = composite.mass_matrix(short, bodies), composite.potential_energy(short, bodies)
+    M = composite.mass_matrix(short, bodies)
+    V = composite.potential_energy(short, bodies)
     return Lagrangian(short, M, V, Named(definitions))
 
 

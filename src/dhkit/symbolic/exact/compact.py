@@ -88,12 +88,15 @@ def _sines_and_cosines(old: Ring, new: Ring) -> dict[int, Element]:
     """Return the sines and cosines of the old ring's joints in the new ring's angles, by index in the old ring."""
     turns: dict[int, Element] = {}
     for i, joints in new.angles.items():
-        s, c = new.sine(i), new.cosine(i)
+        s = new.sine(i)
+        c = new.cosine(i)
         if len(joints) > 1:
             before = joints[-2]
-            s_before, c_before = new.sine(before), new.cosine(before)
+            s_before = new.sine(before)
+            c_before = new.cosine(before)
             s, c = s * c_before - c * s_before, c * c_before + s * s_before
-        turns[old.place("sine", i)], turns[old.place("cosine", i)] = s, c
+        turns[old.place("sine", i)] = s
+        turns[old.place("cosine", i)] = c
     return turns
 
 
@@ -119,14 +122,18 @@ _Places = tuple[int, int]
 
 def _add(terms: dict[Monomial, Fraction], a: _Places, b: _Places, total: _Places) -> bool:
     """Write cos a cos b - sin a sin b as cos(a + b), and sin a cos b + cos a sin b as sin(a + b)."""
-    (sa, ca), (sb, cb), (s, c) = a, b, total
+    (sa, ca) = a
+    (sb, cb) = b
+    (s, c) = total
     one = _paired(terms, (ca, cb), (sa, sb), c, -1)
     return _paired(terms, (sa, cb), (ca, sb), s, 1) or one
 
 
 def _subtract(terms: dict[Monomial, Fraction], a: _Places, b: _Places, difference: _Places) -> bool:
     """Write cos a cos b + sin a sin b as cos(a - b), and sin a cos b - cos a sin b as sin(a - b)."""
-    (sa, ca), (sb, cb), (s, c) = a, b, difference
+    (sa, ca) = a
+    (sb, cb) = b
+    (s, c) = difference
     one = _paired(terms, (ca, cb), (sa, sb), c, 1)
     return _paired(terms, (sa, cb), (ca, sb), s, -1) or one
 

@@ -30,7 +30,8 @@ class JointTransform:
     @classmethod
     def of(cls, ring: Ring, a: Element, alpha: tuple[Element, Element], row: ExactRow) -> JointTransform:
         """Return Tx(a) Rx(alpha) Rz(theta) Tz(d)."""
-        (ca, sa), (c, s) = alpha, row.theta
+        (ca, sa) = alpha
+        (c, s) = row.theta
         R = np.array([[c, -s, ring.zero], [s * ca, c * ca, -sa], [s * sa, c * sa, ca]], dtype=object)
         return cls(R, np.array([a, -(sa * row.d), ca * row.d], dtype=object))
 
@@ -50,7 +51,8 @@ class RigidBody:
 
     def moved(self, step: JointTransform) -> RigidBody:
         """Return the body in the frame before, by Steiner's theorem in first moments."""
-        p, m = step.p, self.mass
+        p = step.p
+        m = self.mass
         h = step.R @ self.moment
         square = 2 * (p @ h) + m * (p @ p)
         J = step.R @ self.second @ step.R.T
@@ -65,7 +67,8 @@ class RigidBody:
 def mass_matrix(arm: ExactArm, bodies: Sequence[RigidBody] | None = None) -> Elements:
     """Return M, shape (n, n), with reflected rotor inertia; ``bodies`` in joint frames replace the arm's own."""
     n, ring = arm.n, arm.ring
-    steps, bodies = joint_steps(arm), bodies or joint_bodies(arm)
+    steps = joint_steps(arm)
+    bodies = bodies or joint_bodies(arm)
     M = np.empty((n, n), dtype=object)
     beyond = bodies[n - 1]
     for j in reversed(range(n)):
@@ -85,7 +88,8 @@ def mass_matrix(arm: ExactArm, bodies: Sequence[RigidBody] | None = None) -> Ele
 
 def potential_energy(arm: ExactArm, bodies: Sequence[RigidBody] | None = None) -> Element:
     """Return V = -sum m g.c, J, zero at the world's origin; ``bodies`` in joint frames replace the arm's own."""
-    steps, bodies = joint_steps(arm), bodies or joint_bodies(arm)
+    steps = joint_steps(arm)
+    bodies = bodies or joint_bodies(arm)
     beyond = bodies[-1]
     for j in reversed(range(arm.n - 1)):
         beyond = RigidBody(
@@ -128,6 +132,8 @@ def joint_bodies(arm: ExactArm) -> list[RigidBody]:
 
 def _behind(ring: Ring, row: ExactRow) -> JointTransform:
     """Return Tx(a) Rx(alpha): DH frame i in joint i's frame, for a standard row."""
-    (ca, sa), zero, one = row.alpha, ring.zero, ring.one
+    (ca, sa) = row.alpha
+    zero = ring.zero
+    one = ring.one
     R = np.array([[one, zero, zero], [zero, ca, -sa], [zero, sa, ca]], dtype=object)
     return JointTransform(R, np.array([row.a, zero, zero], dtype=object))

@@ -117,7 +117,8 @@ class _Regressor:
         )
 
     def _factors(self, name: str, support: Sequence[str]) -> dict[str, Element]:
-        ring, polynomials = self.ring, self.ring.polynomials
+        ring = self.ring
+        polynomials = self.ring.polynomials
         places = [self.names.index(other) for other in support]
         touching = [k for k, row in enumerate(self.rows) if not row.keys().isdisjoint(support)]
         touching.sort(key=lambda k: sum(len(entry) for entry in self.rows[k].values()))
@@ -166,7 +167,8 @@ def _random_values(ring: Ring) -> list[float]:
             continue
         if constant.text.startswith("cos(") and constant.meaning is not None:
             angle = rng.uniform(0.2, 1.4)
-            known[constant.text], known[f"sin{constant.text[3:]}"] = math.cos(angle), math.sin(angle)
+            known[constant.text] = math.cos(angle)
+            known[f"sin{constant.text[3:]}"] = math.sin(angle)
         elif constant.reciprocal_of is not None:
             so_far = [known.get(generator.text, 1.0) for generator in ring.generators]
             known[constant.text] = 1 / float(ring.read(constant.reciprocal_of).value(so_far))

@@ -200,7 +200,8 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
     links = [naming.link(i, own) for i, own in enumerate(bodies)]
     gravity = naming.gravity()
     placement = description.base.placement
-    xyz, rpy = [naming.known(x) for x in placement.xyz], [exact_angle(naming.known(x)) for x in placement.rpy]
+    xyz = [naming.known(x) for x in placement.xyz]
+    rpy = [exact_angle(naming.known(x)) for x in placement.rpy]
 
     tool = [naming.known(x) for x in description.tool.placement.xyz]
     viscous = [naming.known(joint.drive.viscous) if joint.drive else ZERO for joint in description.joints]
@@ -251,7 +252,8 @@ def _row(ring: Ring, i: int, link: LinkNumbers) -> ExactRow:
     alpha, theta = ring.direction(link.row[2]), ring.direction(link.row[3])
     if ring.kinds[i] != "R":
         return ExactRow(a, d + ring.position(i), alpha, theta)
-    c, s = ring.cosine(i), ring.sine(i)
+    c = ring.cosine(i)
+    s = ring.sine(i)
     return ExactRow(a, d, alpha, (c * theta[0] - s * theta[1], s * theta[0] + c * theta[1]))
 
 

@@ -95,7 +95,8 @@ class Naming:
 
     def link(self, i: int, bodies: Sequence[Body]) -> LinkNumbers:
         """Return the numbers of link i, counted from 0."""
-        joint, number = self.description.joints[i], i + 1
+        joint = self.description.joints[i]
+        number = i + 1
         row = (
             self.length(f"a{number}", joint.a),
             self.length(f"d{number}", joint.d),

@@ -14,8 +14,12 @@ def identity(ring: Ring) -> Elements:
 
 def rotation(ring: Ring, first: int, second: int, direction: Direction) -> Elements:
     """Return the rotation by an angle (its cosine and sine) from one axis to another, shape (4, 4)."""
-    T, (c, s) = identity(ring), direction
-    T[first, first], T[first, second], T[second, first], T[second, second] = c, -s, s, c
+    T = identity(ring)
+    (c, s) = direction
+    T[first, first] = c
+    T[first, second] = -s
+    T[second, first] = s
+    T[second, second] = c
     return T
 
 

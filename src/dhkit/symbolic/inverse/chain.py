@@ -63,7 +63,7 @@ class Chain:
     offsets
         Offset of each joint: theta_i minus the joint value; of a sliding joint, its constant angle.
     values
-        Values of the ring's constants that are no entries of poses and not defined by steps.
+        Values of the ring's constants that are not entries of poses and not defined by steps.
     lengths
         Values of the symbols, SI, by name.
     notes
@@ -90,7 +90,8 @@ class Chain:
     def of(cls, description: Description, *, named: bool, in_joint_values: bool = False) -> Chain:
         """Return an arm's chain; lengths that are numbers get names (a2, d3) if ``named``, else all are numbers."""
         naming = Naming(description, "inertial" if named else "none")
-        joints, is_standard = description.joints, description.convention is Convention.STANDARD
+        joints = description.joints
+        is_standard = description.convention is Convention.STANDARD
         lengths = [(naming.length(f"a{i}", j.a), naming.length(f"d{i}", j.d)) for i, j in enumerate(joints, start=1)]
         angles = [tuple(exact_angle(naming.known(x)) for x in (j.alpha, j.theta)) for j in joints]
         ends = [description.base.placement, description.tool.placement]
@@ -108,7 +109,8 @@ class Chain:
             _placed(ring, [ring.read(x) for x in xyz], [ring.direction(x) for x in rpy])
             for xyz, rpy in zip(fixed, turned, strict=True)
         )
-        a, alpha = [ring.read(row[0]) for row in lengths], [ring.direction(row[0]) for row in angles]
+        a = [ring.read(row[0]) for row in lengths]
+        alpha = [ring.direction(row[0]) for row in angles]
         outer = 0 if not is_standard else len(joints) - 1
         link = translation(ring, 0, a[outer]) @ rotation(ring, 1, 2, alpha[outer])
         del a[outer], alpha[outer]
@@ -148,7 +150,8 @@ class Chain:
         offset = self.ring.direction(self.offsets[i - 1])
         if self.description.kinds[i - 1] != "R":
             return offset
-        c, s = self.ring.cosine(i - 1), self.ring.sine(i - 1)
+        c = self.ring.cosine(i - 1)
+        s = self.ring.sine(i - 1)
         if not self.in_joint_values:
             return c, s
         return c * offset[0] - s * offset[1], s * offset[0] + c * offset[1]
@@ -242,7 +245,8 @@ def without_rounding(description: Description) -> tuple[Description, list[str]]:
 @takes_robot
 def table_lengths(description: Description) -> dict[str, Fraction]:
     """Return the lengths of a table that are numbers, by the names that derivations give them: a2, d3, m."""
-    naming, found = Naming(description, "inertial"), {}
+    naming = Naming(description, "inertial")
+    found = {}
     for i, joint in enumerate(description.joints, start=1):
         for name, length in ((f"a{i}", joint.a), (f"d{i}", joint.d)):
             symbol = naming.length(name, length)

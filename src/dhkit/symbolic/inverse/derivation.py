@@ -100,7 +100,7 @@ class InverseDerivation:
     conditions
         Equations that a pose has to satisfy besides: an arm in a plane.
     notes
-        What is not as in the robot file: names of lengths, numbers in place of symbols.
+        What is not as in the robot file: names of lengths, numbers instead of symbols.
     sum
         The joints whose angles add up to phi, from 1, each with 1 or -1; empty without phi.
     meanings
@@ -348,7 +348,8 @@ class Values:
     """Values of a ring's generators at N poses: what is given, and then what step after step finds."""
 
     def __init__(self, chain: Chain, T: Array) -> None:
-        self._chain, ring = chain, chain.ring
+        self._chain = chain
+        ring = chain.ring
         self._values: list[Any] = [chain.values.get(g.text, np.nan) for g in ring.generators]
         self.joints: dict[int, Array] = {}
         """theta_i or q_i by joint, from 0, shape (N,) each."""

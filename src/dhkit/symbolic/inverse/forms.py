@@ -142,11 +142,14 @@ class Circle(Form):
         """Prove the solution, with N = A^2 + B^2 and R^2 = N - C^2; any solution has B cos x - A sin x = +-R."""
         ring = _ring("A B C", {"R": "A^2 + B^2 - C^2"}, "X")
         A, B, C, R = map(ring.constant, "ABCR")
-        c, s, N = ring.cosine(0), ring.sine(0), A * A + B * B
+        c = ring.cosine(0)
+        s = ring.sine(0)
+        N = A * A + B * B
         both = []
         for sign in (1, -1):
             # cos and sin of the sum of the two arc tangents, times N.
-            x, y = A * C - sign * B * R, B * C + sign * A * R
+            x = A * C - sign * B * R
+            y = B * C + sign * A * R
             both += [A * x + B * y - C * N, x * x + y * y - N * N]
         held = A * c + B * s
         return Proof(Circle.statement, _column([*both, (B * c - A * s) ** 2 - (N - held * held)]))
@@ -211,7 +214,9 @@ class Direction(Form):
     def lemma() -> Proof:
         """Prove that (k X, k Y) is k^2 (cos x, sin x), whose direction is x."""
         ring = _ring("k", {}, "X")
-        k, c, s = ring.constant("k"), ring.cosine(0), ring.sine(0)
+        k = ring.constant("k")
+        c = ring.cosine(0)
+        s = ring.sine(0)
         return Proof(Direction.statement, _column([k * (k * c) - k * k * c, k * (k * s) - k * k * s]))
 
 
@@ -243,7 +248,9 @@ class Flip(Form):
     def lemma() -> Proof:
         """Prove that X sin x = Y cos x follows, of which the two angles are the only solutions."""
         ring = _ring("k", {}, "X")
-        k, c, s = ring.constant("k"), ring.cosine(0), ring.sine(0)
+        k = ring.constant("k")
+        c = ring.cosine(0)
+        s = ring.sine(0)
         return Proof(Flip.statement, np.concatenate([_column([(k * c) * s - (k * s) * c]), _along(["X", "Y"])]))
 
 
@@ -270,7 +277,10 @@ class CosineAndSquare(Form):
     def lemma() -> Proof:
         """Prove that the roots of sin^2 x = S are the sines of x and -x."""
         ring = _ring("X", {"R": "1 - X^2"}, "X")
-        X, R, c, s = ring.constant("X"), ring.constant("R"), ring.cosine(0), ring.sine(0)
+        X = ring.constant("X")
+        R = ring.constant("R")
+        c = ring.cosine(0)
+        s = ring.sine(0)
         return Proof(CosineAndSquare.statement, _column([X * X + R * R - 1, s * s - (1 - c * c)]))
 
 
@@ -294,7 +304,8 @@ class Turned(Form):
     @property
     def equations(self) -> tuple[tuple[Element, Element], ...]:
         """The two equations."""
-        (c, s), (U, V, X, Y) = self.unknown.symbols, (self.letters[k] for k in "UVXY")
+        (c, s) = self.unknown.symbols
+        (U, V, X, Y) = (self.letters[k] for k in "UVXY")
         return (U * c - V * s, X), (U * s + V * c, Y)
 
     def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
@@ -306,8 +317,13 @@ class Turned(Form):
     def lemma() -> Proof:
         """Prove that (u x + v y, u y - v x) is (u^2 + v^2) (cos t, sin t)."""
         ring = _ring("u v", {}, "X")
-        u, v, c, s = ring.constant("u"), ring.constant("v"), ring.cosine(0), ring.sine(0)
-        x, y, size = u * c - v * s, u * s + v * c, u * u + v * v
+        u = ring.constant("u")
+        v = ring.constant("v")
+        c = ring.cosine(0)
+        s = ring.sine(0)
+        x = u * c - v * s
+        y = u * s + v * c
+        size = u * u + v * v
         return Proof(Turned.statement, _column([u * x + v * y - size * c, u * y - v * x - size * s]))
 
 
@@ -398,7 +414,8 @@ class Remainder(Form):
     def lemma() -> Proof:
         """Prove that (X, Y) then has length 1, so that its direction is the angle."""
         ring = _ring("", {}, "X")
-        c, s = ring.cosine(0), ring.sine(0)
+        c = ring.cosine(0)
+        s = ring.sine(0)
         return Proof(Remainder.statement, _column([c * c + s * s - 1]))
 
 
@@ -425,8 +442,11 @@ def _ring(names: str, roots: Mapping[str, str], angle: str) -> Ring:
 def _along(names: Sequence[str]) -> Elements:
     """Return what is zero if X sin x = Y cos x makes (X, Y) a multiple of (cos x, sin x)."""
     ring = _ring(" ".join(names), {}, "X")
-    (X, Y), c, s = (ring.constant(name) for name in names), ring.cosine(0), ring.sine(0)
-    along, across = X * c + Y * s, Y * c - X * s
+    (X, Y) = (ring.constant(name) for name in names)
+    c = ring.cosine(0)
+    s = ring.sine(0)
+    along = X * c + Y * s
+    across = Y * c - X * s
     return _column([X - (along * c - across * s), Y - (along * s + across * c)])
 
 

@@ -12,13 +12,15 @@ _INSTEAD = "use arm.ik_numeric, or arm.ik with the package ssik (pip install 'dh
 
 def why_not(chain: Chain) -> str:
     """Return one sentence that says what is missing for a closed form, and what to use instead."""
-    n, kinds = chain.n, chain.description.kinds
+    n = chain.n
+    kinds = chain.description.kinds
     count = f"{n}R" if set(kinds) == {"R"} else kinds
     return f"no closed form is known for these {count} axes: {_missing(chain)}; {_INSTEAD}"
 
 
 def _missing(chain: Chain) -> str:
-    n, kinds = chain.n, chain.description.kinds
+    n = chain.n
+    kinds = chain.description.kinds
     if n > 6:
         return f"{n} joints have more freedom than a pose asks for"
     if n < 2:

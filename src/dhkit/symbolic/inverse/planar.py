@@ -115,7 +115,8 @@ def parallel_chain(bench: Workbench) -> None:
 
 
 def _chain_senses(chain: Chain, turning: list[int]) -> list[tuple[int, int]]:
-    sense, senses = 1, []
+    sense = 1
+    senses = []
     for i in range(turning[0], turning[-1] + 1):
         if i in turning:
             senses.append((i, sense))
@@ -154,7 +155,8 @@ def _chain_rotation(
 def _chain_height(bench: Workbench) -> None:
     """Add the slide along the axes, or the condition that the pose lies in the arm's plane."""
     chain = bench.chain
-    arm, given = (chain.whole @ chain.last)[2, 3], origin(bench.T)[2]
+    arm = (chain.whole @ chain.last)[2, 3]
+    given = origin(bench.T)[2]
     slides = [i for i, kind in enumerate(chain.description.kinds, start=1) if kind == "P"]
     if slides:
         look = f"Joint {slides[0]} alone moves the tool along the axes."
@@ -182,10 +184,13 @@ def slider_fits(chain: Chain) -> bool:
 def slider(bench: Workbench) -> None:
     """Write the steps of a turning axis across a slide."""
     chain = bench.chain
-    place, carried = origin(chain.whole @ chain.last), chain.joint(1) @ chain.link(1)
+    place = origin(chain.whole @ chain.last)
+    carried = chain.joint(1) @ chain.link(1)
     # In the axes of axis 2's frame: the slide is along y, and x and z do not depend on it.
     R = carried[:3, :3]
-    own, start, seen = R.T @ (place - origin(carried)), R.T @ origin(carried), R.T @ origin(bench.T)
+    own = R.T @ (place - origin(carried))
+    start = R.T @ origin(carried)
+    seen = R.T @ origin(bench.T)
     A, B, rest = linear_parts(own[0], 1)
     bench.add(
         Step(

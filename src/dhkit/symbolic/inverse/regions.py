@@ -74,9 +74,12 @@ def turn_the_plane(bench: Workbench, point: Elements, inside: Elements, who: str
         The point's name in sentences.
     """
     chain = bench.chain
-    unknown, (c, s), tilt = bench.unknown(1), chain.cosine_and_sine(1), chain.alpha[0][1]
+    unknown = bench.unknown(1)
+    (c, s) = chain.cosine_and_sine(1)
+    tilt = chain.alpha[0][1]
     px, py, pz = point
-    beside, offset = inside[2], number(chain, inside[2])
+    beside = inside[2]
+    offset = number(chain, inside[2])
     if abs(offset) <= ZERO_LENGTH * (chain.description.reach or 1.0):
         offset = 0.0  # as far as names go; the equation keeps it
     forward = tilt * (c * px + s * py)
@@ -114,7 +117,8 @@ def turn_the_plane(bench: Workbench, point: Elements, inside: Elements, who: str
             Figure(View.TOP, ("axis 1", who)),
         )
     )
-    x, y = c * px + s * py - chain.a[0], tilt * (pz - chain.d[0])
+    x = c * px + s * py - chain.a[0]
+    y = tilt * (pz - chain.d[0])
     up = into_axis_2(bench, _vertical(chain))
     return Plane(tilt, x, y, (up[0], up[1]))
 
@@ -180,7 +184,8 @@ def turn_into_place(
     who: str,
 ) -> None:
     """Add the step that turns a known vector (u, v) into a known place (x, y)."""
-    (u, v), (x, y) = vector, place
+    (u, v) = vector
+    (x, y) = place
     bench.add(
         Step(
             f"theta{i}",
@@ -232,7 +237,8 @@ def remaining_angle(bench: Workbench, i: int, before: Elements, senses: Sequence
     cosine, sine = bench.chain.named(("cphi", "sphi"))
     c, s = before
     own = senses[-1][1]
-    X, Y = cosine * c + sine * s, own * (sine * c - cosine * s)
+    X = cosine * c + sine * s
+    Y = own * (sine * c - cosine * s)
     terms = (("phi", own), *((f"theta{j}", -own * sense) for j, sense in senses[:-1]))
     bench.add(Step(f"theta{i}", look, (), Remainder(bench.unknown(i), {"X": X, "Y": Y}, terms)))
 

@@ -44,7 +44,8 @@ def _spherical(chain: Chain) -> bool:
 
 def _wrist_centre(bench: Workbench) -> Elements:
     """Return the wrist centre before joint 1, shape (3,), m: the origin behind joint 5, which joint 6 leaves alone."""
-    T, d6 = bench.T, bench.chain.d[5]
+    T = bench.T
+    d6 = bench.chain.d[5]
     place: Elements = T[:3, 3] - T[:3, 2] * d6
     if d6.is_zero:
         return place
@@ -155,7 +156,8 @@ def _parallel_senses(chain: Chain) -> list[tuple[int, int]]:
 def three_parallel(bench: Workbench) -> None:
     """Write the steps of the Universal Robots' family."""
     chain = bench.chain
-    T, d6 = bench.T, chain.d[5]
+    T = bench.T
+    d6 = chain.d[5]
     place = T[:3, 3] - T[:3, 2] * d6
     point = place
     who = "the point where axes 5 and 6 meet"
@@ -203,7 +205,8 @@ def _reach_axis_4(
         )
     )
     above = plane.up[1] * x - plane.up[0] * y
-    first, both = element_array([chain.a[1], chain.ring.zero]), origin(chain.link(2) @ chain.part(3, 3))
+    first = element_array([chain.a[1], chain.ring.zero])
+    both = origin(chain.link(2) @ chain.part(3, 3))
     reach_with_two_links(bench, (2, 3), first, both[:2], (x, y), "axis 4", ("up", "down"), above)
     before = chain.part(2, 3)
     remaining_angle(bench, 4, element_array([before[0, 0], before[1, 0]]), senses, "Joint 4 turns what remains of phi.")
@@ -228,7 +231,8 @@ def yaw_three(bench: Workbench) -> None:
     """Write the steps of a turntable with three parallel joints."""
     chain = bench.chain
     plane = turn_the_plane(bench, origin(bench.T), origin(chain.part(2, 4) @ chain.last), TOOL)
-    sense, senses = relative_sense(chain, 2) * relative_sense(chain, 3), _parallel_senses(chain)
+    sense = relative_sense(chain, 2) * relative_sense(chain, 3)
+    senses = _parallel_senses(chain)
     # The tool's axis that is seen in the plane: z, or x if z is along the axes.
     column = 2 if math.hypot(*(number(chain, x) for x in chain.last[:2, 2])) > 0.5 else 0
     _known_rotation(bench, into_axis_2(bench, bench.T[:3, column]), chain.last[:3, column], sense, senses, column)
@@ -244,7 +248,8 @@ def _known_rotation(
     turned = chain.part(joints[0], joints[-1])
     phi = bench.phi(turned[0, 0], turned[1, 0], senses)
     definitions, (ax, ay) = bench.define_all(ax=seen[0], ay=seen[1])
-    U, V = own[0], sense * own[1]
+    U = own[0]
+    V = sense * own[1]
     bench.add(
         Step(
             "phi",

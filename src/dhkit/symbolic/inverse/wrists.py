@@ -39,7 +39,8 @@ def turn_spherical_wrist(bench: Workbench, R: Elements) -> None:
             Choice(FLIPS, (-s_alpha4 * (ax * c4 + ay * s4),)),
         )
     )
-    X, Y = -s_alpha4 * s_alpha5 * az, s_alpha5 * (c4 * ax + s4 * ay)
+    X = -s_alpha4 * s_alpha5 * az
+    Y = s_alpha5 * (c4 * ax + s4 * ay)
     bench.add(
         Step(
             "theta5",

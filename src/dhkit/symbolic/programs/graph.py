@@ -152,7 +152,7 @@ class Graph:
         inputs, outputs
             Symbols and expressions by name; matrices are taken row by row.
         shapes
-            Shapes to state in place of CasADi's (rows, columns).
+            Shapes to state instead of CasADi's (rows, columns).
 
         Raises
         ------
@@ -213,7 +213,8 @@ class _Builder:
         work: dict[int, int] = {}
         outputs = [[-1] * function.numel_out(k) for k in range(function.n_out())]
         for k in range(function.n_instructions()):
-            code, into = function.instruction_id(k), function.instruction_output(k)
+            code = function.instruction_id(k)
+            into = function.instruction_output(k)
             sources = function.instruction_input(k)
             if code == casadi.OP_CONST:
                 work[into[0]] = self.constant(function.instruction_constant(k))

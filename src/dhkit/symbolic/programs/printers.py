@@ -62,7 +62,7 @@ def export_c(graphs: Sequence[Graph], folder: str | Path, name: str, remark: str
     Raises
     ------
     ValueError
-        ``name`` is no identifier.
+        ``name`` is not an identifier.
     """
     if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII):
         raise ValueError(f"name is {name!r}; expected an identifier of C")

@@ -23,7 +23,7 @@ from dhkit.symbolic.ring.polynomials import Monomial, Polynomials, Relation
 
 READABLE = 200
 """Longest element, in terms, that is printed without being asked for."""
-_TOO_LONG = "too long to be derived exactly; numbers in place of symbols, or fewer joints (lock), make it shorter"
+_TOO_LONG = "too long to be derived exactly; numbers instead of symbols, or fewer joints (lock), make it shorter"
 
 
 class RingError(DhkitError):
@@ -200,7 +200,8 @@ class Element:
 
     def by_position(self, i: int) -> Element:
         """Return the partial derivative by joint i's variable."""
-        ring, derivative = self.ring, self.ring.polynomials.derivative
+        ring = self.ring
+        derivative = self.ring.polynomials.derivative
         if ring.kinds[i] != "R":
             return Element(ring, derivative(self.polynomial, ring.place("position", i)))
         change = ring.zero.polynomial

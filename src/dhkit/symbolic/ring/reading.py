@@ -73,7 +73,8 @@ class Reader:
         units = [unit for unit in self.units.get(monomial, ()) if (coefficient / unit).denominator == 1]
         unit = max(units, default=abs(coefficient))
         angle = Expression(((monomial, unit),))
-        cosine, sine = self.ring.constant(f"cos({angle.text})"), self.ring.constant(f"sin({angle.text})")
+        cosine = self.ring.constant(f"cos({angle.text})")
+        sine = self.ring.constant(f"sin({angle.text})")
         c, s = self.ring.one, self.ring.zero
         for _ in range(int(abs(coefficient) / unit)):
             c, s = c * cosine - s * sine, s * cosine + c * sine

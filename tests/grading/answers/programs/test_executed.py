@@ -143,7 +143,7 @@ def test_local_names_of_a_right_hand_side_are_sampled(judged, tmp_path):
 
 @pytest.mark.slow
 def test_sampled_parameters_vary(judged):
-    """A function that has a parameter's value in place of its letter is right at the file's values alone."""
+    """A function that has a parameter's value instead of its letter is right at the file's values alone."""
     text = "def V(q1, q2, m1, m2, l1, l2, g):\n    from math import sin\n    float(q1)\n    return {}"
     right = "m1*g*l1/2*sin(q1) + m2*g*(l1*sin(q1) + l2/2*sin(q1 + q2))"
     assert verdicts(judged(text.format(right))) == {"V": Verdict.SAMPLED}
@@ -161,7 +161,7 @@ def test_sampled_parameters_vary(judged):
         ("raise ValueError('no')", "ValueError: no"),
         ("def V(a, b):\n    return a", "argument a of V is not known"),
         ("x = (", "SyntaxError"),
-        ("V = float('nan')", "nan is no number|assigns no quantity"),
+        ("V = float('nan')", "nan is not a number|assigns no quantity"),
         ("while True:\n    pass", "no answer within"),
     ],
 )

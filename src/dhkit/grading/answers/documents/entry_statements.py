@@ -43,7 +43,8 @@ def statements_of(text: str, suffix: str = ".tex") -> list[Statement]:
 def _plain_statements(text: str) -> Iterator[Statement]:
     """Yield the statements of plain text: one a line, or between semicolons; lines that go on belong together."""
     held: list[str] = []
-    start, depth = 1, 0
+    start = 1
+    depth = 0
     for number, typed in enumerate(text.splitlines(), start=1):
         line = _PLAIN_COMMENT.sub("", typed)
         if typed.strip() and not line.strip():
@@ -53,7 +54,9 @@ def _plain_statements(text: str) -> Iterator[Statement]:
             goes_on = goes_on or _CONTINUATION.match(line) is not None or _UNFINISHED.search(held[-1][-20:]) is not None
         if not goes_on:
             yield from _statements_of_lines(held, start)
-            held, start, depth = [], number, 0
+            held = []
+            start = number
+            depth = 0
         if line.strip():
             start = start if held else number
             held.append(line)

@@ -181,7 +181,8 @@ class _DocumentAnswers:
 
     def _rows_of_shape(self, quantity: str, formula: str) -> list[list[str]] | None:
         """Return the rows of a matrix of the quantity's shape; None of any other formula."""
-        rows, shape = matrix_rows(formula), self.quantities.shape(quantity)
+        rows = matrix_rows(formula)
+        shape = self.quantities.shape(quantity)
         if rows is None:
             return None
         lengths = [len(row) for row in rows]
@@ -363,7 +364,8 @@ class _DocumentAnswers:
         changing = self._changing(name)
         if not changing:
             return ""
-        first, line = changing[0], self._line(changing[0])
+        first = changing[0]
+        line = self._line(changing[0])
         if first.problem:
             return f"{name} is given in {line}: {first.problem}"
         if self.names.is_reserved(name):

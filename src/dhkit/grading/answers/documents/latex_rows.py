@@ -83,12 +83,13 @@ def rows_of(text: str, line: int) -> Iterator[Row]:
         Its first line, from 1.
     """
     text = _SYSTEM.sub(lambda m: rf"\begin{{cases}}{m[2]}\end{{cases}}" if "=" in m[2] else m[0], text)
-    matrices: list[str] = []  # open environments whose rows are no equations
+    matrices: list[str] = []  # open environments whose rows are not equations
     environments = [""]  # open environments of rows
     braces = 0
     columns: list[str] = []
     pieces: list[str] = []  # of the last column
-    start, at = line, 0
+    start = line
+    at = 0
 
     def end_row() -> Iterator[Row]:
         yield from _equations([*columns, "".join(pieces)], start, environments[-1] in _JOINED)

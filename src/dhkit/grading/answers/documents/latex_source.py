@@ -35,7 +35,7 @@ _CHANGES = re.compile(
     + r"|[bpvBV]?matrix|smallmatrix|array|document)\*?\}"
     + r"|\\(?:[gex]?def|let|renewcommand|futurelet|mathchardef|chardef)(?![A-Za-z])"
 )
-"""Commands that may change the meaning of anything behind them, and definitions, also of macros that are no letters."""
+"""Commands that may change the meaning of all that follows, and definitions, also of macros that are not letters."""
 
 _READ_MACROS = frozenset(
     {*GREEK, *FUNCTION_NAMES, *FRACTIONS, *SYMBOL_MACROS, *DOT_MACROS, *STYLE_MACROS, *SIZES, *SPACE_NAMES}
@@ -145,10 +145,12 @@ def _end_of_hidden(match: re.Match[str]) -> int:
 
 
 def _end_of_definition(match: re.Match[str]) -> int:
-    """Return where the body of a macro ends: it is no statement."""
-    text, end = match.string, match.end()
+    """Return where the body of a macro ends: it is not a statement."""
+    text = match.string
+    end = match.end()
     if body := re.compile(r"(?:\s*\[[^\]\n]*\]|#\d|\s)*\{").match(text, end):
-        depth, end = 1, body.end()
+        depth = 1
+        end = body.end()
         while depth and end < len(text):
             depth += (text[end] == "{") - (text[end] == "}")
             end += 1
@@ -157,7 +159,10 @@ def _end_of_definition(match: re.Match[str]) -> int:
 
 def _displays(text: str) -> Iterator[_Display]:
     """Yield displays and formulas in the text; paragraphs where there are none."""
-    line, counted, at, has_math = 1, 0, 0, False
+    line = 1
+    counted = 0
+    at = 0
+    has_math = False
     absent: set[str] = set()
     while match := _OPENING.search(text, at):
         name = match["name"]
@@ -215,7 +220,8 @@ def _macros(text: str) -> dict[str, _Macro]:
         More than ``BOUNDS.macros``.
     """
     macros: dict[str, _Macro] = {}
-    line, at = 1, 0
+    line = 1
+    at = 0
     for match in _MACRO.finditer(text):
         line += text.count("\n", at, match.start())
         at = match.start()

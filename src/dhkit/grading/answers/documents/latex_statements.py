@@ -35,13 +35,13 @@ _DROPPED = re.compile(
 """Macros that say nothing about a formula."""
 
 _LEADING = re.compile(rf"(?:{SPACE}|\\therefore(?![A-Za-z])|[,;]|\.(?!\d))")
-"""What stands in front of a formula and is no part of it."""
+"""What stands in front of a formula and is not a part of it."""
 
 _TRAILING = (
     *("\\,", "\\;", "\\:", "\\!", "\\>", "\\ ", "\\quad", "\\qquad", "\\enspace", "\\thinspace", "\\space"),
     *("\\therefore", "{}", " ", "\t", "\n", "~", ",", ";", "."),
 )
-"""What stands behind a formula and is no part of it."""
+"""What stands behind a formula and is not a part of it."""
 
 STARTS = re.compile(
     rf"(?:{SPACE}|\\left\.)*(?:[-+/*)\]^_']|\\(?:cdot|times|div|right|over|rVert|pm|mp|ast)(?![A-Za-z])"
@@ -91,7 +91,9 @@ def latex_statements(text: str, line: int) -> Iterator[Statement]:
     # Finished statements of the current row of the display; they are yielded together, since a later row may make them
     # ambiguous.
     row_statements: list[Statement] = []
-    problem, depth, is_new_row = "", 0, True
+    problem = ""
+    depth = 0
+    is_new_row = True
     for row in rows_of(text, line):
         is_new_row = is_new_row or row.is_first
         plain = re.sub(r"\s+", " ", _without_words(row.text))
@@ -116,7 +118,9 @@ def latex_statements(text: str, line: int) -> Iterator[Statement]:
                     row_statements = []
                 else:
                     row_statements += statements
-                held, problem, depth = [], "", 0
+                held = []
+                problem = ""
+                depth = 0
         held.append(row)
         depth += sum(map(_nesting, _BRACKET.finditer(plain)))
         is_new_row = False
@@ -176,7 +180,8 @@ def _is_condition(text: str) -> bool:
 
 def _bare(text: str) -> str:
     """Return text without the spaces and punctuation at its ends."""
-    start, end = 0, len(text)
+    start = 0
+    end = len(text)
     while match := _LEADING.match(text, start, end):
         start = match.end()
     while end > start:
@@ -248,11 +253,12 @@ def has_relation(text: str) -> bool:
 
 def _statements_of_rows(rows: Sequence[Row], problem: str) -> list[Statement]:
     """Return the statements of rows that belong together: separated by words, arrows, and commas between equations."""
-    line, text = rows[0].line, re.sub(r"\s+", " ", " ".join(row.text for row in rows))
+    line = rows[0].line
+    text = re.sub(r"\s+", " ", " ".join(row.text for row in rows))
     statements: list[Statement] = []
-    words = "words or an arrow next to a part of a formula that is no equation: "
-    refused = 0  # number of statements already refused because a part that is no equation follows them
-    alone = ""  # the part before a connective if it is no equation: the next statement is refused because of it
+    words = "words or an arrow next to a part of a formula that is not an equation: "
+    refused = 0  # number of statements already refused because a part that is not an equation follows them
+    alone = ""  # the part before a connective if it is not an equation: the next statement is refused because of it
     for part in _split(text, _places(text, _CONNECTIVES)):
         bare_part = _bare(part)
         if not bare_part:
@@ -281,7 +287,8 @@ def _equations(text: str) -> list[str]:
 
 
 def _split(text: str, places: Sequence[tuple[int, int]]) -> list[str]:
-    starts, ends = [0, *(end for _, end in places)], [*(start for start, _ in places), len(text)]
+    starts = [0, *(end for _, end in places)]
+    ends = [*(start for start, _ in places), len(text)]
     return [text[start:end] for start, end in zip(starts, ends, strict=True)]
 
 

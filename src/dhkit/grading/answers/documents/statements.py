@@ -43,7 +43,7 @@ class Statement:
         Line in which it begins, from 1.
     targets
         Names on its sides, without marks of typesetting and without arguments: M12, tau1, g, theta1. Empty of a formula
-        alone, and where the first side is no name.
+        alone, and where the first side is not a name.
     formulas
         The other sides, in order, as typed.
     problem
@@ -92,7 +92,7 @@ def _is_also(name: str, first: str) -> bool:
 def left_hand_name(side: str) -> str:
     r"""Return the name that a side is, with arguments such as (q, \dot q) left out; empty where it is none.
 
-    ``M_{12}(q)`` is M12, ``\mathbf{g}(\theta)`` g, ``M_{10,2}`` M10_2; ``\dot V``, ``V'`` and ``M^{-1}`` are no names.
+    ``M_{12}(q)`` is M12, ``\mathbf{g}(\theta)`` g, ``M_{10,2}`` M10_2; ``\dot V``, ``V'`` and ``M^{-1}`` are not names.
     """
     if len(side) > BOUNDS.side_characters:
         return ""
@@ -124,7 +124,8 @@ def left_hand_name(side: str) -> str:
             return ""
         rest = rest[end + 1 :]
     if rest and not below and (under := re.fullmatch(r"_(?:(\w)|\{([\w,]*)\})", rest)):
-        below, rest = under[1] or under[2], ""
+        below = under[1] or under[2]
+        rest = ""
     if rest:
         return ""
     below = below.replace("\\", "")

@@ -187,7 +187,8 @@ class _ExecutedProgram:
 
     def _bind_names(self) -> None:
         """Bind the names that may be answers, and refuse all where a joint variable is a number."""
-        robot, problem = self.record.robot, ""
+        robot = self.record.robot
+        problem = ""
         for name, line_number in self._lines.items():
             line = self._line(line_number)
             is_quantity = bool(robot.quantities.quantity(name) or robot.quantities.entries(name))
@@ -315,7 +316,8 @@ class _ExecutedProgram:
 
     def symbols(self, name: str, function: Function) -> object:
         """Return an argument as names of symbols."""
-        robot, plain = self.record.robot, plain_name(name)
+        robot = self.record.robot
+        plain = plain_name(name)
         if name in ("t", "time"):
             return "t"
         if name in _STATES and self.state:
@@ -495,7 +497,7 @@ class _SampledFunction(SampledAnswer):
             return parameter
         meaning = robot.find(symbol)
         if meaning is None or len(meaning) != 1 or meaning[0] not in known:
-            raise AnswerError(f"{self.name}: the argument {symbol[:40]} is no single joint variable")
+            raise AnswerError(f"{self.name}: the argument {symbol[:40]} is not a single joint variable")
         return meaning[0]
 
 

@@ -132,7 +132,7 @@ class MatlabProgram:
         self.count = 0
         self.depth = 0
         self.bound: set[str] = set()
-        """Names that the program assigns anywhere: they are no functions."""
+        """Names that the program assigns anywhere: they are not functions."""
         self.signature_names: set[str] = set()
         """Names in the first lines of the file's functions."""
         statements = []
@@ -183,7 +183,8 @@ class MatlabProgram:
                 main.append(statement)
                 k += 1
                 continue
-            end, depth = k + 1, 0
+            end = k + 1
+            depth = 0
             while end < len(statements):
                 word = statements[end].keyword
                 if word == "function":
@@ -430,7 +431,8 @@ class MatlabProgram:
             return
         name, index = _target(left)
         if right and self._is_symbolic_function(left, scope):
-            name, index = left[0].text, None
+            name = left[0].text
+            index = None
         if right and (place := _row_or_column(left)):
             self._assign_line(left[0].text, place, right, scope, line)
             return
@@ -901,7 +903,8 @@ def _row_or_column(left: Tokens) -> tuple[int | None, int | None] | None:
 
 def _constant_index(inside: Tokens) -> Index | None:
     """Return the index, from 0, between brackets; None where it is not made of whole numbers."""
-    numbers, commas = inside[::2], inside[1::2]
+    numbers = inside[::2]
+    commas = inside[1::2]
     if len(inside) % 2 == 0 or any(token.text != "," for token in commas):
         return None
     if not all(t.kind == "number" and t.text.isdecimal() and 0 < int(t.text[:5]) <= BOUNDS.index for t in numbers):

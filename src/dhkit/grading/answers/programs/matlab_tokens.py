@@ -113,7 +113,8 @@ class MatlabStatement:
 
     def assigned_names(self) -> set[str]:
         """Return the names that it may assign."""
-        tokens, keyword = self.tokens, self.tokens[0].text
+        tokens = self.tokens
+        keyword = self.tokens[0].text
         names: set[str] = set()
         if keyword in ("syms", "global", "persistent"):
             names |= set(self.command_names)
@@ -190,7 +191,8 @@ def split_rows(tokens: Tokens) -> list[list[Tokens]]:
 
 def _begins_entry(tokens: Tokens) -> bool:
     """Whether the first token, behind a space, begins an entry: also a sign that stands close to what follows."""
-    token, after = tokens[0], tokens[1] if len(tokens) > 1 else None
+    token = tokens[0]
+    after = tokens[1] if len(tokens) > 1 else None
     if token.kind != "sign" or token.text in ("(", "[", "{", "@"):
         return True
     return token.text in ("+", "-", "~", "!") and after is not None and not after.is_spaced and after.kind != "row"
@@ -261,10 +263,12 @@ class _Tokenizer:
 
     def _line_tokens(self, line: str, number: int) -> Iterator[MatlabToken]:
         """Yield a line's tokens, and its end where it ends a statement or a row of a matrix."""
-        at, is_spaced = 0, True
+        at = 0
+        is_spaced = True
         while at < len(line):
             if match := _SPACE.match(line, at):
-                at, is_spaced = match.end(), True
+                at = match.end()
+                is_spaced = True
                 continue
             is_at_row = self.previous.kind == "row" and not self.brackets
             if line[at] in "%#" or (line[at] == "!" and is_at_row):
@@ -274,7 +278,8 @@ class _Tokenizer:
                 return
             begins_statement = is_at_row or (not self.brackets and self.previous.text in (";", ","))
             match = self._match(line, at, number, is_spaced)
-            kind, text = str(match.lastgroup), match[0]
+            kind = str(match.lastgroup)
+            text = match[0]
             at = match.end()
             is_command = begins_statement and kind == "name" and text in COMMANDS
             rest = line[at:] if is_command else ""
@@ -282,7 +287,8 @@ class _Tokenizer:
             token = MatlabToken(kind, text, number, is_spaced, line[at:end] if is_command else "")
             self._count_bracket(token)
             yield token
-            self.previous, is_spaced = token, False
+            self.previous = token
+            is_spaced = False
             if _takes_words(rest):
                 at = end
         if not self.brackets or self.brackets[-1][0] in "[{":
@@ -293,9 +299,11 @@ class _Tokenizer:
         """Match the token that begins in a column of a line."""
         is_in_matrix = bool(self.brackets) and self.brackets[-1][0] in "[{"
         is_transpose = self.previous.ends_operand and not (is_spaced and is_in_matrix)
-        pattern, problem = _TOKEN, f"found {line[at]!r}, which no statement has"
+        pattern = _TOKEN
+        problem = f"found {line[at]!r}, which no statement has"
         if line[at] == '"' or (line[at] == "'" and not is_transpose):
-            pattern, problem = _STRING, "a string that does not end"
+            pattern = _STRING
+            problem = "a string that does not end"
         match = pattern.match(line, at)
         if match is None:
             raise self._error(number, problem)

@@ -114,7 +114,7 @@ def _without_magics(cell: str, where: str) -> str:
     Raises
     ------
     AnswerError
-        A magic that may assign any name, or a cell that is no Python by itself.
+        A magic that may assign any name, or a cell that is not Python by itself.
     """
     cell = _without_indentation(cell)
     if not _is_python(cell):

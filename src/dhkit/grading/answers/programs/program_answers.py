@@ -376,7 +376,8 @@ class _ProgramAnswers:
 
     def _all_uses(self, uses: frozenset[str]) -> set[str]:
         """Return the keys that formulas are made of, those not to be relied on included."""
-        found, waiting = set(uses), list(uses)
+        found = set(uses)
+        waiting = list(uses)
         while waiting:
             definition = self.record.definitions.get(waiting.pop())
             for key in definition[1].uses if definition is not None else ():

@@ -166,7 +166,8 @@ class Effects:
 
     def reached(self) -> set[str]:
         """Return the names that may be changed by way of others."""
-        found, waiting = set(self.changed), list(self.changed)
+        found = set(self.changed)
+        waiting = list(self.changed)
         while waiting:
             for other in self.shared.get(waiting.pop(), ()):
                 if other not in found:
@@ -206,7 +207,7 @@ class Changes:
         scope
             Where their names are looked up.
         local
-            Names that the pieces bind, which are no functions of libraries.
+            Names that the pieces bind, which are not functions of libraries.
         """
         piece = _Piece(self, scope, frozenset(local))
         for node in nodes:
@@ -487,7 +488,7 @@ class _Piece:
 
 
 def _calculates(value: ast.expr) -> bool:
-    """Whether an expression is an operation whose operands are no lists: [M]*2 holds M twice."""
+    """Whether an expression is an operation whose operands are not lists: [M]*2 holds M twice."""
     match value:
         case ast.BinOp(left, _, right):
             return _calculates(left) and _calculates(right)

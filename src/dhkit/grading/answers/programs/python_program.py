@@ -363,7 +363,8 @@ class PythonProgram:
 
     def _import(self, alias: ast.alias, scope: Scope, line: str) -> None:
         first = alias.name.split(".")[0]
-        name, module = alias.asname or first, alias.name if alias.asname else first
+        name = alias.asname or first
+        module = alias.name if alias.asname else first
         harmless = module.split(".")[0] in (*_KNOWN_PACKAGES, "os", "sys")
         if module in _MODULES or harmless:
             scope.bind(ascii_name(name), Module(module), line)
@@ -371,7 +372,8 @@ class PythonProgram:
             scope.bind(ascii_name(name), Unread(f"{name[:40]} is the module {module[:40]} since {line}"), line)
 
     def _import_from(self, module: str, alias: ast.alias, scope: Scope, line: str) -> None:
-        name, full_name = ascii_name(alias.asname or alias.name), f"{module}.{alias.name}"
+        name = ascii_name(alias.asname or alias.name)
+        full_name = f"{module}.{alias.name}"
         value: Value
         if alias.name == "*":
             self._import_everything(module, line)

@@ -20,7 +20,7 @@ NUMBER_TOLERANCE = 1e-12
 
 
 def is_same_number(value: float | None, number: float | None) -> bool:
-    """Whether a number in a program is a parameter's value, up to :data:`NUMBER_TOLERANCE`; None is no number."""
+    """Whether a number in a program is a parameter's value, up to :data:`NUMBER_TOLERANCE`; None is not a number."""
     return value is not None and number is not None and abs(value - number) <= NUMBER_TOLERANCE * abs(value)
 
 

@@ -293,7 +293,8 @@ class Scope:
         """Return the joint variables that a name takes from a state: q1 = x(1), q = x(1:2); another value as it is."""
         if not isinstance(value, Part):
             return value
-        robot, plain = self.robot, plain_name(name)
+        robot = self.robot
+        plain = plain_name(name)
         if value.is_slice and robot.is_vector(plain) and len(value.places) == robot.n:
             names = [f"{plain}{k + 1}" for k in range(robot.n)]
         elif not value.is_slice and robot.vocabulary.is_state(plain):
@@ -362,7 +363,8 @@ class Scope:
         references[index] = replace(named, uses=named.uses | known)
         is_zeros = isinstance(matrix, Matrix) and matrix.is_zeros
         options = {"is_zeros": is_zeros, "multiplies_entries": bool(getattr(matrix, "multiplies_entries", False))}
-        value, reference = Matrix(dict(sorted(entries.items())), **options), Matrix(references, **options)
+        value = Matrix(dict(sorted(entries.items())), **options)
+        reference = Matrix(references, **options)
         self.names[name] = Bound(value, reference, bound.line if isinstance(matrix, Matrix) and bound else line)
 
     def break_name(self, name: str, reason: str, line: str = "", value: Value | None = None) -> None:
@@ -408,7 +410,8 @@ class Scope:
 
     def same_matrices(self, name: str) -> Iterator[str]:
         """Yield the other names that may be the same list or matrix."""
-        reached, waiting = {name}, [name]
+        reached = {name}
+        waiting = [name]
         while waiting:
             for other in self.aliases.get(waiting.pop(), ()):
                 if other not in reached:
@@ -467,12 +470,12 @@ class Scope:
             case Matrix() if len(value.entries) == 1:
                 return next(iter(value.entries.values()))
             case Matrix():
-                raise UnreadError("a matrix in place of a number is not read")
+                raise UnreadError("a matrix instead of a number is not read")
             case Part(vector, places, False):
                 return self.entry_of_state(value.number, vector, places[0])
             case Function(name=name) | Library(name) | Module(name):
                 raise UnreadError(f"{name} is a function or a module")
-        raise UnreadError("something in place of a number is not read")
+        raise UnreadError("something instead of a number is not read")
 
     def known(self, name: str) -> Scalar:
         """Return a name of the robot's as a scalar."""
@@ -485,7 +488,7 @@ class Scope:
         if not vocabulary.knows(name):
             inside = next((x for x in self.everything() if len(x) < len(plain) and x in plain), "")
             if inside:
-                raise UnreadError(f"unknown name {name[:40]!r}, which is no product: {inside} is the program's")
+                raise UnreadError(f"unknown name {name[:40]!r}, which is not a product: {inside} is the program's")
         # c1 is the cosine of q1: whoever binds q1 to something else changes c1.
         for word in self.robot.find(name) or ():
             if word[0].isalpha() and word != name:

@@ -137,7 +137,7 @@ class Given:
     is_symbol
         Whether the program made a symbol of this name.
     is_constant
-        Whether it is a symbol that is no function of time: its derivative by t is 0.
+        Whether it is a symbol that is not a function of time: its derivative by t is 0.
     number
         Which call of a function it is an argument of; 0 for none.
     uses
@@ -384,7 +384,8 @@ def entry_of(matrix: Matrix, index: Index) -> Scalar:
 
 def product(left: Matrix, right: Matrix, power: str = "^") -> Matrix | Scalar:
     """Return the product of two matrices; of two flat vectors it is a scalar."""
-    a, b = left.rows, right.rows
+    a = left.rows
+    b = right.rows
     if left.is_flat:
         a = [[row[0] for row in a]]  # numpy: a flat vector in front is a row
     if len(a[0]) != len(b):
