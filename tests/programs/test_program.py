@@ -50,10 +50,10 @@ HARMFUL = {
     "crashes": ("import ctypes\ndef fk(q):\n    ctypes.string_at(0)\n", "ended", "by SIGSEGV"),
     "recurses": ("def fk(q):\n    return fk(q)\n", "raised", "line 2: RecursionError"),
     "is a fork bomb": ("import os\ndef fk(q):\n    while True:\n        os.fork()\n", None, "needed more than|started more than"),
-    "writes garbage": ("import os\nos.write(4, b'hello\\n')\ndef fk(q):\n    return 1.0\n", "garbage", "no answer"),
-    "floods": ("import os\ndef fk(q):\n    while True:\n        os.write(4, b'{\"id\": 0}\\n')\n", "garbage", "no answer"),
-    "writes an endless line": ("import os\ndef fk(q):\n    while True:\n        os.write(4, b'x' * 65536)\n", "garbage", "no answer"),
-    "nests deeply": ("import os\ndef fk(q):\n    os.write(4, b'[' * 100000 + b'\\n')\n", "garbage", "no answer"),
+    "writes garbage": ("import os\nos.write(4, b'hello\\n')\ndef fk(q):\n    return 1.0\n", "garbage", "not an answer"),
+    "floods": ("import os\ndef fk(q):\n    while True:\n        os.write(4, b'{\"id\": 0}\\n')\n", "garbage", "not an answer"),
+    "writes an endless line": ("import os\ndef fk(q):\n    while True:\n        os.write(4, b'x' * 65536)\n", "garbage", "not an answer"),
+    "nests deeply": ("import os\ndef fk(q):\n    os.write(4, b'[' * 100000 + b'\\n')\n", "garbage", "not an answer"),
     "closes its answers": ("import os, time\ndef fk(q):\n    os.close(4)\n    time.sleep(50)\n", "ended", "ended"),
     "stops itself": ("import os, signal\ndef fk(q):\n    os.kill(os.getpid(), signal.SIGSTOP)\n", "late", "no answer within 2 s$"),
     "ignores signals": ("import signal, time\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\ndef fk(q):\n    while True:\n        time.sleep(1)\n", "late", "no answer within 2 s$"),
@@ -287,6 +287,7 @@ def test_another_user_reads_nothing_of_ours_and_leaves_nothing(program, open_fol
     for path in package_paths(("numpy",)):
         copytree(path, open_folder / path.name, ignore=ignore_patterns("tests"))
     monkeypatch.setattr(isolated_commands, "package_paths", lambda names: packages)
+    monkeypatch.setattr(tempfile, "tempdir", str(open_folder))
     task = open_folder / "task.toml"
     task.write_text("")
     task.chmod(0o600)

@@ -165,7 +165,7 @@ class Child:
                 return message
             if not message.keys() & {"id", "imported"}:
                 self._end(keep=True)
-                raise ProgramError("wrote what is not an answer", Failure.GARBAGE)
+                raise ProgramError("wrote something that is not an answer", Failure.GARBAGE)
 
     def _end(self, keep: bool = False) -> None:
         if self._process is not None:

@@ -289,7 +289,7 @@ class Process:
             Failure.PROCESSES: f"started more than {MAX_PROCESSES} processes",
             Failure.FILES: f"wrote more than {BOUNDS.written_bytes >> 20} MB to files",
             Failure.ENDED: f"the program ended{self._exit_status_text()}",
-            Failure.GARBAGE: "wrote what is not an answer",
+            Failure.GARBAGE: "wrote something that is not an answer",
         }
         if self.failure is Failure.ENDED:
             self._drained.wait(_LAST_WORDS_TIME)  # its last words may come after the news of its end
