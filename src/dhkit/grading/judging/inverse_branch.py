@@ -1,4 +1,4 @@
-"""A branch of inverse kinematics evaluated at many poses: the poses it reaches, and the first wrong joint."""
+"""A branch of inverse kinematics, evaluated at many poses: the poses that it solves, and its first wrong joint."""
 
 from __future__ import annotations
 
@@ -95,51 +95,70 @@ class Branch:
 
     @cached_property
     def closed(self) -> Mask:
-        """Which poses it reaches, shape (S,); where one joint counts, at which its value is a solution's."""
+        """Mask (S,) of the poses that this branch solves.
+
+        Where one joint alone counts, those at which its value is that of an exact solution.
+        """
         if self.judged_joint is not None:
             return self.agrees(self.judged_joint, self.q[:, self.judged_joint])
         return self.poses.closes(self.q)
 
     @cached_property
     def reachable(self) -> Mask:
-        """Which poses it should reach, shape (S,): all but those that none of the solutions it follows reaches."""
+        """Mask (S,) of the poses that this branch must solve.
+
+        They are the poses at which an exact branch that it follows elsewhere has a solution; all of them where one
+        joint alone counts, where it solves no pose, or where the exact branches are not known.
+        """
+        every_pose = np.ones(len(self.closed), dtype=bool)
         solutions = self.poses.solutions
         if self.judged_joint is not None or not np.any(self.closed) or not self.poses.has_closed_form:
-            return np.ones(len(self.closed), dtype=bool)
-        follows = np.mean(self.poses.matches(self.q, solutions)[self.closed], axis=0) > _CHANCE_SHARE
+            return every_pose
+        shares = np.mean(self.poses.matches(self.q, solutions)[self.closed], axis=0)
+        follows = shares > _CHANCE_SHARE
         if not np.any(follows):
-            return np.ones(len(self.closed), dtype=bool)
-        reached: Mask = self.closed | np.any(np.isfinite(solutions[:, follows, 0]), axis=1)
+            return every_pose
+        has_solution = np.any(np.isfinite(solutions[:, follows, 0]), axis=1)
+        reached: Mask = self.closed | has_solution
         return reached
 
     @cached_property
     def failing(self) -> Mask:
-        """Which poses it should reach and does not, shape (S,)."""
+        """Mask (S,) of the poses that it must solve and does not."""
         return self.reachable & ~self.closed
 
     @property
     def is_right(self) -> bool:
-        """Whether it reaches every pose that it should."""
+        """Whether it solves every pose that it must."""
         return not np.any(self.failing)
 
     @cached_property
     def agreement(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Rank of the first joint that agrees with no solution (n: none), index of the nearest solution; shape (S,)."""
+        """Comparison with the exact solutions, joint by joint in the order of evaluation; shape (S,) each.
+
+        The rank of the first joint that matches no solution which matches all earlier joints, n if there is none; and
+        the index of the solution that is nearest at that joint.
+        """
         truths = self.poses.truths
         first = np.full(len(truths), self.n)
         nearest = np.argmax(np.all(np.isfinite(truths), axis=-1), axis=1)
-        for turn, k in enumerate(self.order):
-            alive = self.alive[turn]
+        for rank, k in enumerate(self.order):
+            alive = self.alive[rank]
             gap = np.where(alive, self.poses.gaps(self.q[:, None, k], truths[..., k], k), np.inf)
-            gap = np.where(alive & np.isnan(gap), 1e300, gap)
-            going = first == self.n
-            nearest = np.where(going, np.argmin(gap, axis=1), nearest)
-            first[going & ~np.any(gap < MATCHES, axis=1)] = turn
+            gap = np.where(alive & np.isnan(gap), 1e300, gap)  # a formula without a value is far from any solution
+
+            is_undecided = first == self.n
+            nearest = np.where(is_undecided, np.argmin(gap, axis=1), nearest)
+            matches_none = ~np.any(gap < MATCHES, axis=1)
+            first[is_undecided & matches_none] = rank
         return first, nearest
 
     @cached_property
     def alive(self) -> list[Mask]:
-        """By rank: which solutions, (S, B + 1), agree with all preceding joints; if none does, those that last did."""
+        """For each joint in order of evaluation, a mask (S, B + 1) of the solutions that match all earlier joints.
+
+        If none matches, it is the previous mask.
+        """
         truths = self.poses.truths
         alive = [np.all(np.isfinite(truths), axis=-1)]
         for k in self.order:
@@ -158,12 +177,12 @@ class Branch:
 
         Newton's method may have missed solutions: a joint must then be wrong at a good part of the poses.
         """
-        first = np.sort(self.agreement[0][self.failing])
-        if not len(first) or not self.poses.isolated:
+        ranks = np.sort(self.agreement[0][self.failing])
+        if not len(ranks) or not self.poses.isolated:
             return None
-        spared = 0 if self.poses.has_closed_form else int(MISSED_SHARE * len(first))
-        turn = int(first[spared])
-        return self.order[turn] if turn < self.n else None
+        spared = 0 if self.poses.has_closed_form else int(MISSED_SHARE * len(ranks))
+        rank = int(ranks[spared])
+        return self.order[rank] if rank < self.n else None
 
     def sample(self, most: int) -> Branch:
         """Return the branch at up to so many poses that it fails to reach, and at up to as many that it reaches."""

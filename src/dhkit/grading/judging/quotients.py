@@ -13,7 +13,7 @@ from dhkit.expressions.parser import value_of
 from dhkit.expressions.syntax import Call, Name, Number, Power, Tree
 from dhkit.expressions.trees import Algebra
 from dhkit.grading.judging.bounds import BOUNDS
-from dhkit.symbolic.ring import Direction, Element, Ring, RingError
+from dhkit.symbolic.ring import Direction, Element, Monomial, Ring, RingError
 
 _WEIGHTED_BITS = 256
 """Size of a coefficient, in bits, from which a pair of terms counts as more than one."""
@@ -42,11 +42,14 @@ class Quotient:
         return self.denominator == 1
 
     def numerator_of_difference(self, truth: Element) -> Element:
-        """Return the numerator of the difference from an element: zero if and only if both are equal."""
+        """Return the numerator of the difference from an element: zero if and only if both are equal.
+
+        N / D - t = (N - t D) / D, and D is not zero.
+        """
         return self.numerator - truth * self.denominator
 
     def equals(self, other: Quotient) -> bool:
-        """Whether two answers are the same quotient."""
+        """Whether two answers are the same quotient: N / D = N' / D' if and only if N D' - N' D = 0."""
         return (self.numerator * other.denominator - other.numerator * self.denominator).is_zero
 
     def element(self) -> Element | None:
@@ -105,7 +108,7 @@ class RingReader(Algebra[Quotient]):
             raise OutsideTheRingError(_TOO_MANY_TERMS) from None
 
     def element(self, tree: Tree) -> Element | None:
-        """Return a syntax tree as an element of the ring; None if it is none, or cannot be read."""
+        """Return a syntax tree as an element of the ring; None if it is not one, or cannot be read."""
         try:
             return self.read(tree).element()
         except (OutsideTheRingError, AnswerError):
@@ -158,7 +161,8 @@ class RingReader(Algebra[Quotient]):
         polynomials = Quotient(self.ring.zero, one)
         fractions: Quotient | None = None
         for k, (added, quotient) in enumerate(terms, start=1):
-            signed = Quotient(quotient.numerator if added else -quotient.numerator, quotient.denominator, quotient.bits)
+            numerator = quotient.numerator if added else -quotient.numerator
+            signed = Quotient(numerator, quotient.denominator, quotient.bits)
             if quotient.denominator is one:
                 pending.append(signed.numerator)
                 polynomials = Quotient(polynomials.numerator, one, polynomials.bits + quotient.bits)
@@ -170,6 +174,7 @@ class RingReader(Algebra[Quotient]):
                 pending = []
         if fractions is None:
             return polynomials
+        # p + N / D = (N + p D) / D
         numerator = fractions.numerator + self._multiply(polynomials.numerator, fractions.denominator)
         bits = fractions.bits + polynomials.bits
         return self._bound_coefficients(Quotient(numerator, fractions.denominator, bits))
@@ -178,6 +183,7 @@ class RingReader(Algebra[Quotient]):
         bits = a.bits + b.bits
         if a.denominator.polynomial == b.denominator.polynomial:
             return Quotient(a.numerator + b.numerator, a.denominator, bits)
+        # N_a / D_a + N_b / D_b = (N_a D_b + N_b D_a) / (D_a D_b)
         numerator = self._multiply(a.numerator, b.denominator) + self._multiply(b.numerator, a.denominator)
         denominator = self._multiply(a.denominator, b.denominator)
         return self._bound_coefficients(Quotient(numerator, denominator, bits))
@@ -186,14 +192,13 @@ class RingReader(Algebra[Quotient]):
         """Multiply and divide, from left to right."""
         product = self._polynomial(self.ring.one)
         for is_factor, quotient in factors:
-            parts = (quotient.numerator, quotient.denominator)
+            above = quotient.numerator
+            below = quotient.denominator
             if not is_factor:
                 self._note_divisor(quotient.numerator)
-                parts = parts[::-1]
-            numerator, denominator = (
-                self._multiply(old, part)
-                for old, part in zip((product.numerator, product.denominator), parts, strict=True)
-            )
+                above, below = below, above
+            numerator = self._multiply(product.numerator, above)
+            denominator = self._multiply(product.denominator, below)
             product = self._bound_coefficients(Quotient(numerator, denominator, product.bits + quotient.bits))
         return self._divide(product.numerator, product.denominator, product.bits)
 
@@ -218,13 +223,17 @@ class RingReader(Algebra[Quotient]):
     def _power(self, base: Tree, exponent: int) -> Quotient:
         quotient = self.of(base)
         power = abs(exponent)
+
+        # Coefficients of a power are about as many times as long: their size is measured before it is given up.
         if quotient.bits * power > BOUNDS.coefficient_bits:
             quotient = self._bound_coefficients(
                 Quotient(quotient.numerator, quotient.denominator, BOUNDS.coefficient_bits + 1)
             )
             if quotient.bits * power > 4 * BOUNDS.coefficient_bits:
                 raise OutsideTheRingError(_NUMBER_TOO_LONG)
-        numerator, denominator = (self._raise(part, power) for part in (quotient.numerator, quotient.denominator))
+
+        numerator = self._raise(quotient.numerator, power)
+        denominator = self._raise(quotient.denominator, power)
         if exponent < 0:
             self._note_divisor(quotient.numerator)
             numerator, denominator = denominator, numerator
@@ -246,9 +255,10 @@ class RingReader(Algebra[Quotient]):
         return Quotient(quotient.numerator, quotient.denominator, bits)
 
     def _raise(self, element: Element, exponent: int) -> Element:
-        """Return a power by repeated squaring."""
+        """Return a power by repeated squaring: x^(2 k + b) = (x^k)^2 x^b, over the binary digits b of the exponent."""
         result = self.ring.one
-        for bit in f"{exponent:b}" if exponent else "":
+        digits = f"{exponent:b}" if exponent else ""
+        for bit in digits:
             result = self._multiply(result, result)
             if bit == "1":
                 result = self._multiply(result, element)
@@ -267,7 +277,9 @@ class RingReader(Algebra[Quotient]):
         if right is self.ring.one:
             return left
         pairs = len(left) * len(right)
-        self._work += pairs + (pairs * _bits(right) // _WEIGHTED_BITS if pairs > _CHECK_INTERVAL else 0)
+        self._work += pairs
+        if pairs > _CHECK_INTERVAL:  # long coefficients take longer to multiply
+            self._work += pairs * _bits(right) // _WEIGHTED_BITS
         if self._work > BOUNDS.reading_work:
             raise OutsideTheRingError(_TOO_MANY_TERMS)
         product = left * right
@@ -349,9 +361,12 @@ class RingReader(Algebra[Quotient]):
             return None
         joint = int(joints[0][1:]) - 1
         if self.angle_factor is None:
-            return (joint, coefficient) if joints[0] in self._names and len(monomial) == 1 else None
-        unit = {"pi": 1 if self.angle_factor < 1 else -1}
-        return (joint, coefficient / self.angle_factor) if powers == {joints[0]: 1, **unit} else None
+            is_plain = joints[0] in self._names and len(monomial) == 1
+            return (joint, coefficient) if is_plain else None
+        # Degrees taken for radians have the factor pi/180, radians taken for degrees 180/pi.
+        power_of_pi = 1 if self.angle_factor < 1 else -1
+        is_confused = powers == {joints[0]: 1, "pi": power_of_pi}
+        return (joint, coefficient / self.angle_factor) if is_confused else None
 
     def _multiple_angle(self, i: int, times: Fraction) -> Direction:
         """Return cosine and sine of a whole multiple of the variable of joint i, from 0."""
@@ -368,14 +383,22 @@ class RingReader(Algebra[Quotient]):
         return (cosine, sine if times > 0 else -sine)
 
     def _add_angles(self, a: Direction, b: Direction) -> Direction:
-        """Return cosine and sine of a sum of angles, the work counted."""
+        """Return cosine and sine of a sum of angles, the work counted.
+
+        cos(a + b) = cos a cos b - sin a sin b,    sin(a + b) = sin a cos b + cos a sin b
+        """
+        cos_a, sin_a = a
+        cos_b, sin_b = b
         times = self._multiply
-        return times(a[0], b[0]) - times(a[1], b[1]), times(a[1], b[0]) + times(a[0], b[1])
+        cosine = times(cos_a, cos_b) - times(sin_a, sin_b)
+        sine = times(sin_a, cos_b) + times(cos_a, sin_b)
+        return cosine, sine
 
 
 def multiple_angle(ring: Ring, joint: int, times: int) -> Direction:
-    """Return cosine and sine of a multiple of the variable of a turning joint, from 0."""
-    single = (ring.cosine(joint), ring.sine(joint) * (1 if times > 0 else -1))
+    """Return cosine and sine of a multiple of the variable of a revolute joint, from 0."""
+    sign = 1 if times > 0 else -1  # cos(-q) = cos q, sin(-q) = -sin q
+    single = (ring.cosine(joint), ring.sine(joint) * sign)
     return sum_of_angles(ring, [single] * abs(times))
 
 
@@ -390,10 +413,12 @@ def sum_of_angles(ring: Ring, directions: Iterable[Direction]) -> Direction:
 def varying(element: Element) -> Element:
     """Return an element without its terms that do not depend on the state."""
     ring = element.ring
-    constant = [g.kind == "constant" for g in ring.generators]
-    return ring.from_terms(
-        {m: c for m, c in element.terms.items() if any(e and not is_it for e, is_it in zip(m, constant, strict=True))}
-    )
+    of_state = [place for place, generator in enumerate(ring.generators) if generator.kind != "constant"]
+
+    def varies(monomial: Monomial) -> bool:
+        return any(monomial[place] for place in of_state)
+
+    return ring.from_terms({monomial: c for monomial, c in element.terms.items() if varies(monomial)})
 
 
 def _rational(element: Element) -> Fraction | None:
