@@ -57,7 +57,7 @@ class MatVariable:
     """MATLAB's class: ``double``, ``char``, ``struct``, ``timeseries``; ``complex matrix`` for complex numbers."""
     parts: tuple[_Element, ...]
     """Dimensions and content; empty for classes that are not read."""
-    reader: _Reader
+    reader: _ElementReader
 
     @property
     def readable(self) -> bool:
@@ -101,7 +101,7 @@ def read_mat(content: bytes, max_bytes: int, *, advice: str) -> dict[str, MatVar
     order = {b"IM": "<", b"MI": ">"}.get(content[_HEADER_LENGTH - 2 : _HEADER_LENGTH])
     if order is None:
         raise DescriptionError(f"no .mat file of format 5; {advice}")
-    reader = _Reader(order, max_bytes)
+    reader = _ElementReader(order, max_bytes)
     variables: dict[str, MatVariable] = {}
     for variable in reader.variables(content[_HEADER_LENGTH:]):
         if variable.name in variables:
@@ -112,7 +112,7 @@ def read_mat(content: bytes, max_bytes: int, *, advice: str) -> dict[str, MatVar
 
 
 @dataclass
-class _Reader:
+class _ElementReader:
     """Reads elements in one byte order, with limits on size, number and depth."""
 
     order: str

@@ -119,7 +119,7 @@ def read_tokens(tokens: Sequence[Token], text: str) -> Tree:
     ExpressionError
         The tokens are not an expression, or nested deeper than ``BOUNDS.nesting``.
     """
-    return _Reader(tokens, text).whole()
+    return _Parser(tokens, text).whole()
 
 
 def decimal_fraction(text: str) -> Fraction:
@@ -173,7 +173,7 @@ def _shown(text: str) -> str:
     return repr(text if len(text) <= 60 else text[:57] + "...")
 
 
-class _Reader:
+class _Parser:
     """One pass over the tokens of a text."""
 
     def __init__(self, tokens: Sequence[Token], text: str) -> None:

@@ -102,10 +102,10 @@ def read_solidworks_report(text: str, path: str, first: int = 1) -> tuple[str, M
     ModelError
         A quantity or its unit is missing or unknown, or the blocks contradict each other.
     """
-    return _Reader(text, path, first).report()
+    return _ReportReader(text, path, first).report()
 
 
-class _Reader:
+class _ReportReader:
     def __init__(self, text: str, path: str, first: int) -> None:
         self.text = text
         self.path = path

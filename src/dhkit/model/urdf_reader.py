@@ -69,12 +69,12 @@ def read_urdf(path: str | Path, *, as_designed: bool = False) -> UrdfTree:
     """
     path = Path(path)
     try:
-        return _Reader(path, as_designed).tree(parse_urdf(path))
+        return _UrdfReader(path, as_designed).tree(parse_urdf(path))
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from None
 
 
-class _Reader:
+class _UrdfReader:
     """Reads one file and collects its warnings; messages do not name the file."""
 
     def __init__(self, path: Path, as_designed: bool) -> None:

@@ -115,10 +115,10 @@ def read_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_nam
         Sizes that do not fit, an operation that matrices do not have, or a formula that cannot be read.
     """
     tokens, plain = matrix_tokens(text, vocabulary)
-    return _as_matrix(_Reader(vocabulary, plain, matrix_of).value(tokens))
+    return _as_matrix(_MatrixReader(vocabulary, plain, matrix_of).value(tokens))
 
 
-class _Reader:
+class _MatrixReader:
     def __init__(self, vocabulary: Vocabulary, text: str, matrix_of: MatrixOf) -> None:
         self.vocabulary = vocabulary
         self.text = text

@@ -205,9 +205,9 @@ class TableRows:
         return _file_rows(self.description, self.convention)
 
     @cached_property
-    def reader(self) -> _Reader:
+    def reader(self) -> _RowReader:
         """Reader into the ring with the file's parameters."""
-        return _Reader(exact_arm(with_massless_links(self.description), "file"))
+        return _RowReader(exact_arm(with_massless_links(self.description), "file"))
 
     @cached_property
     def states(self) -> list[dict[str, float]]:
@@ -254,7 +254,7 @@ def _file_rows(description: Description, convention: Convention) -> tuple[Row, .
     return tuple(rows)
 
 
-class _Reader:
+class _RowReader:
     """Reads exact rows into an arm's ring."""
 
     def __init__(self, arm: ExactArm) -> None:
