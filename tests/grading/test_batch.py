@@ -14,7 +14,7 @@ import pytest
 from dhkit.errors import AnswerError
 from dhkit.grading.batch import GIGABYTE, grade_all
 from dhkit.grading.bounds import BOUNDS
-from dhkit.grading.isolation import Limits
+from dhkit.grading.isolation import WorkerLimits
 from dhkit.grading.report import Entry, GradeReport, Verdict
 from dhkit.grading.sheets import Sheet, find_sheets
 from grading.judged import REPORT
@@ -250,7 +250,7 @@ def test_who_is_slow_to_read_makes_nobody_late():
     def judge(path):
         return replace(right(path), left_out=("x" * 1_000_000,))  # more than a pipe holds
 
-    limit = Limits(seconds=1.0, memory=GIGABYTE)
+    limit = WorkerLimits(seconds=1.0, memory=GIGABYTE)
     reports = grade_all(sheets("a.toml", "b.toml", "c.toml"), judge, jobs=3, seconds=limit.seconds)
     errors = [next(reports).error]
     time.sleep(limit.longest + 0.1)  # the others have written a part and wait

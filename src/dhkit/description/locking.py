@@ -65,7 +65,7 @@ _LinkBodies: TypeAlias = tuple[Body | None, ...]
 """Bodies of one link, in its frame; None stands for a joined link without a body."""
 
 
-class _Chain(NamedTuple):
+class _ArmParts(NamedTuple):
     """The parts of an arm that locking a joint changes."""
 
     base: Base
@@ -194,7 +194,7 @@ def _lock_all(description: Description, locked: Mapping[int, Expression]) -> Des
     """
     bodies = tuple(joint.bodies or (None,) for joint in description.joints)
     base: _LinkBodies = (description.base.body,) if description.base.body is not None else ()
-    chain = _Chain(description.base, description.joints, description.tool, (base, *bodies))
+    chain = _ArmParts(description.base, description.joints, description.tool, (base, *bodies))
     values = resolved(description.parameters)
     first = next(place for place in range(description.n + 1) if place not in locked)
     inwards = sorted((place for place in locked if place > first), reverse=True)
@@ -228,8 +228,8 @@ def _link_bodies(joint: Joint, parts: _LinkBodies) -> tuple[Body, ...]:
 
 
 def _lock_one(
-    chain: _Chain, convention: Convention, place: int, q: Expression, values: Mapping[str, Expression]
-) -> _Chain:
+    chain: _ArmParts, convention: Convention, place: int, q: Expression, values: Mapping[str, Expression]
+) -> _ArmParts:
     """Lock the joint at a place: the first joins the base, the last the tool, others the link before."""
     row = fixed_row(chain.joints[place], convention, q)
     if place == 0:
@@ -239,27 +239,27 @@ def _lock_one(
     return _join_link_before(chain, convention, place, row, values)
 
 
-def _join_base(chain: _Chain, row: ExactPose) -> _Chain:
+def _join_base(chain: _ArmParts, row: ExactPose) -> _ArmParts:
     """Make frame 1 the new frame 0."""
     T_new_old = inverse(row)
     placement = placement_of(pose_of(chain.base.placement) @ row)
     shapes = _joined_shapes(_moved_shapes(chain.base.shapes, T_new_old), chain.joints[0].shapes)
     on_base = _moved_bodies(chain.bodies[0], T_new_old) + chain.bodies[1]
-    return _Chain(Base(placement, shapes), chain.joints[1:], chain.tool, (on_base, *chain.bodies[2:]))
+    return _ArmParts(Base(placement, shapes), chain.joints[1:], chain.tool, (on_base, *chain.bodies[2:]))
 
 
-def _join_tool(chain: _Chain, row: ExactPose) -> _Chain:
+def _join_tool(chain: _ArmParts, row: ExactPose) -> _ArmParts:
     """Make the last link part of the one before, and its row part of the tool's placement."""
     *others, before, last = chain.joints
     *other_bodies, own_bodies, last_bodies = chain.bodies
     tool = Tool(placement_of(row @ pose_of(chain.tool.placement)), chain.tool.shapes)
     joints = (*others, _with_shapes_of(before, last, identity(), row))
-    return _Chain(chain.base, joints, tool, (*other_bodies, own_bodies + _moved_bodies(last_bodies, row)))
+    return _ArmParts(chain.base, joints, tool, (*other_bodies, own_bodies + _moved_bodies(last_bodies, row)))
 
 
 def _join_link_before(
-    chain: _Chain, convention: Convention, place: int, row: ExactPose, values: Mapping[str, Expression]
-) -> _Chain:
+    chain: _ArmParts, convention: Convention, place: int, row: ExactPose, values: Mapping[str, Expression]
+) -> _ArmParts:
     """Make the locked link part of the one before, and the locked row part of the two neighbouring rows."""
     before, locked, after = chain.joints[place - 1 : place + 2]
     if convention is Convention.STANDARD:
@@ -274,7 +274,7 @@ def _join_link_before(
     before = _screw_about_axis(_with_shapes_of(before, locked, to_new, to_new @ row), normal.beta, normal.epsilon)
     after = _screw_about_axis(after, normal.gamma, normal.delta)
     bodies = _moved_bodies(chain.bodies[place], to_new) + _moved_bodies(chain.bodies[place + 1], to_new @ row)
-    return _Chain(
+    return _ArmParts(
         chain.base,
         (*chain.joints[: place - 1], before, after, *chain.joints[place + 2 :]),
         chain.tool,

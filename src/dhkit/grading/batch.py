@@ -16,7 +16,7 @@ from typing import TypeAlias
 
 from dhkit.errors import DhkitError
 from dhkit.grading.bounds import BOUNDS
-from dhkit.grading.isolation import Limits, Worker, is_late, start_worker
+from dhkit.grading.isolation import Worker, WorkerLimits, is_late, start_worker
 from dhkit.grading.report import GradeReport
 from dhkit.grading.reports.json import report_of
 from dhkit.grading.sheets import Sheet
@@ -71,7 +71,7 @@ def grade_all(
     """
     if jobs < 1 or seconds <= 0 or memory <= 0:
         raise ValueError(f"found jobs {jobs}, seconds {seconds}, memory {memory}; expected positive numbers")
-    limits = Limits(seconds, memory)
+    limits = WorkerLimits(seconds, memory)
     if hasattr(os, "fork"):
         results = _judge_in_processes(sheets, judge, jobs, limits)
     else:
@@ -98,14 +98,14 @@ def _in_order(
             turn += 1
 
 
-def _judge_here(sheets: Sequence[Sheet], judge: Judge, limits: Limits) -> Iterator[_Numbered]:
+def _judge_here(sheets: Sequence[Sheet], judge: Judge, limits: WorkerLimits) -> Iterator[_Numbered]:
     for number, sheet in enumerate(sheets):
         begin = time.monotonic()
         report = GradeReport(error=sheet.error) if sheet.error else report_of(_judge_to_json(sheet.path, judge, limits))
         yield number, _with_origin(report, sheet, time.monotonic() - begin)
 
 
-def _judge_in_processes(sheets: Sequence[Sheet], judge: Judge, jobs: int, limits: Limits) -> Iterator[_Numbered]:
+def _judge_in_processes(sheets: Sequence[Sheet], judge: Judge, jobs: int, limits: WorkerLimits) -> Iterator[_Numbered]:
     """Yield reports as they are completed; at the end no process is left."""
     waiting = deque(enumerate(sheets))
     with closing(_Pool(judge, limits)) as pool:
@@ -118,7 +118,7 @@ def _judge_in_processes(sheets: Sequence[Sheet], judge: Judge, jobs: int, limits
             yield from pool.wait()
 
 
-def _judge_to_json(path: Path, judge: Judge, limits: Limits) -> bytes:
+def _judge_to_json(path: Path, judge: Judge, limits: WorkerLimits) -> bytes:
     """Return the report of a sheet as JSON; an exception of the judge becomes its error."""
     starved = _error_json(limits.starved)  # made while there is memory
     try:
@@ -140,7 +140,7 @@ def _error_json(error: str) -> bytes:
 class _Pool:
     """The processes that judge sheets at the moment."""
 
-    def __init__(self, judge: Judge, limits: Limits) -> None:
+    def __init__(self, judge: Judge, limits: WorkerLimits) -> None:
         self.judge = judge
         self.limits = limits
         self.running: dict[int, tuple[Sheet, Worker]] = {}

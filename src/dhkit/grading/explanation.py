@@ -21,7 +21,7 @@ from dhkit.symbolic.textbook_kinematics import derive_kinematics
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class SolutionStep:
     """A step of a derivation.
 
     Attributes
@@ -39,7 +39,7 @@ class Step:
     results: tuple[tuple[str, str, Element], ...]
 
 
-def _worked_solution(description: Description) -> list[Step]:
+def _worked_solution(description: Description) -> list[SolutionStep]:
     """Return the steps from the table to the joint torques.
 
     Raises
@@ -109,7 +109,7 @@ class _Solution:
         self.textbook: TextbookDerivation = derive(description)
         self.lag: Lagrangian = lagrangian(description)
 
-    def steps(self) -> Iterator[Step]:
+    def steps(self) -> Iterator[SolutionStep]:
         n = self.description.n
         lag = self.lag
         kind = "R_z(theta) T_z(d) T_x(a) R_x(alpha)"
@@ -146,7 +146,7 @@ class _Solution:
         coupled = "; couplings of drives: b qd_i qd_j each" if self.lag.arm.couplings else ""
         return f"Sums over the links, and over the drives' rotors: G^2 J qd^2/2 each{coupled}."
 
-    def _body(self, name: str, i: int, number: str, body: BodyMotion) -> Iterator[Step]:
+    def _body(self, name: str, i: int, number: str, body: BodyMotion) -> Iterator[SolutionStep]:
         """Yield the steps for a body of link i, from 1, whose quantities have this number."""
         yield self._step(
             f"{name}: where its centre of mass is",
@@ -165,7 +165,7 @@ class _Solution:
             [(f"K{number}", element_array(body.K)), (f"V{number}", element_array(body.V))],
         )
 
-    def _step(self, title: str, method: str, quantities: Sequence[tuple[str, Elements]]) -> Step:
+    def _step(self, title: str, method: str, quantities: Sequence[tuple[str, Elements]]) -> SolutionStep:
         results = []
         for name, array in quantities:
             stem = name.rstrip("0123456789")
@@ -177,4 +177,4 @@ class _Solution:
                     subscript = ",".join(filter(None, (number, "".join(indices))))
                     latex = f"{letter}_{{{subscript}}}" if subscript else letter
                     results.append((f"{name}[{','.join(indices)}]" if index else name, latex, element))
-        return Step(title, method, tuple(results))
+        return SolutionStep(title, method, tuple(results))

@@ -38,7 +38,7 @@ _TIME_SIGNALS = ("SIGXCPU", "SIGALRM", "SIGPROF")
 
 
 @dataclass(frozen=True)
-class Limits:
+class WorkerLimits:
     """Limits of a process.
 
     Attributes
@@ -108,7 +108,7 @@ class Worker:
             return 0
 
 
-def start_worker(work: Callable[[], bytes], limits: Limits) -> Worker:
+def start_worker(work: Callable[[], bytes], limits: WorkerLimits) -> Worker:
     """Fork a process that does some work and writes the result into a pipe.
 
     Raises
@@ -135,7 +135,7 @@ def start_worker(work: Callable[[], bytes], limits: Limits) -> Worker:
     return Worker(pid, pipe, now, now + limits.longest)
 
 
-def result_of(work: Callable[[], bytes], limits: Limits) -> bytes:
+def result_of(work: Callable[[], bytes], limits: WorkerLimits) -> bytes:
     """Return the result of work in a process of its own; in this process if there is no ``os.fork`` (Windows).
 
     Raises
@@ -170,7 +170,7 @@ def is_late(status: int) -> bool:
     return -status in [getattr(signal, name) for name in _TIME_SIGNALS]
 
 
-def _run(end: int, work: Callable[[], bytes], limits: Limits) -> NoReturn:
+def _run(end: int, work: Callable[[], bytes], limits: WorkerLimits) -> NoReturn:
     """Run in the child: work, write the result, and exit without cleaning up what belongs to the parent."""
     import fcntl
 
@@ -203,7 +203,7 @@ def _close_files(end: int) -> None:
     sys.stdout = sys.stderr = open(1, "w", closefd=False)  # noqa: SIM115
 
 
-def _set_limits(limits: Limits) -> None:
+def _set_limits(limits: WorkerLimits) -> None:
     import resource
 
     for number, timer, longest in (

@@ -9,7 +9,7 @@ import pytest
 from dhkit.description import Convention, library_robot, link_transforms
 from dhkit.expressions import read
 from dhkit.grading.answers.sheet import sheet_of
-from dhkit.grading.isolation import Limits, result_of
+from dhkit.grading.isolation import WorkerLimits, result_of
 from dhkit.grading.judging import changed_formulas
 from dhkit.grading.judging.consistency import Consistency
 from dhkit.grading.judging.coordinates import Coordinates
@@ -196,10 +196,10 @@ def test_edits_come_in_their_order():
 
 
 def test_work_in_a_process_of_its_own_ends():
-    limits = Limits(seconds=5.0, memory=2**30)
+    limits = WorkerLimits(seconds=5.0, memory=2**30)
     assert result_of(lambda: b"result", limits) == b"result"
     with pytest.raises(TimeoutError, match=r"took longer than 0\.2 s"):
-        result_of(lambda: bytes(iter(lambda: 0, 1)), Limits(0.2, 2**30))
+        result_of(lambda: bytes(iter(lambda: 0, 1)), WorkerLimits(0.2, 2**30))
     with pytest.raises(ChildProcessError):
         result_of(lambda: exit(3), limits)
 

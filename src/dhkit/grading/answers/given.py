@@ -24,7 +24,7 @@ from dhkit.grading.answers.pose_entries import other_names, with_pose_entries
 from dhkit.grading.answers.pretty import is_pretty
 from dhkit.grading.answers.quantity_names import QuantityNames, Target
 from dhkit.grading.answers.reading import meaning_of
-from dhkit.grading.answers.sheet_values import AnswerSheet, Chain, Entries, Refusal
+from dhkit.grading.answers.sheet_values import AnswerSheet, Entries, EqualFormulas, Refusal
 from dhkit.grading.answers.tokens import quote
 from dhkit.grading.answers.vocabulary import Vocabulary, plain_name
 from dhkit.symbolic import table_lengths
@@ -48,7 +48,8 @@ POSE_NAMES = ("px", "py", "pz", *(f"r{i}{j}" for i in "123" for j in "123"))
 """Names of the tool's pose in the world, the data of inverse kinematics: its origin, m, and its rotation by rows."""
 
 Answer: TypeAlias = object
-"""Text, a number, or lists of them, :class:`Entries`, :class:`Chain` or :class:`Refusal`, or a library's expression."""
+"""Text, a number, lists of them, :class:`Entries`, :class:`EqualFormulas` or :class:`Refusal`; or an expression of a
+library."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +135,7 @@ def _texts(value: object) -> Iterator[str]:
     match value:
         case str():
             yield value
-        case Chain():
+        case EqualFormulas():
             yield from value.formulas
         case Entries():
             yield from _texts(value.texts)
@@ -179,7 +180,7 @@ def given_quantity(
         raise AnswerError(f"{name}: {_refused(value)}")
     if isinstance(value, str) and shape:
         value = _system(name, value, names)
-    if isinstance(value, Chain):
+    if isinstance(value, EqualFormulas):
         return _chained(
             [given_quantity(name, formula, shape, vocabulary, names, matrix_of) for formula in value.formulas]
         )
@@ -237,11 +238,11 @@ def _refused(refusal: Refusal) -> str:
 # Statements
 
 
-def _system(name: str, text: str, names: QuantityNames) -> str | Chain | Entries:
+def _system(name: str, text: str, names: QuantityNames) -> str | EqualFormulas | Entries:
     """Return the entries that a system of equations in one text states; the text itself where it is none."""
     if not _SYSTEM.search(text):
         return text
-    entries: dict[tuple[int, ...], str | Chain | Refusal] = {}
+    entries: dict[tuple[int, ...], str | EqualFormulas | Refusal] = {}
     for statement in statements_of(text):
         if statement.problem:
             raise AnswerError(f"{name}: {statement.problem}: {quote(statement.text)}")
@@ -255,11 +256,11 @@ def _system(name: str, text: str, names: QuantityNames) -> str | Chain | Entries
     return Entries(entries) if entries else text
 
 
-def _formulas(statement: Statement) -> str | Chain:
-    return statement.formulas[0] if len(statement.formulas) == 1 else Chain(statement.formulas)
+def _formulas(statement: Statement) -> str | EqualFormulas:
+    return statement.formulas[0] if len(statement.formulas) == 1 else EqualFormulas(statement.formulas)
 
 
-def _without_name(target: Target, text: str, names: QuantityNames) -> str | Chain:
+def _without_name(target: Target, text: str, names: QuantityNames) -> str | EqualFormulas:
     """Return an entry's formula without the name in front of it: tau_1 = ..., G(q) = ...; a chain of several.
 
     Raises
@@ -315,7 +316,7 @@ def _entry(target: Target, value: Answer, vocabulary: Vocabulary, names: Quantit
             value = _without_name(target, value, names)
         except AnswerError as error:
             return Given(index, str(value)[: BOUNDS.unread_characters], error=str(error))
-    if isinstance(value, Chain):
+    if isinstance(value, EqualFormulas):
         (given,) = _chained([(_read(index, formula, vocabulary),) for formula in value.formulas])
         return given
     return _read(index, value, vocabulary)

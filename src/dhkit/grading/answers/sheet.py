@@ -15,8 +15,8 @@ from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.sheet_values import (
     AnswerSheet,
-    Chain,
     Entries,
+    EqualFormulas,
     InverseStep,
     Names,
     Refusal,
@@ -79,7 +79,7 @@ ALIASES = dict(D="M", G="g", KE="K", PE="V", U="V", P="V", Tau="tau", N="g", Jac
 def source_sheet(
     file: str,
     n: int,
-    answers: Mapping[str, str | Chain | Entries | Refusal],
+    answers: Mapping[str, str | EqualFormulas | Entries | Refusal],
     parameters: Mapping[str, str | Refusal],
     notes: Sequence[str],
     left_out: Sequence[str],

@@ -23,7 +23,7 @@ class Refusal:
 
 
 @dataclass(frozen=True)
-class Chain:
+class EqualFormulas:
     """The formulas of one statement ``V = a = b``: the last is the answer, and those before it must equal it.
 
     Attributes
@@ -42,10 +42,10 @@ class Entries:
     Attributes
     ----------
     texts
-        Text, :class:`Chain` or :class:`Refusal` by index, from 0.
+        Text, :class:`EqualFormulas` or :class:`Refusal` by index, from 0.
     """
 
-    texts: Mapping[tuple[int, ...], str | Chain | Refusal]
+    texts: Mapping[tuple[int, ...], str | EqualFormulas | Refusal]
 
 
 @dataclass(frozen=True)

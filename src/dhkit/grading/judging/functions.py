@@ -13,7 +13,7 @@ from dhkit.errors import AnswerError
 from dhkit.grading.answers.given import Given
 from dhkit.grading.answers.sampled import SampledAnswer
 from dhkit.grading.answers.sheet import shape_of
-from dhkit.grading.isolation import Limits, result_of
+from dhkit.grading.isolation import WorkerLimits, result_of
 from dhkit.grading.judging.findings import Finding
 from dhkit.grading.judging.quantities import JudgedQuantity, parameters_in, place_of
 from dhkit.grading.judging.sampling import samples
@@ -28,7 +28,7 @@ GROUP = 10
 _TOLERANCE = 1e-9
 """Tolerance relative to a quantity's largest entry at a state: doubles, with room for a long formula's rounding."""
 _STATES = ("q", "qd", "qdd")
-LIMITS = Limits(seconds=15.0, memory=2 * 1024**3)
+LIMITS = WorkerLimits(seconds=15.0, memory=2 * 1024**3)
 """Limits of the process that calls a function at all states: a function that hangs or exits ends that process alone."""
 _ERROR_MARK = b"!"
 """First byte of a process's result that is an error message and no array."""

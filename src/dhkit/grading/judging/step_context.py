@@ -17,8 +17,8 @@ from dhkit.grading.judging.inverse_mistakes import lengths_of
 from dhkit.grading.judging.inverse_poses import Mask, Poses
 from dhkit.grading.report import Verdict, Witness
 from dhkit.symbolic import InverseDerivation, inverse_derivation, table_lengths
-from dhkit.symbolic.inverse.chain import Chain
-from dhkit.symbolic.inverse.steps import Step as DerivedStep
+from dhkit.symbolic.inverse.chain import ExactChain
+from dhkit.symbolic.inverse.steps import DerivationStep as DerivedStep
 
 
 @dataclass
@@ -131,7 +131,7 @@ class StepContext:
                 yield mistake, replace(poses, T=T if behind is None else T @ behind).values
 
     @cached_property
-    def chains(self) -> tuple[Chain, Chain]:
+    def chains(self) -> tuple[ExactChain, ExactChain]:
         """The arm with named lengths, and with numbers."""
-        named, numbers = (Chain.of(self.description, named=named, in_joint_values=True) for named in (True, False))
+        named, numbers = (ExactChain.of(self.description, named=named, in_joint_values=True) for named in (True, False))
         return named, numbers

@@ -25,7 +25,7 @@ from dhkit.grading.judging.step_roots import Residual, other_root
 from dhkit.grading.report import Verdict, Witness
 from dhkit.symbolic import table_lengths
 from dhkit.symbolic.equations import plain_text
-from dhkit.symbolic.inverse.chain import POSE, Chain
+from dhkit.symbolic.inverse.chain import POSE, ExactChain
 from dhkit.symbolic.inverse.steps import names_in
 from dhkit.symbolic.ring import Element, RingError
 from dhkit.symbolic.ring.ring import translated
@@ -180,7 +180,7 @@ class Equations:
             return Verdict.WRONG, "", difference
         return Verdict.UNDECIDED, f"holds at {len(self.context.poses.q)} random poses; tried, not proved", None
 
-    def _element(self, tree: Tree, chain: Chain, known: dict[str, Fraction]) -> Element:
+    def _element(self, tree: Tree, chain: ExactChain, known: dict[str, Fraction]) -> Element:
         """Return a difference with the pose of the arm put in, up to a denominator."""
         quotient = RingReader(chain.ring, numbers=known).read(tree)
         T = chain.tool_pose

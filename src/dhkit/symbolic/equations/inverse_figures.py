@@ -12,7 +12,7 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.symbolic.inverse.derivation import InverseDerivation, Values
 from dhkit.symbolic.inverse.forms import Circle, Form
-from dhkit.symbolic.inverse.steps import Step, View
+from dhkit.symbolic.inverse.steps import DerivationStep, View
 
 _WIDTH, _HEIGHT, _MARGIN = 340, 250, 46
 """Of a figure, in pixels."""
@@ -99,7 +99,7 @@ class _Drawing:
         return "".join([*parts, *texts, "</svg>"])
 
 
-def figure_of(derivation: InverseDerivation, step: Step, T: Array) -> str:
+def figure_of(derivation: InverseDerivation, step: DerivationStep, T: Array) -> str:
     """Return the figure of a step at a pose T (4, 4), m; empty if it has none, or the pose has no solution."""
     if step.figure is None or step.form is None:
         return ""
@@ -110,7 +110,7 @@ def figure_of(derivation: InverseDerivation, step: Step, T: Array) -> str:
     return draw(derivation, step, step.form, found[0]).svg(f"{step.title}: {', '.join(step.figure.labels)}")
 
 
-def _named_roots(step: Step, form: Form, values: Values) -> list[tuple[float, str, list[float]]]:
+def _named_roots(step: DerivationStep, form: Form, values: Values) -> list[tuple[float, str, list[float]]]:
     """Return the two roots of a step at the pose: value, name, and the values of the factors of the rule."""
     if step.choice is None:
         return []
@@ -148,7 +148,7 @@ def _letters(form: Form, values: Values) -> dict[str, float]:
     return {letter: float(np.ravel(values.of(element))[0]) for letter, element in form.letters.items()}
 
 
-def _top(derivation: InverseDerivation, step: Step, form: Form, values: Values) -> _Drawing:
+def _top(derivation: InverseDerivation, step: DerivationStep, form: Form, values: Values) -> _Drawing:
     drawing = _Drawing()
     letters = _letters(form, values)
     origin = np.zeros(2)
@@ -176,7 +176,7 @@ def _top(derivation: InverseDerivation, step: Step, form: Form, values: Values) 
     return drawing
 
 
-def _labels(step: Step) -> tuple[str, ...]:
+def _labels(step: DerivationStep) -> tuple[str, ...]:
     return step.figure.labels if step.figure is not None else ()
 
 
@@ -184,7 +184,7 @@ def _place(derivation: InverseDerivation, values: Values) -> Array:
     return np.array([float(np.ravel(values.of(derivation.chain.symbol(name)))[0]) for name in "xy"])
 
 
-def _triangle(derivation: InverseDerivation, step: Step, form: Form, values: Values) -> _Drawing:
+def _triangle(derivation: InverseDerivation, step: DerivationStep, form: Form, values: Values) -> _Drawing:
     drawing = _Drawing()
     letters = _letters(form, values)
     origin = np.zeros(2)
@@ -213,7 +213,7 @@ def _triangle(derivation: InverseDerivation, step: Step, form: Form, values: Val
     return drawing
 
 
-def _slide(derivation: InverseDerivation, step: Step, form: Form, values: Values) -> _Drawing:
+def _slide(derivation: InverseDerivation, step: DerivationStep, form: Form, values: Values) -> _Drawing:
     drawing = _Drawing()
     letters = _letters(form, values)
     origin = np.zeros(2)

@@ -12,7 +12,7 @@ from dhkit.symbolic.equations.inverse_figures import figure_of, sample_pose
 from dhkit.symbolic.equations.inverse_text import GIVEN, branches_sentence, introduction, rule_in_dollars
 from dhkit.symbolic.equations.inverse_writing import Phrases, solved_before
 from dhkit.symbolic.inverse.derivation import InverseDerivation
-from dhkit.symbolic.inverse.steps import Step
+from dhkit.symbolic.inverse.steps import DerivationStep
 
 _STYLE = """<style>
 .ik-step { display: flow-root; }
@@ -61,7 +61,7 @@ def _body(derivation: InverseDerivation) -> str:
     return "\n".join(filter(None, parts))
 
 
-def _step(derivation: InverseDerivation, write: Phrases, step: Step) -> Iterator[str]:
+def _step(derivation: InverseDerivation, write: Phrases, step: DerivationStep) -> Iterator[str]:
     yield f"<p>{_words(step.look)}</p>"
     if used := solved_before(derivation, step):
         yield f'<p class="ik-known">Known from before: {_words(", ".join(used))}.</p>'

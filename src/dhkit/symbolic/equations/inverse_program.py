@@ -14,7 +14,7 @@ from dhkit.symbolic.equations.writing import Printer
 from dhkit.symbolic.inverse.chain import POSE
 from dhkit.symbolic.inverse.derivation import IN_PLANE, InverseDerivation, in_branch_order
 from dhkit.symbolic.inverse.forms import ZERO_RADICAND, Form, Remainder
-from dhkit.symbolic.inverse.steps import Choice, Step
+from dhkit.symbolic.inverse.steps import Choice, DerivationStep
 from dhkit.symbolic.languages.statements import Comment, Digit, Guard, Let, Statement
 from dhkit.symbolic.languages.syntax import Syntax
 from dhkit.symbolic.ring import Element, Generator
@@ -178,7 +178,7 @@ class _Statements:
     def _text(self, element: Element) -> str:
         return self.printer.sum(collected(element))
 
-    def _step(self, step: Step) -> Iterator[Statement]:
+    def _step(self, step: DerivationStep) -> Iterator[Statement]:
         head = step.unknown.name if step.unknown else step.title
         yield Comment(f"{head}: {step.look}")
         for definition in step.definitions:

@@ -10,7 +10,7 @@ from dhkit.symbolic.equations.inverse_writing import Phrases, phi_label, solved_
 from dhkit.symbolic.equations.latex_document import escaped
 from dhkit.symbolic.equations.text import WIDTH, broken_lines
 from dhkit.symbolic.inverse.derivation import InverseDerivation
-from dhkit.symbolic.inverse.steps import Choice, Step
+from dhkit.symbolic.inverse.steps import Choice, DerivationStep
 
 GIVEN = "Given is the pose T of the tool in the world: its position px, py, pz and its rotation r11 ... r33."
 
@@ -81,11 +81,11 @@ def branches_sentence(derivation: InverseDerivation) -> str:
     return f"{count} branches: {', '.join(derivation.branches)}.{aims}"
 
 
-def _title(write: Phrases, step: Step) -> str:
+def _title(write: Phrases, step: DerivationStep) -> str:
     return write.unknown(step.unknown) if step.unknown else step.title
 
 
-def _step(derivation: InverseDerivation, write: Phrases, step: Step) -> Iterator[str]:
+def _step(derivation: InverseDerivation, write: Phrases, step: DerivationStep) -> Iterator[str]:
     indent = "   "
     yield from textwrap.wrap(step.look, WIDTH, initial_indent=indent, subsequent_indent=indent)
     if used := solved_before(derivation, step):

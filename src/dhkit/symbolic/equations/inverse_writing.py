@@ -13,7 +13,7 @@ from dhkit.symbolic.equations.text import TextWriter
 from dhkit.symbolic.equations.writing import Printer
 from dhkit.symbolic.inverse.derivation import InverseDerivation
 from dhkit.symbolic.inverse.forms import Circle, CosineAndSquare, Flip, Form, Remainder, Unknown
-from dhkit.symbolic.inverse.steps import Choice, Step
+from dhkit.symbolic.inverse.steps import Choice, DerivationStep
 from dhkit.symbolic.ring import Element
 from dhkit.symbolic.ring.notation import Notation, notation, symbols_of
 
@@ -91,7 +91,7 @@ class Phrases:
         text = _ANGLE.sub(lambda m: r"\varphi" if m[1] == "phi" else rf"\theta_{{{m[2]}}}", text)
         return re.sub(r"\bq(\d+)\b", r"q_{\1}", text)
 
-    def equations(self, step: Step) -> list[tuple[str, str]]:
+    def equations(self, step: DerivationStep) -> list[tuple[str, str]]:
         """Return both sides of a step's equations; the angle that remains of phi as a sum."""
         form = step.form
         if form is None:
@@ -197,7 +197,7 @@ def _filled(template: str, texts: dict[str, str]) -> str:
     return PLACEHOLDER.sub(lambda match: texts[match[1]], template)
 
 
-def solved_before(derivation: InverseDerivation, step: Step) -> list[str]:
+def solved_before(derivation: InverseDerivation, step: DerivationStep) -> list[str]:
     """Return the joints and defined quantities of earlier steps that a step uses, in their order."""
     elements = [*step.elements, *(definition.element for definition in step.definitions)]
     if isinstance(step.form, Flip):  # what the unknown is multiplied by is not known yet
@@ -208,7 +208,7 @@ def solved_before(derivation: InverseDerivation, step: Step) -> list[str]:
     return [f"theta{i + 1}" if kinds[i] == "R" else f"q{i + 1}" for i in sorted(joints - {own}) if i >= 0]
 
 
-def _joints_of_quantities(derivation: InverseDerivation, step: Step) -> dict[str, set[int]]:
+def _joints_of_quantities(derivation: InverseDerivation, step: DerivationStep) -> dict[str, set[int]]:
     """Return the joints behind each quantity that steps before one define, or find as phi, by name."""
     names = derivation.chain.names
     found = dict[str, set[int]]()

@@ -83,7 +83,7 @@ class Function:
 
 
 @dataclass(frozen=True)
-class Program:
+class FunctionSet:
     """Functions, and the parameters that they share.
 
     Attributes
@@ -114,7 +114,7 @@ class Program:
         return "Equations of motion" if moving else "Kinematics"
 
 
-def program(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity], language: Syntax) -> Program:
+def program(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity], language: Syntax) -> FunctionSet:
     """Return quantities as functions in a language."""
     elements = [element for quantity in quantities for element in quantity.elements.flat]
     values = dict(lag.description.numbers.values) | lag.arm.parameters
@@ -123,7 +123,7 @@ def program(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity]
     names = sorted(symbols_of(constants), key=lambda name: (order.get(name, len(order)), name))
     identifiers = _identifiers(names)
     code = _Code(language, identifiers)
-    return Program(
+    return FunctionSet(
         harmless(lag.description.name),
         identifier(lag.description.name),
         lag.n,

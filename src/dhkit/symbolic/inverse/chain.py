@@ -41,7 +41,7 @@ ZERO_LENGTH = Fraction(1, 10**12)
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class ExactChain:
     """The exact chain of an arm.
 
     Attributes
@@ -87,7 +87,7 @@ class Chain:
     in_joint_values: bool = False
 
     @classmethod
-    def of(cls, description: Description, *, named: bool, in_joint_values: bool = False) -> Chain:
+    def of(cls, description: Description, *, named: bool, in_joint_values: bool = False) -> ExactChain:
         """Return an arm's chain; lengths that are numbers get names (a2, d3) if ``named``, else all are numbers."""
         naming = Naming(description, "inertial" if named else "none")
         joints = description.joints

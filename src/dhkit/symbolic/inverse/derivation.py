@@ -17,11 +17,11 @@ from dhkit.display import repr_line
 from dhkit.errors import DescriptionError
 from dhkit.formats import format_function
 from dhkit.symbolic.exact.lagrangian import Proof
-from dhkit.symbolic.inverse.chain import POSE, Chain, without_rounding
+from dhkit.symbolic.inverse.chain import POSE, ExactChain, without_rounding
 from dhkit.symbolic.inverse.families import Derivable, family_of
 from dhkit.symbolic.inverse.forms import ZERO_RADICAND, Unknown, lemmas
 from dhkit.symbolic.inverse.missing import why_not
-from dhkit.symbolic.inverse.steps import Choice, Condition, Step, Workbench, names_in, without_unused
+from dhkit.symbolic.inverse.steps import Choice, Condition, DerivationStep, Workbench, names_in, without_unused
 from dhkit.symbolic.inverse.wrists import FLIPS
 from dhkit.symbolic.ring import Element
 from dhkit.symbolic.ring.elements import element_array
@@ -116,9 +116,9 @@ class InverseDerivation:
     True
     """
 
-    chain: Chain
+    chain: ExactChain
     family: Derivable
-    steps: tuple[Step, ...]
+    steps: tuple[DerivationStep, ...]
     conditions: tuple[Condition, ...]
     notes: tuple[str, ...]
     sum: tuple[tuple[int, int], ...]
@@ -347,7 +347,7 @@ class InverseDerivation:
 class Values:
     """Values of a ring's generators at N poses: what is given, and then what step after step finds."""
 
-    def __init__(self, chain: Chain, T: Array) -> None:
+    def __init__(self, chain: ExactChain, T: Array) -> None:
         self._chain = chain
         ring = chain.ring
         self._values: list[Any] = [chain.values.get(g.text, np.nan) for g in ring.generators]
@@ -410,10 +410,10 @@ def inverse_derivation(description: Description) -> InverseDerivation:
         No closed form is known: says which axes do not meet or are not parallel, and what to use instead.
     """
     description, notes = without_rounding(description)
-    chain = Chain.of(description, named=True)
+    chain = ExactChain.of(description, named=True)
     family = family_of(chain)
     if family is None:
-        numbers = Chain.of(description, named=False)
+        numbers = ExactChain.of(description, named=False)
         family = family_of(numbers)
         if family is None:
             raise DescriptionError(f"{description.name}: {why_not(numbers)}")

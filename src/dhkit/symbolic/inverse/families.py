@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from dhkit.symbolic.inverse.chain import Chain
+from dhkit.symbolic.inverse.chain import ExactChain
 from dhkit.symbolic.inverse.planar import chain_fits, parallel_chain, polar, slider, slider_fits
 from dhkit.symbolic.inverse.relations import perpendicular
 from dhkit.symbolic.inverse.steps import Workbench
@@ -56,13 +56,13 @@ class Derivable:
     name: str
     kinds: tuple[str, ...]
     geometry: str
-    fits: Callable[[Chain], bool]
+    fits: Callable[[ExactChain], bool]
     derive: Callable[[Workbench], None]
     undoes_tool: bool = False
     aims: bool = False
 
 
-def family_of(chain: Chain) -> Derivable | None:
+def family_of(chain: ExactChain) -> Derivable | None:
     """Return the family of an arm; None if it has none."""
     for family in FAMILIES:
         if chain.description.kinds in family.kinds and family.fits(chain):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from dhkit.symbolic.inverse.chain import Chain
+from dhkit.symbolic.inverse.chain import ExactChain
 from dhkit.symbolic.ring import Element
 
 _INSTEAD = "use arm.ik_numeric, or arm.ik with the package ssik (pip install 'dhkit-robotics[ik]')"
 
 
-def why_not(chain: Chain) -> str:
+def why_not(chain: ExactChain) -> str:
     """Return one sentence that says what is missing for a closed form, and what to use instead."""
     n = chain.n
     kinds = chain.description.kinds
@@ -18,7 +18,7 @@ def why_not(chain: Chain) -> str:
     return f"no closed form is known for these {count} axes: {_missing(chain)}; {_INSTEAD}"
 
 
-def _missing(chain: Chain) -> str:
+def _missing(chain: ExactChain) -> str:
     n = chain.n
     kinds = chain.description.kinds
     if n > 6:
@@ -44,26 +44,26 @@ def _missing(chain: Chain) -> str:
     return ", ".join(found) or "its links have no length where two axes are parallel"
 
 
-def _number(chain: Chain, element: Element) -> float:
+def _number(chain: ExactChain, element: Element) -> float:
     return float(element.value([chain.values.get(g.text, 0.0) for g in chain.ring.generators]))
 
 
-def _degrees(chain: Chain, i: int) -> float:
+def _degrees(chain: ExactChain, i: int) -> float:
     c, s = (_number(chain, x) for x in chain.alpha[i - 1])
     return float(np.degrees(np.arctan2(abs(s), abs(c))))
 
 
-def _angle(chain: Chain, i: int) -> str:
+def _angle(chain: ExactChain, i: int) -> str:
     """Return how axes i and i + 1 lie to each other; neither parallel nor at right angles as is needed."""
     angle = _degrees(chain, i)
     text = f"{angle:.4g}" if min(abs(angle), abs(angle - 90)) > 1e-3 or angle in (0.0, 90.0) else f"{angle:.12g}"
     return f"axes {i} and {i + 1} are at {text} degrees"
 
 
-def _relation(chain: Chain, i: int) -> str:
+def _relation(chain: ExactChain, i: int) -> str:
     length = _length(chain, chain.a[i - 1])
     return f"{_angle(chain, i)} and {length} apart"
 
 
-def _length(chain: Chain, element: Element) -> str:
+def _length(chain: ExactChain, element: Element) -> str:
     return f"{1000 * abs(_number(chain, element)):.4g} mm"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dhkit.symbolic.exact.transforms import rotation
-from dhkit.symbolic.inverse.chain import Chain
+from dhkit.symbolic.inverse.chain import ExactChain
 from dhkit.symbolic.inverse.forms import Circle, Turned
 from dhkit.symbolic.inverse.regions import (
     UPRIGHT,
@@ -29,35 +29,35 @@ from dhkit.symbolic.inverse.relations import (
     relative_sense,
     sum_text,
 )
-from dhkit.symbolic.inverse.steps import Choice, Condition, Step, Workbench
+from dhkit.symbolic.inverse.steps import Choice, Condition, DerivationStep, Workbench
 from dhkit.symbolic.ring import Elements
 from dhkit.symbolic.ring.elements import element_array
 
 
-def chain_fits(chain: Chain) -> bool:
+def chain_fits(chain: ExactChain) -> bool:
     """Whether all axes are parallel, and two links have a length."""
     if not all(parallel(chain, i) for i in range(1, chain.n)):
         return False
     return all(is_long(vector[:2]) for vector in _chain_vectors(chain))
 
 
-def _revolute(chain: Chain) -> list[int]:
+def _revolute(chain: ExactChain) -> list[int]:
     return [i for i, kind in enumerate(chain.description.kinds, start=1) if kind == "R"]
 
 
-def _between(chain: Chain, i: int, j: int) -> Elements:
+def _between(chain: ExactChain, i: int, j: int) -> Elements:
     """Return what is constant between joints i and j > i, both revolute: C_i, and a slide with its link."""
     return chain.link(i) @ chain.part(i + 1, j - 1)
 
 
-def _end(chain: Chain, i: int) -> Elements:
+def _end(chain: ExactChain, i: int) -> Elements:
     """Return what is constant behind joint i, the last revolute one: its link, a slide, and the tool."""
     if i == chain.n:
         return chain.last
     return chain.link(i) @ chain.part(i + 1, chain.n) @ chain.last
 
 
-def _chain_vectors(chain: Chain) -> list[Elements]:
+def _chain_vectors(chain: ExactChain) -> list[Elements]:
     """Return the constant vectors of the two links behind the first two revolute joints, shape (3,) each, m."""
     turning = _revolute(chain)
     parts = [_between(chain, i, j) for i, j in pairwise(turning)] + [_end(chain, turning[-1])]
@@ -91,7 +91,7 @@ def parallel_chain(bench: Workbench) -> None:
     definitions, (x, y) = bench.define_all(x=x, y=y)
     who = TOOL if len(turning) == 2 else f"axis {turning[2]}"
     bench.add(
-        Step(
+        DerivationStep(
             "The point in the plane",
             f"{who.capitalize()} is at (x, y) from axis {a}, in the axes of its frame at theta{a} = 0"
             + (": what lies behind it is turned by phi, and taken off." if len(turning) == 3 else "."),
@@ -114,7 +114,7 @@ def parallel_chain(bench: Workbench) -> None:
     _chain_height(bench)
 
 
-def _chain_senses(chain: Chain, turning: list[int]) -> list[tuple[int, int]]:
+def _chain_senses(chain: ExactChain, turning: list[int]) -> list[tuple[int, int]]:
     sense = 1
     senses = []
     for i in range(turning[0], turning[-1] + 1):
@@ -142,7 +142,7 @@ def _chain_rotation(
     seen = before[:2, :2].T @ bench.T[:2, column]
     definitions, (ax, ay) = bench.define_all(ax=seen[0], ay=seen[1])
     bench.add(
-        Step(
+        DerivationStep(
             "phi",
             f"{sum_text(_chain_senses(chain, turning))} The joints turn the tool's {'xyz'[column]} axis by phi: "
             "it is seen at (ax, ay) in the plane.",
@@ -169,14 +169,14 @@ def polar(bench: Workbench) -> None:
     """Write the steps of a slide across a turning axis."""
     chain = bench.chain
     definitions, (x, y) = bench.define_all(x=origin(bench.T)[0], y=origin(bench.T)[1])
-    bench.add(Step("The point in the plane", "The tool is at (x, y) from axis 1.", definitions))
+    bench.add(DerivationStep("The point in the plane", "The tool is at (x, y) from axis 1.", definitions))
     vector = origin(chain.link(1) @ chain.joint(2) @ chain.last)
     reach_with_slide(bench, 1, vector[:2], (x, y), TOOL)
     arm = (chain.whole @ chain.last)[2, 3]
     bench.conditions.append(Condition(IN_THE_PLANE, origin(bench.T)[2], arm))
 
 
-def slider_fits(chain: Chain) -> bool:
+def slider_fits(chain: ExactChain) -> bool:
     """Whether the tool is off an axis that a slide carries."""
     return perpendicular(chain, 1) and is_long(origin(chain.last)[:2])
 
@@ -193,7 +193,7 @@ def slider(bench: Workbench) -> None:
     seen = R.T @ origin(bench.T)
     A, B, rest = linear_parts(own[0], 1)
     bench.add(
-        Step(
+        DerivationStep(
             "theta2",
             "Joint 1 slides at right angles to axis 2: what it does not change is how far the tool lies beside the "
             "line in which it slides, which depends on theta2 alone.",

@@ -8,9 +8,9 @@ from fractions import Fraction
 
 import numpy as np
 
-from dhkit.symbolic.inverse.chain import ZERO_LENGTH, Chain
+from dhkit.symbolic.inverse.chain import ZERO_LENGTH, ExactChain
 from dhkit.symbolic.inverse.forms import Circle, Form, Line, Remainder, Sliding, Square, Turned
-from dhkit.symbolic.inverse.steps import Choice, Definition, Figure, Step, View, Workbench
+from dhkit.symbolic.inverse.steps import Choice, Definition, DerivationStep, Figure, View, Workbench
 from dhkit.symbolic.ring import Element, Elements
 from dhkit.symbolic.ring.elements import element_array
 
@@ -38,13 +38,13 @@ class Plane:
     up: tuple[Element, Element]
 
 
-def number(chain: Chain, element: Element) -> float:
+def number(chain: ExactChain, element: Element) -> float:
     """Return the value of an element of constants, with the file's values."""
     ring = chain.ring
     return float(element.value([chain.values.get(g.text, np.nan) for g in ring.generators]))
 
 
-def _vertical(chain: Chain) -> Elements:
+def _vertical(chain: ExactChain) -> Elements:
     """Return the direction that is up in the frame before joint 1, shape (3,).
 
     It only gives branches their names; a base that is upright or level but for UPRIGHT counts as upright or level.
@@ -106,7 +106,7 @@ def turn_the_plane(bench: Workbench, point: Elements, inside: Elements, who: str
         swapped = (-1.0 if number(chain, _vertical(chain)[2]) < 0 else 1.0) * offset > 0
         names = ("right", "left") if swapped else ("left", "right")
     bench.add(
-        Step(
+        DerivationStep(
             "theta1",
             look,
             (),
@@ -158,7 +158,7 @@ def reach_with_two_links(
     A, B, rest = linear_parts(square, unknown.joint or 0)
     form = Circle(unknown, {"A": A, "B": B, "C": x * x + y * y - rest})
     bench.add(
-        Step(
+        DerivationStep(
             f"theta{b}",
             f"Axes {a} and {b} are parallel. The distance of {who} from axis {a} depends on theta{b} alone: "
             f"the law of cosines in the triangle of axis {a}, axis {b} and {who}.",
@@ -187,7 +187,7 @@ def turn_into_place(
     (u, v) = vector
     (x, y) = place
     bench.add(
-        Step(
+        DerivationStep(
             f"theta{i}",
             f"Before joint {i} turns, {who} is at (u, v) from axis {i}; afterwards it is at (x, y).",
             definitions,
@@ -206,7 +206,7 @@ def reach_with_slide(bench: Workbench, i: int, vector: Elements, place: tuple[El
     middle, rest = _quadratic_parts(square, unknown.joint or 0)
     S = x * x + y * y - rest + middle * middle
     bench.add(
-        Step(
+        DerivationStep(
             f"q{i + 1}",
             f"Joint {i + 1} slides at right angles to axis {i}: the distance of {who} from axis {i} depends on "
             f"q{i + 1} alone (Pythagoras).",
@@ -240,7 +240,7 @@ def remaining_angle(bench: Workbench, i: int, before: Elements, senses: Sequence
     X = cosine * c + sine * s
     Y = own * (sine * c - cosine * s)
     terms = (("phi", own), *((f"theta{j}", -own * sense) for j, sense in senses[:-1]))
-    bench.add(Step(f"theta{i}", look, (), Remainder(bench.unknown(i), {"X": X, "Y": Y}, terms)))
+    bench.add(DerivationStep(f"theta{i}", look, (), Remainder(bench.unknown(i), {"X": X, "Y": Y}, terms)))
 
 
 def linear_parts(element: Element, i: int) -> tuple[Element, Element, Element]:
@@ -281,4 +281,4 @@ def height_of_slide(bench: Workbench, i: int, given: Element, arm: Element, look
     unit = tuple(int(k == place) for k in range(len(bench.chain.ring.generators)))
     sense = arm.terms[unit]
     rest = arm - sense * bench.chain.ring.position(i - 1)
-    bench.add(Step(f"q{i}", look, (), Sliding(bench.unknown(i), {"Z": sense * (given - rest)})))
+    bench.add(DerivationStep(f"q{i}", look, (), Sliding(bench.unknown(i), {"Z": sense * (given - rest)})))

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dhkit.symbolic.inverse.chain import Chain
+from dhkit.symbolic.inverse.chain import ExactChain
 from dhkit.symbolic.ring import Element, Elements
 
 CENTRE, TOOL = "the wrist centre", "the tool"
 IN_THE_PLANE = "The arm moves in a plane: the pose has to lie in it."
 
 
-def parallel(chain: Chain, i: int) -> bool:
+def parallel(chain: ExactChain, i: int) -> bool:
     """Return whether axes i and i + 1 are parallel."""
     return chain.alpha[i - 1][1].is_zero
 
 
-def perpendicular(chain: Chain, i: int) -> bool:
+def perpendicular(chain: ExactChain, i: int) -> bool:
     """Return whether axes i and i + 1 are at right angles."""
     return chain.alpha[i - 1][0].is_zero
 
 
-def relative_sense(chain: Chain, i: int) -> Element:
+def relative_sense(chain: ExactChain, i: int) -> Element:
     """Return 1 or -1: whether parallel axes i and i + 1 have the same direction."""
     return chain.alpha[i - 1][0]
 
@@ -37,7 +37,7 @@ def is_long(vector: Elements) -> bool:
     return any(not entry.is_zero for entry in vector)
 
 
-def flipped(chain: Chain, sense: Element) -> Elements:
+def flipped(chain: ExactChain, sense: Element) -> Elements:
     """Return the rotation by 0 or pi about x, shape (3, 3): diag(1, sense, sense)."""
     R = chain.part(1, 0)[:3, :3].copy()
     R[1, 1] = R[2, 2] = sense

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from dhkit.symbolic.inverse.chain import INNER, POSE, Chain, is_identity, undone
+from dhkit.symbolic.inverse.chain import INNER, POSE, ExactChain, is_identity, undone
 from dhkit.symbolic.inverse.forms import Form, Unknown
 from dhkit.symbolic.ring import Element, Elements
 from dhkit.symbolic.ring.elements import element_array
@@ -76,7 +76,7 @@ class Choice:
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class DerivationStep:
     """A step of a derivation.
 
     Attributes
@@ -145,9 +145,9 @@ class Workbench:
         them.
     """
 
-    chain: Chain
+    chain: ExactChain
     undoes_tool: bool
-    steps: list[Step] = field(default_factory=list)
+    steps: list[DerivationStep] = field(default_factory=list)
     conditions: list[Condition] = field(default_factory=list)
     meanings: dict[str, Element] = field(default_factory=dict)
     """What the names of the pose and of defined quantities are if the pose is that of the arm."""
@@ -170,7 +170,7 @@ class Workbench:
         values = dict(zip(INNER, [*given[:3, 3], *given[:3, :3].flat], strict=True))
         what = "base and tool" if self.undoes_tool else "base"
         self.steps.append(
-            Step(
+            DerivationStep(
                 f"The pose without {what}",
                 f"The constant transforms before axis 1{f' and behind joint {chain.n}' * self.undoes_tool} are taken "
                 "off: what remains, h, depends on the joints alone.",
@@ -195,7 +195,7 @@ class Workbench:
         pairs = [self.define(name, element) for name, element in elements.items()]
         return tuple(definition for definition, _ in pairs), element_array([symbol for _, symbol in pairs])
 
-    def add(self, step: Step) -> None:
+    def add(self, step: DerivationStep) -> None:
         """Append a step."""
         self.steps.append(step)
 
@@ -230,9 +230,9 @@ def names_in(elements: Iterable[Element]) -> set[str]:
     return found
 
 
-def without_unused(steps: Sequence[Step], further: Iterable[Element] = ()) -> list[Step]:
+def without_unused(steps: Sequence[DerivationStep], further: Iterable[Element] = ()) -> list[DerivationStep]:
     """Return steps without the definitions that nothing uses."""
-    kept: list[Step] = []
+    kept: list[DerivationStep] = []
     used = names_in(further)
     for step in reversed(steps):
         used |= names_in(step.elements)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from dhkit.symbolic.exact.transforms import rotation
-from dhkit.symbolic.inverse.chain import Chain
+from dhkit.symbolic.inverse.chain import ExactChain
 from dhkit.symbolic.inverse.forms import Direction as Directed, Turned
 from dhkit.symbolic.inverse.regions import (
     Plane,
@@ -28,13 +28,13 @@ from dhkit.symbolic.inverse.relations import (
     relative_sense,
     sum_text,
 )
-from dhkit.symbolic.inverse.steps import Step, Workbench
+from dhkit.symbolic.inverse.steps import DerivationStep, Workbench
 from dhkit.symbolic.inverse.wrists import turn_parallel_wrist, turn_spherical_wrist
 from dhkit.symbolic.ring import Element, Elements
 from dhkit.symbolic.ring.elements import element_array
 
 
-def _spherical(chain: Chain) -> bool:
+def _spherical(chain: ExactChain) -> bool:
     meet = chain.a[3].is_zero and chain.a[4].is_zero and chain.d[4].is_zero
     return meet and perpendicular(chain, 4) and perpendicular(chain, 5)
 
@@ -51,7 +51,7 @@ def _wrist_centre(bench: Workbench) -> Elements:
         return place
     definitions, symbols = bench.define_all(wx=place[0], wy=place[1], wz=place[2])
     bench.add(
-        Step(
+        DerivationStep(
             "The wrist centre",
             f"Axes 4, 5 and 6 meet in one point, the wrist centre. It is {d6} along axis 6 behind frame 6: joints 4, 5 "
             "and 6 turn the tool about it and leave it in place.",
@@ -61,12 +61,12 @@ def _wrist_centre(bench: Workbench) -> Elements:
     return symbols
 
 
-def _fore_arm(chain: Chain) -> Elements:
+def _fore_arm(chain: ExactChain) -> Elements:
     """Return the wrist centre in the frame of axis 3 behind joint 3, shape (3,), m."""
     return origin(chain.link(3) @ chain.joint(4))
 
 
-def elbow_fits(chain: Chain) -> bool:
+def elbow_fits(chain: ExactChain) -> bool:
     """Whether axes 2 and 3 are parallel before a spherical wrist."""
     if not (perpendicular(chain, 1) and parallel(chain, 2) and _spherical(chain)):
         return False
@@ -84,7 +84,7 @@ def elbow(bench: Workbench) -> None:
     sense = relative_sense(chain, 2)
     definitions, (c, s) = bench.define_all(cphi=turned[0, 0], sphi=turned[1, 0])
     bench.sum = (2, 1), (3, int(number(chain, sense)))
-    bench.add(Step("The rotation of link 3", sum_text(bench.sum), definitions))
+    bench.add(DerivationStep("The rotation of link 3", sum_text(bench.sum), definitions))
     R = rotation(chain.ring, 0, 1, (c, s))[:3, :3] @ flipped(chain, sense) @ chain.link(3)[:3, :3]
     turn_spherical_wrist(bench, _turn_1(bench) @ R)
 
@@ -94,7 +94,7 @@ def _two_links_in_plane(bench: Workbench, plane: Plane, who: str, both: Elements
     chain = bench.chain
     definitions, (x, y) = bench.define_all(x=plane.x, y=plane.y)
     bench.add(
-        Step(
+        DerivationStep(
             "The point in the arm's plane",
             f"In the plane that joint 1 has turned, {who} is at (x, y) from axis 2, in the axes of its frame.",
             definitions,
@@ -112,7 +112,7 @@ def _turn_1(bench: Workbench) -> Elements:
     return R
 
 
-def slide_fits(chain: Chain) -> bool:
+def slide_fits(chain: ExactChain) -> bool:
     """Whether joint 3 slides at right angles to axis 2 before a spherical wrist."""
     return perpendicular(chain, 1) and perpendicular(chain, 2) and _spherical(chain)
 
@@ -124,7 +124,7 @@ def slide(bench: Workbench) -> None:
     plane = turn_the_plane(bench, centre, origin(chain.part(2, 3) @ chain.joint(4)), CENTRE)
     definitions, (x, y) = bench.define_all(x=plane.x, y=plane.y)
     bench.add(
-        Step(
+        DerivationStep(
             "The point in the arm's plane",
             f"In the plane that joint 1 has turned, {CENTRE} is at (x, y) from axis 2, in the axes of its frame.",
             definitions,
@@ -139,7 +139,7 @@ def slide(bench: Workbench) -> None:
 # The Universal Robots' family, and turntables with parallel joints
 
 
-def parallel_fits(chain: Chain) -> bool:
+def parallel_fits(chain: ExactChain) -> bool:
     """Whether axes 2, 3 and 4 are parallel, and 5 and 6 meet."""
     if not (perpendicular(chain, 1) and parallel(chain, 2) and parallel(chain, 3)):
         return False
@@ -148,7 +148,7 @@ def parallel_fits(chain: Chain) -> bool:
     return not chain.a[1].is_zero and not chain.a[2].is_zero
 
 
-def _parallel_senses(chain: Chain) -> list[tuple[int, int]]:
+def _parallel_senses(chain: ExactChain) -> list[tuple[int, int]]:
     second, third = (int(number(chain, relative_sense(chain, i))) for i in (2, 3))
     return [(2, 1), (3, second), (4, second * third)]
 
@@ -164,7 +164,7 @@ def three_parallel(bench: Workbench) -> None:
     if not d6.is_zero:
         definitions, point = bench.define_all(wx=place[0], wy=place[1], wz=place[2])
         bench.add(
-            Step(
+            DerivationStep(
                 "The point where axes 5 and 6 meet",
                 f"Axes 5 and 6 meet in a point {d6} along axis 6 behind frame 6: joints 5 and 6 leave it in place.",
                 definitions,
@@ -178,7 +178,7 @@ def three_parallel(bench: Workbench) -> None:
     definitions, cosine, sine = turn_parallel_wrist(bench, sense)
     phi = bench.phi(arm[0, 0], arm[1, 0], senses)
     bench.add(
-        Step(
+        DerivationStep(
             "phi",
             f"{sum_text(senses)} Joint 6 is known, and with it the direction of axis 5 in the tool's x and y axes. "
             "Axis 5 is at right angles to axes 2, 3 and 4, which turn it by phi.",
@@ -198,7 +198,7 @@ def _reach_axis_4(
     behind = rotation(chain.ring, 0, 1, (c, s))[:3, :3] @ flipped(chain, sense) @ lever
     definitions, (x, y) = bench.define_all(x=plane.x - behind[0], y=plane.y - behind[1])
     bench.add(
-        Step(
+        DerivationStep(
             "Axis 4 in the arm's plane",
             "What lies behind axis 4 is turned by phi: without it, axis 4 is at (x, y) from axis 2.",
             definitions,
@@ -212,7 +212,7 @@ def _reach_axis_4(
     remaining_angle(bench, 4, element_array([before[0, 0], before[1, 0]]), senses, "Joint 4 turns what remains of phi.")
 
 
-def turntable_fits(chain: Chain) -> bool:
+def turntable_fits(chain: ExactChain) -> bool:
     """Whether parallel axes stand on a turntable."""
     if not (perpendicular(chain, 1) and all(parallel(chain, i) for i in range(2, chain.n))):
         return False
@@ -251,7 +251,7 @@ def _known_rotation(
     U = own[0]
     V = sense * own[1]
     bench.add(
-        Step(
+        DerivationStep(
             "phi",
             f"{sum_text(senses)} The parallel joints turn the tool's {'xyz'[column]} axis by phi: it is seen at "
             "(ax, ay) in the plane.",
@@ -263,7 +263,7 @@ def _known_rotation(
     )
 
 
-def pan_tilt_fits(chain: Chain) -> bool:
+def pan_tilt_fits(chain: ExactChain) -> bool:
     """Whether two axes are at right angles, and the tool is off the second."""
     return perpendicular(chain, 1) and is_long(origin(chain.last)[:2])
 

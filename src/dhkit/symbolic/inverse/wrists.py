@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dhkit.symbolic.inverse.forms import CosineAndSquare, Direction, Flip
 from dhkit.symbolic.inverse.regions import into_axis_2
-from dhkit.symbolic.inverse.steps import Choice, Definition, Step, Workbench
+from dhkit.symbolic.inverse.steps import Choice, Definition, DerivationStep, Workbench
 from dhkit.symbolic.ring import Element, Elements
 
 FLIPS = ("no-flip", "flip")
@@ -26,7 +26,7 @@ def turn_spherical_wrist(bench: Workbench, R: Elements) -> None:
     definitions, (ax, ay, az) = bench.define_all(ax=tool[0, 2], ay=tool[1, 2], az=tool[2, 2])
     k = s_alpha5 * s5
     bench.add(
-        Step(
+        DerivationStep(
             "theta4",
             "Joints 1 to 3 are known, and with them the axes of link 3. (ax, ay, az) is the direction of axis 6 in "
             "them. Joint 4 turns until axis 6 lies in the plane that joint 5 swings it through; the sine of theta5 is "
@@ -42,7 +42,7 @@ def turn_spherical_wrist(bench: Workbench, R: Elements) -> None:
     X = -s_alpha4 * s_alpha5 * az
     Y = s_alpha5 * (c4 * ax + s4 * ay)
     bench.add(
-        Step(
+        DerivationStep(
             "theta5",
             "In the plane that joint 5 swings axis 6 through, the direction of axis 6 gives cosine and sine.",
             (),
@@ -52,7 +52,7 @@ def turn_spherical_wrist(bench: Workbench, R: Elements) -> None:
     more, (nx, ny, ox, oy) = bench.define_all(nx=tool[0, 0], ny=tool[1, 0], ox=tool[0, 1], oy=tool[1, 1])
     sign = s_alpha4 * s_alpha5
     bench.add(
-        Step(
+        DerivationStep(
             "theta6",
             "Joint 4 has turned axis 5 into the direction (s4, -c4, 0) in the axes of link 3, up to its sense. "
             "The components of the tool's x and y axes along it are its sine and cosine; nx, ny and ox, oy are the x "
@@ -85,7 +85,7 @@ def turn_parallel_wrist(bench: Workbench, sense: Element) -> tuple[tuple[Definit
     n, o, a = (into_axis_2(bench, bench.T[:3, k]) for k in range(3))
     definitions, (ax, ay, az) = bench.define_all(ax=a[0], ay=a[1], az=a[2])
     bench.add(
-        Step(
+        DerivationStep(
             "theta5",
             "Joint 1 is known, and with it the axes of axis 2's frame. (ax, ay, az) is the direction of axis 6 in "
             "them. Joints 2, 3 and 4 turn about its z axis and leave az as it is: it gives the angle between axis 6 "
@@ -100,7 +100,7 @@ def turn_parallel_wrist(bench: Workbench, sense: Element) -> tuple[tuple[Definit
     )
     more, (nz, oz) = bench.define_all(nz=n[2], oz=o[2])
     bench.add(
-        Step(
+        DerivationStep(
             "theta6",
             "nz and oz are the components of the tool's x and y axes along axis 2: the direction of axis 2, seen from "
             "the tool.",

@@ -19,7 +19,7 @@ _EXACT_STEP = Fraction(1, 12)
 
 
 @dataclass(frozen=True)
-class Reader:
+class ExpressionReader:
     """Reads expressions into a ring.
 
     Attributes

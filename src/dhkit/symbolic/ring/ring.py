@@ -19,7 +19,7 @@ from dhkit.expressions import Expression
 from dhkit.expressions.exact import Monomial as TermMonomial
 from dhkit.symbolic.ring.elements import Element, Generator, PolynomialRing
 from dhkit.symbolic.ring.polynomials import Monomial, Relation, polynomials
-from dhkit.symbolic.ring.reading import Reader
+from dhkit.symbolic.ring.reading import ExpressionReader
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ class Ring(PolynomialRing):
         RingError
             A name or function in it is not a constant of the ring.
         """
-        return Reader(self, self.units).expression(expression)
+        return ExpressionReader(self, self.units).expression(expression)
 
     def direction(self, angle: Expression) -> tuple[Element, Element]:
         """Return cosine and sine of an angle that does not depend on the state.
@@ -154,7 +154,7 @@ class Ring(PolynomialRing):
         RingError
             As for :meth:`read`.
         """
-        return Reader(self, self.units).angle(angle)
+        return ExpressionReader(self, self.units).angle(angle)
 
     @cached_property
     def _expansions(self) -> dict[int, Element]:

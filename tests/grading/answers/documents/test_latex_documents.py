@@ -10,7 +10,7 @@ from dhkit.errors import AnswerError
 from dhkit.grading import grade
 from dhkit.grading.answers.documents.entry_statements import statements_of
 from dhkit.grading.answers.documents.statements import left_hand_name
-from dhkit.grading.answers.sheet_values import Chain, Entries, Refusal
+from dhkit.grading.answers.sheet_values import Entries, EqualFormulas, Refusal
 from dhkit.grading.answers.sources import read_source
 from dhkit.grading.remarks import NoteKind
 
@@ -105,7 +105,7 @@ def test_a_second_row_counts(graded):
 
 @pytest.mark.parametrize("sign", ["=", r"\equiv", r"\approx"])
 def test_a_chain_states_each_of_its_formulas(read, graded, sign):
-    assert read(rf"\begin{{align}} V &= A \\ &{sign} B \end{{align}}").answers["V"] == Chain(("A", "B"))
+    assert read(rf"\begin{{align}} V &= A \\ &{sign} B \end{{align}}").answers["V"] == EqualFormulas(("A", "B"))
     wrong = V.replace("s_1", "c_1")
     assert graded(rf"\begin{{align}} V &= {V} \\ &{sign} {V} + 0 \end{{align}}")
     for first, second in ((V, wrong), (wrong, V), (wrong, wrong)):

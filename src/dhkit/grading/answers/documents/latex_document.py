@@ -15,7 +15,7 @@ from dhkit.grading.answers.latex import latex_tokens
 from dhkit.grading.answers.programs.robot_names import RobotNames, is_same_number
 from dhkit.grading.answers.quantity_names import Target
 from dhkit.grading.answers.sheet import source_sheet
-from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Chain, Entries, Names, Refusal
+from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Entries, EqualFormulas, Names, Refusal
 from dhkit.grading.answers.tokens import to_ascii
 from dhkit.grading.answers.vocabulary import plain_name
 
@@ -99,7 +99,7 @@ class _DocumentAnswers:
             messages.append(message)
 
     def sheet(self, file: str) -> AnswerSheet:
-        answers: dict[str, str | Chain | Entries | Refusal] = {}
+        answers: dict[str, str | EqualFormulas | Entries | Refusal] = {}
         own = {name for name in self.by_name if name in self.quantities.whole and self._of_quantity(name, name)}
         for name in list(self.by_name):
             quantity = self.quantities.quantity(name)
@@ -141,7 +141,9 @@ class _DocumentAnswers:
                 self._add(self.left_out, self._quote(statement))
         return fitting
 
-    def _whole(self, name: str, quantity: str, statements: Sequence[Statement]) -> str | Chain | Entries | Refusal:
+    def _whole(
+        self, name: str, quantity: str, statements: Sequence[Statement]
+    ) -> str | EqualFormulas | Entries | Refusal:
         first = statements[0]
         if broken := next((s for s in statements if s.problem), None):
             return _refused(f"{self._line(broken)}: {broken.problem}")
@@ -156,11 +158,11 @@ class _DocumentAnswers:
                 return entries
         return self._with_definitions(formulas, {name})
 
-    def _with_definitions(self, formulas: tuple[str, ...], outer: set[str]) -> str | Chain | Refusal:
+    def _with_definitions(self, formulas: tuple[str, ...], outer: set[str]) -> str | EqualFormulas | Refusal:
         """Return formulas whose names are all defined, or why they cannot be."""
         if problem := next((why for formula in formulas if (why := self._define_names_in(formula, outer))), ""):
             return _refused(problem)
-        return formulas[0] if len(formulas) == 1 else Chain(formulas)
+        return formulas[0] if len(formulas) == 1 else EqualFormulas(formulas)
 
     def _note_relations(self, statement: Statement) -> None:
         r"""Note a \approx that is read as =."""
@@ -203,7 +205,7 @@ class _DocumentAnswers:
         marks = marked_places(rows) if quantity == "M" else set()
         if not any(named) and not marks:
             return None
-        texts: dict[tuple[int, ...], str | Chain | Refusal] = {}
+        texts: dict[tuple[int, ...], str | EqualFormulas | Refusal] = {}
         for k, (entry, name) in enumerate(zip(flat, named, strict=True)):
             index = (k,) if len(shape) == 1 else divmod(k, shape[1])
             if index not in marks:
@@ -231,7 +233,7 @@ class _DocumentAnswers:
         return self.quantities.entries(name)
 
     def _entries(self) -> dict[str, Entries | Refusal]:
-        texts: dict[str, dict[tuple[int, ...], str | Chain | Refusal]] = {}
+        texts: dict[str, dict[tuple[int, ...], str | EqualFormulas | Refusal]] = {}
         refused: dict[str, Refusal] = {}
         for name, statements in self.by_name.items():
             targets = self._targets(name)
@@ -258,7 +260,7 @@ class _DocumentAnswers:
             self.notes.append(f"{self._line(self.by_name[name][0])}: {name} is read as a name of the document's own")
         return is_used
 
-    def _entry(self, name: str) -> str | Chain | Refusal:
+    def _entry(self, name: str) -> str | EqualFormulas | Refusal:
         self._used.add(name)
         statements = self.by_name[name]
         if broken := next((s for s in statements if s.problem), None):

@@ -23,7 +23,7 @@ from dhkit.grading.answers.programs.values import (
 )
 from dhkit.grading.answers.quantity_names import Target
 from dhkit.grading.answers.sheet import source_sheet
-from dhkit.grading.answers.sheet_values import AnswerSheet, Chain, Entries, Refusal
+from dhkit.grading.answers.sheet_values import AnswerSheet, Entries, EqualFormulas, Refusal
 
 _WRITTEN_BY_DHKIT = {
     "mass_matrix": "M",
@@ -38,7 +38,7 @@ _WRITTEN_BY_DHKIT = {
 _ENERGIES = ("K", "V", "L")
 
 
-class Program(Protocol):
+class ReadProgram(Protocol):
     """A program that was read."""
 
     record: Record
@@ -95,7 +95,7 @@ def called_name(function: Function) -> str:
     return _WRITTEN_BY_DHKIT.get(function.name, function.name)
 
 
-def answers_of(program: Program, file: str) -> AnswerSheet:
+def answers_of(program: ReadProgram, file: str) -> AnswerSheet:
     """Return the answers of a program.
 
     Raises
@@ -107,7 +107,7 @@ def answers_of(program: Program, file: str) -> AnswerSheet:
 
 
 class _ProgramAnswers:
-    def __init__(self, program: Program) -> None:
+    def __init__(self, program: ReadProgram) -> None:
         self.program = program
         self.record = program.record
         self.quantities = program.record.robot.quantities
@@ -550,7 +550,7 @@ class _ProgramAnswers:
         return bool(user)
 
     def _entries_answer(self, entries: Sequence[_Candidate]) -> Entries | Refusal:
-        texts: dict[tuple[int, ...], str | Chain | Refusal] = {}
+        texts: dict[tuple[int, ...], str | EqualFormulas | Refusal] = {}
         lines: dict[tuple[int, ...], str] = {}
         for one in entries:
             index = one.target.index or ()
