@@ -307,11 +307,12 @@ class Search(Generic[Iterate]):
         if is_usable and solution.infeasibility <= FEASIBILITY_TOLERANCE:
             self._last = solution
             return program.iterate(solution.x)
-        worst, which, interval, misses = worst_row(solution, program.blocks, rows)
-        state = f"misses its bound by {misses:.2g}" if np.isfinite(misses) else "is not a number"
+        worst = worst_row(solution, program.blocks, rows)
+        name = self._row_name(worst.rows.what, worst.place, of_joint=worst.rows.of_joints)
+        state = f"misses its bound by {worst.violation:.2g}" if np.isfinite(worst.violation) else "is not a number"
         raise PlanningError(
             f"not converged ({solution.status.replace('_', ' ').lower()}, {solution.iterations} iterations): "
-            f"{self._row_name(worst.what, which, of_joint=worst.of_joints)} {state} at {program.place(interval)}"
+            f"{name} {state} at {program.place(worst.interval)}"
         )
 
     def _row_name(self, what: str, row: int, *, of_joint: bool) -> str:
