@@ -341,10 +341,11 @@ class Checker:
     def slow_down(self, states: States) -> float:
         """Return the smallest factor c >= 1 of the duration with which limits that depend on velocity are kept.
 
-        Infinite if a limit is exceeded even at rest. Only for motions from rest to rest. The excess e(c), largest use
-        less 1, is bracketed by e(low) > 0 >= e(high), and its root found by the Illinois variant of regula falsi
-        (Dowell and Jarratt 1971): where the same end is kept twice, its excess is halved. ``high`` is returned, at which
-        the limits are kept. SciPy's brentq takes 0.2 s to be imported.
+        Infinite if a limit is exceeded even at rest. Only for motions from rest to rest.
+
+        The excess e(c), largest use less 1, is bracketed by e(low) > 0 >= e(high), and its root found by the Illinois
+        variant of regula falsi (Dowell and Jarratt 1971): where the same end is kept twice, its excess is halved. The
+        result is ``high``, at which the limits are kept. SciPy's brentq takes 0.2 s to be imported.
         """
         moving = [pair for pair in self.limiting.values() if pair[0].moving]
 
