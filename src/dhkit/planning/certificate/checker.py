@@ -319,7 +319,7 @@ class Checker:
     ) -> tuple[Check, list[str]]:
         """Return the check of torques, and those of which nothing is proved between the states.
 
-        Where the proof succeeds, it decides on what lies between the states; elsewhere the peaks of cubics do.
+        Where the proof succeeds, it decides on the torques between the states; elsewhere the peaks of cubics do.
 
         Parameters
         ----------
