@@ -71,7 +71,7 @@ class PlanReport:
     is_duration_given: bool
     """Whether the duration was given."""
     is_least_time: bool
-    """Whether the objective is the duration."""
+    """Whether the objective is the duration alone."""
     certificate: Certificate
     joints: tuple[str, ...]
     intervals: int
