@@ -360,7 +360,7 @@ def test_constraints_that_are_no_values_are_refused():
         lambda constraint: Planner(arm.description, constraints=[constraint]),
     ):
         with pytest.raises(
-            TypeError, match=r"PlainSpeed.most is no field; expected a class with @dataclass.frozen=True"
+            TypeError, match=r"PlainSpeed has an attribute most that is not a dataclass field; declare it"
         ):
             planned(PlainSpeed(0.5))
         with pytest.raises(TypeError, match=r"ListedSpeed: .*unhashable.*; expected @dataclass"):

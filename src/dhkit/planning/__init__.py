@@ -30,7 +30,7 @@ The way from a request to a motion, through rooms (folders) and files::
     Under all of them:
     criteria/        objectives and constraints: in symbols for program/, in numbers for certificate/
     obstacles/       scenes, capsules around links, exact distances, separating planes
-    second_check/    other code, which searches a certified motion for what the certificate overlooked
+    second_check/    other code, which searches a certified motion for violations that the certificate overlooked
 
 A room imports only rooms below it: planner and along > report > search and request > program > certificate >
 second_check > criteria and obstacles.

@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, Unpack
 
 import numpy as np
@@ -54,7 +55,10 @@ from dhkit.trajectories import Limits, Trajectory
 
 DEFAULT_INTERVALS = 48
 """Default number of intervals for arms of six joints; more for fewer joints, since they cost less."""
-MAX_INTERVALS, MIN_DEFAULT_INTERVALS = 2000, 24
+MIN_DEFAULT_INTERVALS = 24
+"""Smallest default number of intervals."""
+MAX_INTERVALS = 2000
+"""Largest number of intervals."""
 SMALL_ARM_SIZE = 384
 """Product of joints and default intervals for arms of few joints."""
 DURATION_TOLERANCE = 1e-3
@@ -357,29 +361,31 @@ class Planner:
         """Return the best motion of a task, with the task whose clearance it keeps, and count the work."""
         if task.rests and task.span < RESOLUTION:
             return task, PlannedMotion.unresolved(task)
-        for attempt in range(count := len(self._curves(task))):
-            program, seconds = self.program(task, attempt)
-            work.build_seconds += seconds
-            is_last = attempt == count - 1
-            search = Search(task.without_obstacles, program, work, progress, is_last)
+        last = len(self._curves(task)) - 1
+        attempt = 0
+        while True:
+            program = self._counted_program(task, attempt, work)
+            search = Search(task.without_obstacles, program, work, progress, is_last=attempt == last)
+            finer = partial(self._counted_program, task, attempt, work, FINER)
             try:
                 found = replace(search(warm), attempt=attempt)
-
-                def finer(attempt: int = attempt) -> MotionProgram:
-                    program, seconds = self.program(task, attempt, FINER)
-                    work.build_seconds += seconds
-                    return program
-
                 return motion_around(task, found, search, program, finer, warm)
             except PlanningError as error:
-                if is_last or work.is_over:
-                    slow = None
-                    if task.checker.constraints:  # which may leave the optimizer a flat objective
-                        slow = PlannedMotion.slowed_straight(task, program.intervals, error)
-                    if slow is not None:
-                        return task, slow
+                if attempt < last and not work.is_over:
+                    attempt += 1
+                    continue
+                slow = None
+                if task.checker.constraints:  # which may leave the optimizer a flat objective
+                    slow = PlannedMotion.slowed_straight(task, program.intervals, error)
+                if slow is None:
                     raise
-        raise AssertionError("no curve")
+                return task, slow
+
+    def _counted_program(self, task: Task, attempt: int, work: Work, scale: float = 1.0) -> MotionProgram:
+        """Return the program of a task as :meth:`program` does, and count the time for building it."""
+        program, seconds = self.program(task, attempt, scale)
+        work.build_seconds += seconds
+        return program
 
     def _with_reason(
         self, error: PlanningError, request: PlanRequest, routes: Sequence[Route], work: Work
@@ -392,7 +398,8 @@ class Planner:
         )
         try:
             task = quickest._task(replace(request, duration=None), routes[0].points)
-            program, _ = quickest.program(quick := task.without_obstacles)
+            quick = task.without_obstacles
+            program, _ = quickest.program(quick)
             least = Search(quick, program, work)().trajectory.duration
         except PlanningError:
             return error

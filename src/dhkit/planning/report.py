@@ -21,8 +21,10 @@ MAX_LISTED_LIMITS = 3
 """Largest number of active limits that are listed as text."""
 SHORT_DURATION = 0.1
 """Durations (s) below which 0.1 ms is too coarse."""
-NO_DIFFERENCE, MANY_TIMES = 1e-6, 9.0
-"""Shares by which something is more than another that are told as none, and as a factor."""
+NO_DIFFERENCE = 1e-6
+"""Relative difference of two costs or durations below which they are told as equal."""
+MANY_TIMES = 9.0
+"""Relative difference of two costs or durations above which it is told as a factor, not in percent."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ class PlanReport:
     is_duration_given: bool
     """Whether the duration was given."""
     is_least_time: bool
-    """Whether the duration is what is least."""
+    """Whether the objective is the duration alone."""
     certificate: Certificate
     joints: tuple[str, ...]
     intervals: int
@@ -99,7 +101,7 @@ class PlanReport:
     clearance: float | None = None
     """Distance that was asked for from obstacles, m; None without obstacles."""
     clear_of: str = ""
-    """What it is kept from: obstacles, or between links."""
+    """Bodies from or between which the clearance is kept, in words: obstacles, links."""
     spare_clearance: float = 0.0
     """Smallest distance beyond that, m."""
     reduced_clearances: tuple[str, ...] = ()
@@ -107,9 +109,9 @@ class PlanReport:
     coordinates: tuple[str, ...] = ()
     """Coordinates of the places' poses that counted; empty if all did."""
     not_checked: tuple[str, ...] = ()
-    """What no distance was measured of: links without a shape, and what overlaps in all sampled configurations."""
+    """Parts without a measured distance: links without a shape, or that overlap in all sampled configurations."""
     is_clearance_reduced_throughout: bool = False
-    """Whether it is reduced to them during the whole motion: none was found that keeps the clearance farther away."""
+    """Whether the clearance is reduced during the whole motion: none was found that keeps it away from the ends."""
 
     @property
     def sensitivity(self) -> float | None:
@@ -118,7 +120,7 @@ class PlanReport:
 
     @property
     def notes(self) -> list[str]:
-        """What a reader of the motion has to know besides, a sentence each."""
+        """Notes on the motion and its certificate for a reader, a sentence each."""
         notes = []
         if self.coordinates:
             notes.append(f"of the poses to go to, {', '.join(self.coordinates)} counted and no other coordinates")
@@ -153,7 +155,7 @@ class PlanReport:
 
     @property
     def title(self) -> str:
-        """The motion in a few words: its duration and what is least."""
+        """The motion in a few words: its duration and its objective."""
         aim = f"least {self.objective}" if self.is_resolved else "not optimized"
         return f"{seconds_text(self.duration)}, {aim}"
 

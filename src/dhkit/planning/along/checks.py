@@ -17,8 +17,10 @@ from dhkit.trajectories.limits import farthest_outside
 REGULAR_POINTS = 8
 """Number of points of each piece of a path at which its derivative is examined."""
 
-MIN_DERIVATIVE_RATIO, MAX_DERIVATIVE_RATIO = 1e-6, 1e4
-"""Ratios of the path's derivative to its mean: below the first the path stops, above the second it is singular."""
+MIN_DERIVATIVE_RATIO = 1e-6
+"""Ratio of the path's derivative by s to its mean at and below which the path stands still."""
+MAX_DERIVATIVE_RATIO = 1e4
+"""Ratio of the path's derivative by s to its mean above which the path is singular."""
 
 
 def require_path(description: LoadedArm, path: JointPath, limits: Limits) -> None:
@@ -73,14 +75,19 @@ def require_kept(program: PathProgram[Profile]) -> None:
     PlanningError
         Names the constraint or the obstacle, and the place.
     """
-    task, states = program.task, program.states
-    # Both ends of each interval in the order of s, with derivatives by s in place of rates: between two places the
+    task = program.task
+    states = program.states
+    n = task.arm.n
+
+    # Both ends of each interval in the order of s, with derivatives by s instead of rates: between two places the
     # clearance is measured along the path itself.
-    q, slope, bend = (np.swapaxes(x, 0, 1).reshape(-1, task.arm.n) for x in (states.q, states.qs, states.qss))
     s = states.s.T.ravel()
+    q = np.swapaxes(states.q, 0, 1).reshape(-1, n)
+    qs = np.swapaxes(states.qs, 0, 1).reshape(-1, n)
+    qss = np.swapaxes(states.qss, 0, 1).reshape(-1, n)
     knots = np.append(states.s[0], states.s[1, -1])
     along = cast("JointPath", task.path).pieces.with_breaks(knots)
-    still = States(task.loaded, s, q, slope, bend, motion=along, points=2)
+    still = States(task.loaded, s, q, qs, qss, motion=along, points=2)
     for limit, (constraint, parameters) in task.checker.limiting.items():
         if constraint.moving or limit == Limit.POSITION:
             continue
@@ -110,7 +117,8 @@ def require_holdable_along(program: PathProgram[Profile]) -> None:
     PlanningError
         Names the joint and the place.
     """
-    task, states = program.task, program.states
+    task = program.task
+    states = program.states
     use = np.abs(states.g) / task.limits.torque
     end, k, _ = np.unravel_index(int(np.argmax(use)), use.shape)
     require_holdable(task.loaded, task.limits, states.q[end, k], f"the path at s = {states.s[end, k]:.4g}")

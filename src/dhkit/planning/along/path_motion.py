@@ -27,9 +27,12 @@ from dhkit.symbolic import Friction
 from dhkit.trajectories import JointPath, Trajectory
 from dhkit.trajectories.timing import check_duration, default_limits
 
-MIN_INTERVALS, DEFAULT_INTERVALS = 6, 200
-"""Smallest number of intervals, and the usual one."""
+MIN_INTERVALS = 6
+"""Smallest number of intervals of a path."""
+DEFAULT_INTERVALS = 200
+"""Default number of intervals of a path."""
 QUICKEST = Objective.of("time")
+"""Objective of the fastest motion, from which motions with other objectives start."""
 POINTS = 8
 """Number of states in an interval for the certificate; few, because there are many intervals."""
 DURATION_FACTOR = 1.5

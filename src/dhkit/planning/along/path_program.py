@@ -1,11 +1,11 @@
-"""What the programs along a path share: the grid, the path's coefficients, and the limits of a state."""
+"""Common part of the programs along a path: the grid, the path's coefficients, and the limits of a state."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol, Self, TypeVar, cast
+from typing import TYPE_CHECKING, NamedTuple, Protocol, Self, TypeVar, cast
 
 import numpy as np
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 MAX_INTERVALS = 2000
 """Largest number of requested intervals; after refinement there may be twice as many."""
 REFINED = 4
-"""Factor by which the excess inside an interval falls if the interval is halved."""
+"""Factor by which the excess inside an interval falls if the interval is halved: it grows with the length squared."""
 
 
 class Timed(Protocol):
@@ -50,6 +50,28 @@ class Timed(Protocol):
 
 
 Profile = TypeVar("Profile", bound=Timed)
+
+
+class IntervalSymbols(NamedTuple):
+    """Symbols of an interval's parameters."""
+
+    step: casadi.SX
+    """Its length in s."""
+    left: casadi.SX
+    """The path's coefficients at its left end, see :class:`PathStates`."""
+    right: casadi.SX
+    """The path's coefficients at its right end."""
+    given: list[casadi.SX]
+    """Parameters of each constraint of the motion."""
+    scale: casadi.SX
+    """Scale of the cost."""
+
+    @property
+    def vector(self) -> casadi.SX:
+        """All of them, in the order of the program's parameters."""
+        import casadi
+
+        return casadi.vertcat(self.step, self.left, self.right, *self.given, self.scale)
 
 
 class PathProgram(Program[Profile]):
@@ -93,14 +115,14 @@ class PathProgram(Program[Profile]):
         """Indices of each interval's parameters, shape (parameters, K)."""
         self.parameter_count = K * of_interval + of_all
 
-    def symbols(self) -> tuple[casadi.SX, casadi.SX, casadi.SX, list[casadi.SX], casadi.SX]:
-        """Return symbols of an interval's parameters: its length, both ends' coefficients, constraints, scale."""
+    def symbols(self) -> IntervalSymbols:
+        """Return symbols of an interval's parameters."""
         import casadi
 
         symbol = casadi.SX.sym
         size = int(self.point.path.numel())
         given = [symbol(f"p{k}", count) for k, count in enumerate(self.sizes)]
-        return symbol("step"), symbol("left", size), symbol("right", size), given, symbol("scale")
+        return IntervalSymbols(symbol("step"), symbol("left", size), symbol("right", size), given, symbol("scale"))
 
     def at_state(self, given: list[casadi.SX]) -> tuple[casadi.Function, list[Rows]]:
         """Return a state's rows and integrand as a function, and the kinds of the rows.
@@ -116,10 +138,13 @@ class PathProgram(Program[Profile]):
 
         point = self.point
         limits = limit_rows(self._limited, self.point, given)
-        parts = casadi.SX.sym("parts", self.powers)
-        rows = casadi.vertcat(casadi.SX(0, 1), *(row for _, row in limits), parts - self._power)
-        inputs = [point.sdd, point.b, point.speed, point.path, parts, *given]
-        results = [rows, self.task.objective.integrand(point) + casadi.sum1(parts)]
+
+        # A positive part max(0, P) is a variable u >= 0 with the row u - P >= 0.
+        u = casadi.SX.sym("parts", self.powers)
+        rows = casadi.vertcat(casadi.SX(0, 1), *(row for _, row in limits), u - self._power)
+        integrand = self.task.objective.integrand(point) + casadi.sum1(u)
+        inputs = [point.sdd, point.b, point.speed, point.path, u, *given]
+        results = [rows, integrand]
         kinds = [*(kind for kind, _ in limits), Rows(RowKind.POSITIVE_PART, "positive power", self.powers)]
         return casadi.Function("at_state", inputs, results, {"cse": True}), kinds
 
@@ -147,19 +172,21 @@ class PathProgram(Program[Profile]):
         """Indices of the positive parts at the left and the right end of each interval, shape (2 powers, K)."""
         own = np.vstack([step[None], self.positive_parts])
         each = np.stack([step, step], axis=1)
-        total = casadi.SX.sym("total", K)
+
+        # The first interval has an inner knot on its right only, the last one on its left only.
         of_first = np.vstack([own[:, :1], inner[:, :1]])
         of_last = np.vstack([own[:, -1:], inner[:, -1:]])
         between = np.vstack([own[:, 1:-1], inner[:, :-1], inner[:, 1:]])
-        blocks = [
-            Block(function, indices, self.parameters_at[:, part], rows, each[part])
-            for (function, rows), indices, part in (
-                (interval(first=True), of_first, slice(None, 1)),
-                (interval(), between, slice(1, -1)),
-                (interval(last=True), of_last, slice(-1, None)),
-            )
-        ]
-        duration = LocalFunction(total, casadi.SX(0, 1), casadi.sum1(total))
+        blocks = []
+        for (function, rows), indices, part in (
+            (interval(first=True), of_first, slice(None, 1)),
+            (interval(), between, slice(1, -1)),
+            (interval(last=True), of_last, slice(-1, None)),
+        ):
+            blocks.append(Block(function, indices, self.parameters_at[:, part], rows, each[part]))
+
+        durations = casadi.SX.sym("total", K)
+        duration = LocalFunction(durations, casadi.SX(0, 1), casadi.sum1(durations))
         kinds = (Rows(RowKind.DURATION, "duration", 1),)
         blocks.append(Block(duration, step[:, None], np.zeros((0, 1), dtype=int), kinds))
         return BlockProgram(variables + self.positive_parts.size, self.parameter_count, tuple(blocks))
@@ -174,9 +201,12 @@ class PathProgram(Program[Profile]):
         left, right
             Accelerations at the ends of the intervals, shape (K,), 1/s^2.
         """
-        ends = zip((left, right), (sd[:-1], sd[1:]), self.states.coefficients, strict=True)
-        values = [self._powers(sdd[None], (v * v)[None], v[None], path.T).toarray() for sdd, v, path in ends]
-        positive: Array = np.maximum(np.vstack(values), 0.0)
+        of_left, of_right = self.states.coefficients
+        begin = sd[:-1]
+        end = sd[1:]
+        at_left = self._powers(left[None], (begin * begin)[None], begin[None], of_left.T).toarray()
+        at_right = self._powers(right[None], (end * end)[None], end[None], of_right.T).toarray()
+        positive: Array = np.maximum(np.vstack([at_left, at_right]), 0.0)
         return positive
 
     @cached_property

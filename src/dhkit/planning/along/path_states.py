@@ -1,7 +1,11 @@
-"""A path on a grid, and the arm's states along it, as numbers and as CasADi symbols: tau = m sdd + c sd^2 + g.
+"""A path on a grid, and the arm's states along it, as numbers and as CasADi symbols.
 
-Bobrow, Dubowsky and Gibson 1985, Time-optimal control of robotic manipulators along specified paths. The grid is finer
-where the arm has to move slowly, with knots where the path's curvature jumps.
+With q(s), its derivatives q' and q'' by s, and the speed sd and the acceleration sdd along the path,
+
+    qd = q' sd,    qdd = q' sdd + q'' sd^2,    tau = m sdd + c sd^2 + g
+
+(Bobrow, Dubowsky and Gibson 1985, Time-optimal control of robotic manipulators along specified paths). The grid is
+finer where the arm has to move slowly, with knots where the path's curvature jumps.
 """
 
 from __future__ import annotations
@@ -26,8 +30,10 @@ if TYPE_CHECKING:
 
 JUMP_ROUNDING = 1e-6
 """Jump of a derivative, relative to its largest value, that counts as rounding."""
-EVEN_SHARE, MIN_TIME = 0.3, 1e-12
-"""Share of knots with even spacing, and the shortest time of an interval, s."""
+EVEN_SHARE = 0.3
+"""Share of the grid's density that is even in s; the rest is even in time."""
+MIN_TIME = 1e-12
+"""Smallest duration of a path, s, by which the times of its intervals are divided."""
 CANCELLED_SHARE = 1e-9
 """Magnitude of a sum relative to that of its parts below which it counts as zero."""
 
@@ -44,7 +50,8 @@ def knots_of(path: JointPath, intervals: int, rough: Array, speeds: Array) -> Ar
     """Return a grid whose intervals take about the same time, with knots where the path's curvature jumps.
 
     From rest, s and the first knots grow as t^2; where joints have to move slowly, near singularities, the grid is
-    finer.
+    finer. The knots are those at which the cumulative share of a blend of time and s, 0 to 1, is
+    (1 - cos(pi k / K)) / 2.
 
     Parameters
     ----------
@@ -54,11 +61,15 @@ def knots_of(path: JointPath, intervals: int, rough: Array, speeds: Array) -> Ar
     steps = np.diff(rough)
     times = steps / speeds
     share = (1 - EVEN_SHARE) * times / max(float(times.sum()), MIN_TIME) + EVEN_SHARE * steps
+    covered = np.concatenate([[0.0], np.cumsum(share) / share.sum()])
     x = (1 - np.cos(np.linspace(0.0, np.pi, intervals + 1))) / 2
-    knots = np.interp(x, np.concatenate([[0.0], np.cumsum(share) / share.sum()]), rough)
+    knots = np.interp(x, covered, rough)
+
+    # The nearest knot moves to a jump of the curvature; a knot is added if that one is at another jump.
     taken = set()
     bends = np.abs(jumps(path, 2)).max(axis=1)
-    for s in path.breaks[1:-1][bends > JUMP_ROUNDING * np.abs(path.qss(path.breaks)).max()]:
+    is_bend = bends > JUMP_ROUNDING * np.abs(path.qss(path.breaks)).max()
+    for s in path.breaks[1:-1][is_bend]:
         k = int(np.argmin(np.abs(knots[1:-1] - s))) + 1
         if knots[k] in taken:
             knots = np.insert(knots, np.searchsorted(knots, s), s)
@@ -79,6 +90,7 @@ class PathStates:
     qs: Array
     """First derivatives of q by s, shape (2, K, n)."""
     qss: Array
+    """Second derivatives of q by s, shape (2, K, n)."""
     m: Array
     """Torque per sdd, shape (2, K, n); zeros without bodies."""
     c: Array
@@ -88,24 +100,35 @@ class PathStates:
     ps: Array
     """Derivatives of the tool's position by s, shape (2, K, 3), m."""
     pss: Array
+    """Second derivatives of the tool's position by s, shape (2, K, 3), m."""
     qsss: Array
+    """Third derivatives of q by s, shape (2, K, n)."""
 
     @classmethod
     def of(cls, arm: LoadedArm, path: JointPath, knots: Array) -> PathStates:
-        """Evaluate a path (rad and m) on knots (K+1,); at jumps of curvature each interval has its side's value."""
+        """Evaluate a path (rad and m) on knots (K+1,); at jumps of curvature each interval has its side's value.
+
+        The torques of the states (q, qd, qdd) = (q, 0, q') and (q, q', q'') are M q' + g and M q'' + C q' + g, so that
+
+            m = M q',    c = M q'' + C(q, q') q',
+
+        and the tool's position p has p' = J q', p'' = J q'' + Jd q', with Jd for the rates q'.
+        """
         pieces = [path.pieces.differentiated(order) for order in range(4)]
         ends: tuple[tuple[Array, Side], ...] = ((knots[:-1], "right"), (knots[1:], "left"))
         q, qs, qss, qsss = (np.stack([piece(s, side) for s, side in ends]) for piece in pieces)
         still = np.zeros_like(q)
-        m = c = g = still
+        m = still
+        c = still
+        g = still
         if np.isfinite(arm.numbers.mass).all():
             g = dynamics.inverse_dynamics(arm, q, still, still)
             m = dynamics.inverse_dynamics(arm, q, still, qs) - g
             c = dynamics.inverse_dynamics(arm, q, qs, qss) - g
-        J = kinematics.jacobian(arm, q)
-        Jd = kinematics.jacobian_dot(arm, q, qs)
-        ps = np.einsum("...ij,...j->...i", J[..., :3, :], qs)
-        pss = np.einsum("...ij,...j->...i", J[..., :3, :], qss) + np.einsum("...ij,...j->...i", Jd[..., :3, :], qs)
+        J = kinematics.jacobian(arm, q)[..., :3, :]
+        Jd = kinematics.jacobian_dot(arm, q, qs)[..., :3, :]
+        ps = np.einsum("...ij,...j->...i", J, qs)
+        pss = np.einsum("...ij,...j->...i", J, qss) + np.einsum("...ij,...j->...i", Jd, qs)
         return cls(np.stack([knots[:-1], knots[1:]]), q, qs, qss, m, c, g, ps, pss, qsss)
 
     @property
@@ -123,7 +146,7 @@ class PathStates:
     # Speeds without friction and further constraints, for grids and guesses
 
     def fastest(self, limits: Limits, shares: Array | float = 0.0) -> Array:
-        """Return the largest sd^2 at each knot by the limits of joint rates, shape (K+1,), 1/s^2.
+        """Return the largest sd^2 at each knot by the limits of joint rates, shape (K+1,), 1/s^2: (v / |q'|)^2.
 
         Parameters
         ----------
@@ -147,24 +170,31 @@ class PathStates:
         return speeds
 
     def largest(self, limits: Limits, shape: Array) -> float:
-        """Return the largest factor of sd^2 = shape (K+1,), 1/s^2, that the limits allow which are kept at rest."""
+        """Return the largest factor of sd^2 = shape (K+1,), 1/s^2, with which all limits that rest keeps are kept."""
         with np.errstate(divide="ignore"):
             return min(float(np.min(self.fastest(limits) / shape)), float(self._factors(limits, shape).min()))
 
     def _factors(self, limits: Limits, shape: Array) -> Array:
-        """Return the largest factors of sd^2 = shape (K+1,) by limits of torque and acceleration, shape (2, K)."""
+        """Return the largest factors of b = sd^2 = shape (K+1,) by limits of torque and acceleration, shape (2, K).
+
+        With b linear in s, sdd = b' / 2. A factor k multiplies b and sdd alike, so that a torque is k u + g with
+        u = m sdd + c b, and an acceleration k u with u = q' sdd + q'' b: the limit is kept up to
+
+            k = (limit - sign(u) g) / |u|,    with g = 0 for accelerations.
+        """
         b = np.stack([shape[:-1], shape[1:]])[..., None]
         sdd = (np.diff(shape) / (2 * self.steps))[:, None]
         found = np.full(self.s.shape, np.inf)
-        for by_sdd, by_b, rest, limit in (
+        for by_sdd, by_b, at_rest, limit in (
             (self.m, self.c, self.g, limits.torque),
             (self.qs, self.qss, 0 * self.q, limits.acceleration),
         ):
-            used = by_sdd * sdd + by_b * b
-            used[np.abs(used) < CANCELLED_SHARE * (np.abs(by_sdd * sdd) + np.abs(by_b * b) + np.abs(rest))] = 0.0
-            spare = limit - np.sign(used) * rest
+            moving = by_sdd * sdd + by_b * b
+            parts = np.abs(by_sdd * sdd) + np.abs(by_b * b) + np.abs(at_rest)
+            moving[np.abs(moving) < CANCELLED_SHARE * parts] = 0.0
+            spare = limit - np.sign(moving) * at_rest
             with np.errstate(divide="ignore", invalid="ignore"):
-                most = np.where((spare > 0) & (used != 0), spare / np.abs(used), np.inf)
+                most = np.where((spare > 0) & (moving != 0), spare / np.abs(moving), np.inf)
             found = np.minimum(found, most.min(axis=2))
         return found
 
@@ -183,16 +213,20 @@ class PathPoint(Point):
         self.limits = limits
         self.n = n
         self.friction = friction
-        self.b, self.speed, self.sdd = (casadi.SX.sym(name) for name in ("b", "speed", "sdd"))
+        self.b = casadi.SX.sym("b")
+        self.speed = casadi.SX.sym("speed")
+        self.sdd = casadi.SX.sym("sdd")
         self.path = casadi.SX.sym("path", 7 * n + 6)
         edges = [*range(0, 6 * n + 1, n), 6 * n + 3, 6 * n + 6, 7 * n + 6]
         q, qs, qss, m, c, g, ps, pss, _ = casadi.vertsplit(self.path, edges)
+        # b = sd^2 is a variable of its own: the programs are written in it.
         self.q = q
         self.qd = qs * self.speed
         self.qdd = qs * self.sdd + qss * self.b
         self.load = casadi.SX(0, 1)  # torques along the path include the payload
         self._rigid = m * self.sdd + c * self.b + g
-        self._tool = ps * self.speed, ps * self.sdd + pss * self.b
+        self._tool_velocity = ps * self.speed
+        self._tool_acceleration = ps * self.sdd + pss * self.b
 
     @cached_property
     def tau(self) -> casadi.SX:
@@ -219,9 +253,9 @@ class PathPoint(Point):
     @cached_property
     def tool_velocity(self) -> casadi.SX:
         """The velocity of the tool's origin, 3 x 1, m/s."""
-        return self._tool[0]
+        return self._tool_velocity
 
     @cached_property
     def tool_acceleration(self) -> casadi.SX:
         """The acceleration of the tool's origin, 3 x 1, m/s^2."""
-        return self._tool[1]
+        return self._tool_acceleration

@@ -1,8 +1,12 @@
 """Timing of a path as two programs: in the squared path speed, and under limits of jerk.
 
-The first is in the squared path speed b = sd^2. With b linear between the knots of a grid, sdd = b' / 2 is constant
-between them. The time-optimal program is convex in b without friction: Verscheure et al. 2009, Time-optimal path
-tracking for robots, section III.
+The first is in the squared path speed b = sd^2. From db/dt = 2 sd sdd = b' sd follows sdd = b' / 2. With b linear
+between the knots of a grid, sdd is constant between them, and an interval of length ds takes
+
+    2 ds / (sqrt b_k + sqrt b_(k+1)).
+
+The time-optimal program is convex in b without friction: Verscheure et al. 2009, Time-optimal path tracking for robots,
+section III.
 
 The second is in the speed and the acceleration along the path. sdd is continuous, and linear in time between the knots
 of a grid: joint jerks are q' sddd + 3 q'' sd sdd + q''' sd^3.
@@ -36,12 +40,14 @@ END_SHARE = 0.01
 """Share of the path at each end in which a guess of even speed speeds up or slows down."""
 MIN_SQUARED_SPEED = 1e-7
 """Smallest b at inner knots, relative to about the path's mean: Ipopt relaxes bounds by a tenth of it."""
-TIME_TOLERANCE, SMOOTH_TOLERANCE = 1e-7, 1e-8
-"""Ipopt's tolerances for time (scaled to 1) and for other objectives; each active limit costs a tenth of it."""
+TIME_TOLERANCE = 1e-7
+"""Ipopt's tolerance for least time, scaled to 1; each active limit costs a tenth of it."""
+SMOOTH_TOLERANCE = 1e-8
+"""Ipopt's tolerance for other objectives, which are flatter near their optimum."""
 GUESS_SPEED_SHARE = 0.5
 """Squared speed of the initial guess as a share of the largest possible."""
 JERK_LIMITED_TOLERANCE = 1e-8
-"""Ipopt's tolerance."""
+"""Ipopt's tolerance under limits of jerk, with costs scaled to 1."""
 SAMPLES = 2000
 """Number of times of a quintic from which a guess is interpolated."""
 MIN_STEP = 1e-6
@@ -104,26 +110,37 @@ class TimingProgram(PathProgram[Profile]):
         duration = casadi.SX.sym("duration")
         inner = casadi.SX.sym("b", 2 - first - last)
         parts = [casadi.SX.sym(f"parts{k}", self.powers) for k in range(2)]
-        step, left, right, given, scale = self.symbols()
-        known = casadi.vertsplit(casadi.exp(inner) if self._logarithmic else inner)
-        # At rest the speed is a constant: the square root has no derivative there.
-        rest = [casadi.SX(0)]
-        b = [*rest * first, *known, *rest * last]
-        speed = [*rest * first, *(casadi.sqrt(part) for part in known), *rest * last]
+        symbols = self.symbols()
+        ds = symbols.step
+
+        # b and the speed sqrt b at both ends. At rest the speed is a constant: the square root has no derivative there.
+        b = casadi.vertsplit(casadi.exp(inner) if self._logarithmic else inner)
+        speed = [casadi.sqrt(part) for part in b]
+        if first:
+            b = [casadi.SX(0), *b]
+            speed = [casadi.SX(0), *speed]
+        if last:
+            b = [*b, casadi.SX(0)]
+            speed = [*speed, casadi.SX(0)]
+
+        # The time that the interval takes, and sdd = b' / 2.
+        time = 2 * ds / (speed[0] + speed[1])
+        sdd = (b[1] - b[0]) / (2 * ds)
         kinds = [Rows(RowKind.TIME, "duration of an interval", 1)]
-        rows = [2 * step / (speed[0] + speed[1]) - duration]
+        rows = [time - duration]
+
+        # The limits at both ends, and the integral of the rates by the trapezoidal rule.
+        at_state, limits = self.at_state(symbols.given)
         rates = []
-        at_state, limits = self.at_state(given)
-        sdd = (b[1] - b[0]) / (2 * step)
-        for x, v, coefficients, part in zip(b, speed, (left, right), parts, strict=True):
-            row, rate = at_state(sdd, x, v, coefficients, part, *given)
+        for x, v, coefficients, part in zip(b, speed, (symbols.left, symbols.right), parts, strict=True):
+            row, rate = at_state(sdd, x, v, coefficients, part, *symbols.given)
             rows.append(row)
             rates.append(rate)
             kinds += limits
-        cost = scale * duration * (self.task.objective.time_weight + (rates[0] + rates[1]) / 2)
+        cost = symbols.scale * duration * (self.task.objective.time_weight + (rates[0] + rates[1]) / 2)
+
         z = casadi.vertcat(duration, *parts, inner)
-        p = casadi.vertcat(step, left, right, *given, scale)
-        return LocalFunction(z, p, casadi.vertcat(*rows), cost), tuple(kinds)
+        return LocalFunction(z, symbols.vector, casadi.vertcat(*rows), cost), tuple(kinds)
 
     # Guesses
 
@@ -136,7 +153,7 @@ class TimingProgram(PathProgram[Profile]):
         return Starts([lambda: Profile(self.s, np.square(ends / duration)), self.usual_profile])
 
     def usual_profile(self) -> Profile:
-        """Return a guess: b = 4 beta s (1 - s), whose duration is pi / (2 sqrt beta)."""
+        """Return a guess: b = 4 beta s (1 - s), s = sin(sqrt(beta) t)^2, which takes pi / (2 sqrt beta)."""
         shape = 4 * self.s * (1 - self.s)
         return Profile(self.s, GUESS_SPEED_SHARE * self.states.largest(self.task.limits, shape) * shape)
 
@@ -150,26 +167,26 @@ class TimingProgram(PathProgram[Profile]):
         """Return the arguments of a solution; the unit of time is the guess's duration."""
         K = self.intervals
         unit = guess.duration
+        cost = self.cost_unit(task, guess)
+
+        # Bounds of b at the inner knots.
         lowest = MIN_SQUARED_SPEED / unit**2
         shares = margins.of(Limit.VELOCITY, task.arm.n)
-        high = np.maximum(self.states.fastest(task.limits, shares)[1:-1], 2 * lowest)
-        cost = self.cost_unit(task, guess)
-        speed = np.sqrt(guess.b)
+        highest = np.maximum(self.states.fastest(task.limits, shares)[1:-1], 2 * lowest)
+
+        sdd = np.diff(guess.b) / (2 * np.diff(self.s))
+        powers = self.positive_powers(np.sqrt(guess.b), sdd, sdd)
+        x = self._variables(np.diff(guess.times), np.maximum(guess.b[1:-1], lowest), powers)
+        low = self._variables(np.zeros(K), np.full(K - 1, lowest), np.zeros_like(powers))
+        high = self._variables(np.full(K, np.inf), highest, np.full_like(powers, np.inf))
+
+        # b has the unit 1 / unit^2: a factor of b is an offset of its logarithm.
         scaling = self.scaling(unit, cost / unit)
         if self._logarithmic:
             scaling.offset[K : 2 * K - 1] = -2 * np.log(unit)
         else:
             scaling.unit[K : 2 * K - 1] = unit**-2
-        sdd = np.diff(guess.b) / (2 * np.diff(self.s))
-        most = np.full(self.positive_parts.shape, np.inf)
-        powers = self.positive_powers(speed, sdd, sdd)
-        low = self._variables(np.zeros(K), np.full(K - 1, lowest), 0 * powers)
-        return Arguments(
-            self._variables(np.diff(guess.times), np.maximum(guess.b[1:-1], lowest), powers),
-            self.parameters(task, cost),
-            (low, self._variables(np.full(K, np.inf), high, most)),
-            scaling,
-        )
+        return Arguments(x, self.parameters(task, cost), (low, high), scaling)
 
     def _variables(self, durations: Array, b: Array, powers: Array) -> Array:
         """Return the program's variables.
@@ -177,9 +194,9 @@ class TimingProgram(PathProgram[Profile]):
         Parameters
         ----------
         durations
-            Of the intervals, shape (K,), s.
+            Durations of the intervals, shape (K,), s.
         b
-            At the inner knots, shape (K-1,), 1/s^2.
+            Squared speeds at the inner knots, shape (K-1,), 1/s^2.
         powers
             Positive parts of powers at the ends of the intervals, shape (2 powers, K).
         """
@@ -194,10 +211,10 @@ class TimingProgram(PathProgram[Profile]):
         return Profile(self.s, np.concatenate([[0.0], inside, [0.0]]))
 
     def law(self, found: Profile) -> tuple[Array, Array]:
-        """Return s(t): its breaks (K+1,), s, and ascending coefficients, shape (K, 3)."""
-        speed = np.sqrt(found.b)
-        sdd = (speed[1:] - speed[:-1]) * (speed[1:] + speed[:-1]) / (2 * np.diff(found.s))
-        return found.times, np.stack([found.s[:-1], speed[:-1], sdd / 2], axis=1)
+        """Return s(t): its breaks (K+1,), s, and ascending coefficients, shape (K, 3): s + sd t + sdd t^2 / 2."""
+        sd = np.sqrt(found.b)
+        sdd = (sd[1:] - sd[:-1]) * (sd[1:] + sd[:-1]) / (2 * np.diff(found.s))
+        return found.times, np.stack([found.s[:-1], sd[:-1], sdd / 2], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +224,7 @@ class SmoothProfile:
     s: Array
     """Path parameters of the knots, shape (K+1,)."""
     durations: Array
-    """Of the intervals, shape (K,), s."""
+    """Durations of the intervals, shape (K,), s."""
     sd: Array
     """Speeds at the knots, shape (K+1,), 1/s."""
     sdd: Array
@@ -225,9 +242,12 @@ class SmoothProfile:
 
     @classmethod
     def quintic(cls, s: Array, duration: float) -> SmoothProfile:
-        """Return the profile of s = 10 x^3 - 15 x^4 + 6 x^5, x = t / duration, s."""
-        x = np.linspace(0.0, 1.0, SAMPLES)
-        x = np.interp(s, x**3 * (10 - 15 * x + 6 * x * x), x)
+        """Return the profile of s = 10 x^3 - 15 x^4 + 6 x^5, x = t / duration, s.
+
+        x at the knots is interpolated; ds/dx = 30 x^2 (1 - x)^2 and d2s/dx2 = 60 x (1 - x) (1 - 2 x).
+        """
+        sampled = np.linspace(0.0, 1.0, SAMPLES)
+        x = np.interp(s, sampled**3 * (10 - 15 * sampled + 6 * sampled * sampled), sampled)
         sd = 30 * x**2 * (1 - x) ** 2 / duration
         sdd = 60 * x * (1 - x) * (1 - 2 * x) / duration**2
         return cls(s, duration * np.diff(x), sd, sdd)
@@ -256,31 +276,45 @@ class SmoothTimingProgram(PathProgram[SmoothProfile]):
         h = casadi.SX.sym("duration")
         known = [casadi.SX.sym(f"state{k}", 2) for k in range(2 - first - last)]
         parts = [casadi.SX.sym(f"parts{k}", self.powers) for k in range(2)]
-        step, left, right, given, scale = self.symbols()
-        rest = [casadi.SX(2, 1)]
-        begin, end = [*rest * first, *known, *rest * last]
-        at_state, limits = self.at_state(given)
-        n = self.task.arm.n
-        reciprocals = given[Limit.JERK]
+        symbols = self.symbols()
+        states = known
+        if first:
+            states = [casadi.SX(2, 1), *states]
+        if last:
+            states = [*states, casadi.SX(2, 1)]
+        begin, end = states
+
+        # Continuity, with sdd linear in time from a0 to a1:
+        #   ds = h v0 + h^2 (2 a0 + a1) / 6,    v1 = v0 + h (a0 + a1) / 2.
+        v0 = begin[0]
+        v1 = end[0]
+        a0 = begin[1]
+        a1 = end[1]
+        moved = h * v0 + h * h * (2 * a0 + a1) / 6
+        gained = h * (a0 + a1) / 2
         kinds = [Rows(RowKind.CONTINUITY, "continuity along the path", 2)]
-        moved = h * begin[0] + h * h * (2 * begin[1] + end[1]) / 6
-        gained = h * (begin[1] + end[1]) / 2
-        rows = [casadi.vertcat(moved / step - 1, begin[0] + gained - end[0])]
+        rows = [casadi.vertcat(moved / symbols.step - 1, v0 + gained - v1)]
+
+        # The limits at both ends, jerks q' sddd + 3 q'' sd sdd + q''' sd^3 as shares of their limits, and the integral
+        # of the rates by the trapezoidal rule.
+        n = self.task.arm.n
+        reciprocals = symbols.given[Limit.JERK]
+        at_state, limits = self.at_state(symbols.given)
         rates = []
-        for state, path, part in zip((begin, end), (left, right), parts, strict=True):
+        for state, path, part in zip((begin, end), (symbols.left, symbols.right), parts, strict=True):
             v, a = casadi.vertsplit(state)
-            row, rate = at_state(a, v * v, v, path, part, *given)
+            row, rate = at_state(a, v * v, v, path, part, *symbols.given)
             qs = path[n : 2 * n]
             qss = path[2 * n : 3 * n]
             qsss = path[-n:]
-            jerk = qs * (end[1] - begin[1]) / h + 3 * qss * v * a + qsss * v**3
+            jerk = qs * (a1 - a0) / h + 3 * qss * v * a + qsss * v**3
             rows += [row, jerk * reciprocals]
             rates.append(rate)
             kinds += [*limits, Rows(RowKind.LIMIT, Limit.JERK.what, n, Limit.JERK, of_joints=True)]
-        cost = scale * h * (self.task.objective.time_weight + (rates[0] + rates[1]) / 2)
+        cost = symbols.scale * h * (self.task.objective.time_weight + (rates[0] + rates[1]) / 2)
+
         z = casadi.vertcat(h, *parts, *known)
-        p = casadi.vertcat(step, left, right, *given, scale)
-        return LocalFunction(z, p, casadi.vertcat(*rows), cost), tuple(kinds)
+        return LocalFunction(z, symbols.vector, casadi.vertcat(*rows), cost), tuple(kinds)
 
     # Guesses
 
@@ -289,9 +323,14 @@ class SmoothTimingProgram(PathProgram[SmoothProfile]):
         return Starts([self._quintic])
 
     def _quintic(self) -> SmoothProfile:
+        """Return a quintic law of the given duration, or one that is slow enough for the limits.
+
+        Without limits of jerk, b = 4 beta s (1 - s) takes at least pi / (2 sqrt beta): its duration is slowed down.
+        """
         task = self.task
         shape = 4 * self.s * (1 - self.s)
-        least = np.pi / (2 * np.sqrt(self.states.largest(task.limits, shape)))
+        beta = self.states.largest(task.limits, shape)
+        least = np.pi / (2 * np.sqrt(beta))
         profile = SmoothProfile.quintic(self.s, task.duration or float(least))
         if task.duration is not None:
             return profile
@@ -302,7 +341,8 @@ class SmoothTimingProgram(PathProgram[SmoothProfile]):
     def again(self, guess: SmoothProfile, found: SmoothProfile) -> SmoothProfile:
         """Return the last solution on the grid, which may have become finer."""
         times = np.interp(self.s, found.s, found.times)
-        sd, sdd = (np.interp(self.s, found.s, values) for values in (found.sd, found.sdd))
+        sd = np.interp(self.s, found.s, found.sd)
+        sdd = np.interp(self.s, found.s, found.sdd)
         return SmoothProfile(self.s, np.diff(times), sd, sdd)
 
     # Arguments
@@ -312,33 +352,38 @@ class SmoothTimingProgram(PathProgram[SmoothProfile]):
         K = self.intervals
         unit = float(guess.times[-1])
         cost = self.cost_unit(task, guess)
+
+        low = np.full(self.blocks.variables, -np.inf)
+        high = np.full(self.blocks.variables, np.inf)
+        low[:K] = MIN_STEP * unit / K
+        low[self._sd] = 0.0
+        low[self.positive_parts] = 0.0
+        shares = margins.of(Limit.VELOCITY, task.arm.n)
+        high[self._sd] = np.sqrt(self.states.fastest(task.limits, shares)[1:-1])
+
+        powers = self.positive_powers(guess.sd, guess.sdd[:-1], guess.sdd[1:])
+        x = np.concatenate([guess.durations, guess.sd[1:-1], guess.sdd[1:-1], powers.ravel()])
+
+        # Speeds have the unit 1 / unit, as has the second row of each interval: the continuity of the speed.
         scaling = self.scaling(unit, cost / unit)
         scaling.unit[self._sd] = 1 / unit
         scaling.unit[self._sdd] = unit**-2
         per_interval = sum(kind.count for kind in self.blocks.blocks[1].rows)
         scaling.row_unit[1 : K * per_interval : per_interval] = 1 / unit
-        low = np.full(self.blocks.variables, -np.inf)
-        high = np.full(self.blocks.variables, np.inf)
-        shares = margins.of(Limit.VELOCITY, task.arm.n)
-        low[:K] = MIN_STEP * unit / K
-        low[self._sd] = 0.0
-        low[self.positive_parts] = 0.0
-        high[self._sd] = np.sqrt(self.states.fastest(task.limits, shares)[1:-1])
-        powers = self.positive_powers(guess.sd, guess.sdd[:-1], guess.sdd[1:])
-        x = np.concatenate([guess.durations, guess.sd[1:-1], guess.sdd[1:-1], powers.ravel()])
         return Arguments(x, self.parameters(task, cost), (low, high), scaling)
 
     # Solutions
 
     def iterate(self, x: Array) -> SmoothProfile:
         """Return the profile of variables, shape (variables,)."""
-        sd, sdd = (np.concatenate([[0.0], x[indices], [0.0]]) for indices in (self._sd, self._sdd))
+        sd = np.concatenate([[0.0], x[self._sd], [0.0]])
+        sdd = np.concatenate([[0.0], x[self._sdd], [0.0]])
         return SmoothProfile(self.s, x[: self.intervals], sd, sdd)
 
     def law(self, found: SmoothProfile) -> tuple[Array, Array]:
         """Return s(t): its breaks (K+1,), s, and ascending coefficients, shape (K, 4); exactly from 0 to 1."""
-        columns = (values[:, None] for values in (found.s, found.sd, found.sdd))
-        knots = Knots(np.array([found.times[-1]]), *columns)
+        duration = np.array([found.times[-1]])
+        knots = Knots(duration, found.s[:, None], found.sd[:, None], found.sdd[:, None])
         ends = np.array([self.intervals])
         coefficients = corrected(Curve.LINEAR, found.durations, ends, knots, fixed_ends=True)
         return found.times, coefficients[..., 0]

@@ -25,17 +25,21 @@ POINTS = 24
 POINTS_PER_COEFFICIENT = 4
 """Number of states in an interval for each coefficient of its polynomials, whose extremes lie close together."""
 LARGEST_TURN = 0.2
-"""Turn of a joint between two states, rad: torques change with sines and cosines of the joint values."""
+"""Largest turn of a joint between two states, rad: torques change with sines and cosines of the joint values."""
 MAX_POINTS = 20_000
 """Largest number of states in an interval."""
 ACCEPTED_EXCESS = 5e-7
 """Largest excess of a certified motion, as a share of the limit: half of the documented 1e-6."""
 SMALL = 1e-2
-"""Size of joint values and speeds, rad and m, that jumps of smaller ones are compared with."""
-MAX_SLOW_DOWN, SLOW_DOWN_TOLERANCE = 1e9, 1e-9
-"""Largest factor by which a motion is slowed down, and the tolerance of such factors."""
+"""Smallest size of joint values and rates, in rad, m and per second, of which a jump is taken as a share."""
+SMALL_ACCELERATION = 1e-3
+"""Smallest size of accelerations, rad/s^2 and m/s^2, of which a jump is taken as a share."""
+MAX_SLOW_DOWN = 1e9
+"""Largest factor by which a motion is slowed down."""
+SLOW_DOWN_TOLERANCE = 1e-9
+"""Absolute tolerance of the factor by which a motion is slowed down, and of the excess at that factor."""
 PROVED = 2e-8
-"""Distance of a proved bound of positions and their derivatives from the truth, as a share of the limit."""
+"""Largest distance of a proved bound of positions and their derivatives from the truth, as a share of the limit."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +86,7 @@ class Certificate:
     sampled: tuple[str, ...] = ()
     """Limits of which nothing is proved between the states."""
     not_checked: tuple[str, ...] = ()
-    """What nothing is known of: torques of links without a body, and distances that were not measured."""
+    """Quantities of which nothing is known: torques of links without a body, and distances that were not measured."""
     independent: Recheck | None = None
     """Result of the second check; None unless asked for."""
 
@@ -109,15 +113,12 @@ class Certificate:
         return repr_line("Certificate", summary=self._summary)
 
     def _repr_html_(self) -> str:
-        rows = [
-            (
-                check.what,
-                str(check.row + 1),
-                f"exceeded by {100 * check.excess:.2g} %" if check.excess > 0 else f"{-100 * check.excess:.2g} % left",
-                f"{check.time:.4g} s",
-            )
-            for check in sorted(self.checks, key=lambda check: -check.excess)
-        ]
+        rows = []
+        for check in sorted(self.checks, key=lambda check: -check.excess):
+            state = f"{-100 * check.excess:.2g} % left"
+            if check.excess > 0:
+                state = f"exceeded by {100 * check.excess:.2g} %"
+            rows.append((check.what, str(check.row + 1), state, f"{check.time:.4g} s"))
         headings = ("limit", "joint or row", "at worst", "at")
         return html_block(f"Certificate: {self._summary}", html_table(headings, rows, align="lr"))
 
@@ -164,11 +165,11 @@ def certify(
     payload
         Payload of the tool; the motion's own unless given.
     obstacles, clearance, self_collision
-        What the links keep a distance from, and how much, m, as for :meth:`dhkit.planning.Planner.solve`: links that
-        are nearer at the start or the goal keep less there.
+        Obstacles, the distance from them, m, and whether links keep it from each other, as for
+        :meth:`dhkit.planning.Planner.solve`: links that are nearer at the start or the goal keep less there.
     independent
-        Whether a second check, which shares no code with the first, searches the motion for what the first has
-        overlooked: see :mod:`dhkit.planning.second_check`. It takes 0.05 to 1 s.
+        Whether a second check, which shares no code with the first, searches the motion for violations that the first
+        has overlooked: see :mod:`dhkit.planning.second_check`. It takes 0.05 to 1 s.
 
     Raises
     ------
@@ -177,7 +178,7 @@ def certify(
     PlanningError
         A clearance larger than the space in which the arm moves.
     ModelError
-        What is asked for needs Pinocchio or coal, which is not installed.
+        Pinocchio or coal is needed and not installed.
 
     Examples
     --------
@@ -213,11 +214,12 @@ def certify(
 
 
 def _not_checked(description: Description, limits: Limits, avoidance: CollisionAvoidance) -> tuple[str, ...]:
-    """Return what a certificate says nothing of although the robot has such limits, or the motion such obstacles."""
+    """Return the robot's limits, and the distances from the motion's obstacles, that a certificate leaves out."""
     bare = [joint.name for joint in description.joints if not joint.bodies]
     has_efforts = bool(np.isfinite(description.numbers.effort).any())
     found: list[str] = []
-    if bare and has_efforts and not np.isfinite(limits.torque).any():
+    has_torque_limits = bool(np.isfinite(limits.torque).any())
+    if bare and has_efforts and not has_torque_limits:
         found.append(f"torques, as the links of {', '.join(bare)} have no body")
     if avoidance:
         found += not_checked(description, avoidance.obstacles, avoidance.self_collision, avoidance.clearance)
@@ -274,13 +276,12 @@ class Checker:
     def check(self, trajectory: Trajectory, states: States | None = None) -> Certificate:
         """Return the certificate of a motion; ``states`` are its states on the grid, if they are known."""
         states = self.states(trajectory) if states is None else states
-        checks = []
-        active = []
-        anywhere = np.zeros(len(states.times), dtype=bool)
         share = _time_shares(trajectory, states)
-        if (jump := _largest_jump(trajectory, self.limits)) is not None:
-            checks.append(jump)
+        jump = _largest_jump(trajectory, self.limits)
+        checks = [] if jump is None else [jump]
         sampled: list[str] = []
+        active: list[ActiveLimit] = []
+        anywhere = np.zeros(len(states.times), dtype=bool)
         for k, at_states in self.measured(states).items():
             constraint, _ = self.limiting[k]
             use = _with_peaks_between(at_states, self.points)
@@ -294,9 +295,10 @@ class Checker:
             if k > Limit.CLEARANCE:
                 sampled.append(constraint.what)
             checks.append(check)
-            reached = use >= constraint.active_share
+
             if k == Limit.POSITION:
                 continue  # a joint may rest anywhere in its range
+            reached = use >= constraint.active_share
             anywhere |= reached.any(axis=1)
             active += [
                 ActiveLimit(constraint.what, i, float(share @ reached[:, i]), constraint.of_joints)
@@ -317,7 +319,7 @@ class Checker:
     ) -> tuple[Check, list[str]]:
         """Return the check of torques, and those of which nothing is proved between the states.
 
-        Where the proof succeeds, it decides on what lies between the states; elsewhere the peaks of cubics do.
+        Where the proof succeeds, it decides on the torques between the states; elsewhere the peaks of cubics do.
 
         Parameters
         ----------
@@ -340,40 +342,53 @@ class Checker:
         """Return the smallest factor c >= 1 of the duration with which limits that depend on velocity are kept.
 
         Infinite if a limit is exceeded even at rest. Only for motions from rest to rest.
+
+        The excess e(c), largest use less 1, is bracketed by e(low) > 0 >= e(high), and its root found by the Illinois
+        variant of regula falsi (Dowell and Jarratt 1971): where the same end is kept twice, its excess is halved. The
+        result is ``high``, at which the limits are kept. SciPy's brentq takes 0.2 s to be imported.
         """
         moving = [pair for pair in self.limiting.values() if pair[0].moving]
 
-        def over(c: float) -> float:
+        def excess(c: float) -> float:
             slower = states.slowed(c)
             uses = (constraint.use(slower, given) for constraint, given in moving)
             return max((float(np.max(_with_peaks_between(use, self.points))) - 1 for use in uses), default=-1.0)
 
         low = 1.0
-        over_low = over(1.0)
-        if over_low <= 0:
+        e_low = excess(low)
+        if e_low <= 0:
             return 1.0
+
+        # The distance of the factor from 1 grows fourfold until the limits are kept.
         high = 1.001
-        while (over_high := over(high)) > 0:
+        e_high = excess(high)
+        while e_high > 0:
             low = high
-            over_low = over_high
+            e_low = e_high
             high = 1 + 4 * (high - 1)
             if high > MAX_SLOW_DOWN:
                 return np.inf
-        # Regula falsi after Dowell and Jarratt 1971 (Illinois); SciPy's brentq takes 0.2 s to be imported.
-        kept = 0
-        while high - low > SLOW_DOWN_TOLERANCE and over_high < -SLOW_DOWN_TOLERANCE:
-            c = high - over_high * (high - low) / (over_high - over_low)
-            over_c = over(c)
-            if over_c > 0:
+            e_high = excess(high)
+
+        low_kept = 0
+        high_kept = 0
+        while high - low > SLOW_DOWN_TOLERANCE and e_high < -SLOW_DOWN_TOLERANCE:
+            c = high - e_high * (high - low) / (e_high - e_low)
+            e = excess(c)
+            if e > 0:
                 low = c
-                over_low = over_c
-                kept = max(kept, 0) + 1
-                over_high /= 2 if kept > 1 else 1
+                e_low = e
+                low_kept = 0
+                high_kept += 1
+                if high_kept > 1:
+                    e_high /= 2
             else:
                 high = c
-                over_high = over_c
-                kept = min(kept, 0) - 1
-                over_low /= 2 if kept < -1 else 1
+                e_high = e
+                high_kept = 0
+                low_kept += 1
+                if low_kept > 1:
+                    e_low /= 2
         return high
 
 
@@ -387,6 +402,7 @@ def _with_peaks_between(use: Array, points: int) -> Array:
 
 
 def _check(constraint: Constraint, limit: int, excess: Array, times: Array) -> Check:
+    """Return the check of a constraint with excesses (N, k) at times (N,), s: the largest one."""
     excess = np.where(np.isnan(excess), np.inf, excess)  # a limit whose use is not a number is not kept
     k, i = np.unravel_index(int(np.argmax(excess)), excess.shape)
     return Check(constraint.what, float(excess[k, i]), int(i), float(times[k]), constraint.of_joints, limit)
@@ -397,16 +413,20 @@ def _largest_jump(trajectory: Trajectory, limits: Limits) -> Check | None:
     inner = trajectory.breaks[1:-1]
     if not len(inner):
         return None
+
+    # Jumps are shares of the motion's own sizes: limits may be far larger.
+    fastest = np.abs(trajectory.qd(trajectory.breaks)).max(axis=0)
+    widest = np.abs(trajectory.q(trajectory.breaks)).max(axis=0)
+    strongest = float(np.abs(trajectory.qdd(trajectory.breaks)).max())
+    size_of_q = np.minimum(PositionLimit(limits).sizes, np.maximum(widest, SMALL))
+    size_of_qd = np.minimum(limits.velocity, np.maximum(fastest, SMALL))
+    size_of_qdd = np.where(np.isfinite(limits.jerk), max(strongest, SMALL_ACCELERATION), np.inf)
+
     found: list[Check] = []
-    # Shares of what the motion does: limits may be far larger.
-    speeds = np.abs(trajectory.qd(trajectory.breaks)).max(axis=0)
-    fastest = np.minimum(limits.velocity, np.maximum(speeds, SMALL))
-    widest = np.maximum(np.abs(trajectory.q(trajectory.breaks)).max(axis=0), SMALL)
-    largest = max(float(np.abs(trajectory.qdd(trajectory.breaks)).max()), 1e-3)
     for what, values, size in (
-        ("jump of position", trajectory.q, np.minimum(PositionLimit(limits).sizes, widest)),
-        ("jump of velocity", trajectory.qd, fastest),
-        ("jump of acceleration", trajectory.qdd, np.where(np.isfinite(limits.jerk), largest, np.inf)),
+        ("jump of position", trajectory.q, size_of_q),
+        ("jump of velocity", trajectory.qd, size_of_qd),
+        ("jump of acceleration", trajectory.qdd, size_of_qdd),
     ):
         jumps = np.abs(values(inner, "right") - values(inner, "left")) / size
         k, i = np.unravel_index(int(np.argmax(jumps)), jumps.shape)
@@ -418,6 +438,7 @@ def _largest_jump(trajectory: Trajectory, limits: Limits) -> Check | None:
 def _points_of_turns(description: Description, motion: Trajectory) -> int:
     """Return the number of states of a piece with which no joint turns by more than ``LARGEST_TURN`` between two."""
     _, rates = motion.pieces.differentiated(1).inside(POINTS)
+    # A joint turns by the mean of |qd| times the piece's duration.
     turns = np.abs(rates).mean(axis=1) * np.diff(motion.breaks)[:, None]
     most = float(turns[:, ~description.numbers.prismatic].max(initial=0.0))
     return int(min(most / LARGEST_TURN + 2, MAX_POINTS))
@@ -427,12 +448,13 @@ def _proved_check(motion: Trajectory, limits: Limits, kind: Limit) -> Check:
     """Return the check of positions or one of their derivatives: bounds of the polynomials, not samples."""
     pieces = motion.pieces.differentiated(int(kind))
     if kind is Limit.POSITION:
-        upper = limits.upper
         lower = limits.lower
+        upper = limits.upper
         size = PositionLimit(limits).sizes
     else:
-        upper = size = getattr(limits, kind.what)
-        lower = -upper
+        size = getattr(limits, kind.what)
+        lower = -size
+        upper = size
     found = pieces.bounds(PROVED * size)
     unit = np.where(np.isfinite(size), size, 1.0)  # joints without a limit: -inf
     above = (found.highest - upper) / unit
@@ -445,7 +467,7 @@ def _proved_check(motion: Trajectory, limits: Limits, kind: Limit) -> Check:
 
 
 def _time_shares(trajectory: Trajectory, states: States) -> Array:
-    """Return the share of the duration of each state by the trapezoidal rule, shape (N,)."""
+    """Return the share of the duration that each state stands for by the trapezoidal rule, shape (N,)."""
     K = len(trajectory.breaks) - 1
     weights = np.ones(len(states.times) // K)
     weights[[0, -1]] = 0.5

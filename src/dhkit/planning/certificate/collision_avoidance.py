@@ -39,10 +39,12 @@ from dhkit.planning.obstacles import (
 from dhkit.planning.second_check import Claim
 from dhkit.trajectories import Limits
 
-BETWEEN, MIN_BETWEEN = 0.1, 1e-3
-"""Share of the clearance, at least in m, by which a distance may fall below it between two states of a certificate."""
+BETWEEN = 0.1
+"""Share of the clearance by which a distance may fall below it between two states of a certificate."""
+MIN_BETWEEN = 1e-3
+"""The same in m; the larger of both counts."""
 MEASURED = 0.02
-"""Distance, m, beyond the required one up to which distances between shapes are measured, and not bounded."""
+"""Distance, m, beyond the required one up to which distances between shapes are measured; others are bounded."""
 KEPT_SHARE = 0.75
 """Share of a gap at an end of a motion to which the clearance is reduced there: a link may come a little nearer on its
 way out of a narrow place."""
@@ -59,14 +61,15 @@ def _without_slack(required: Array) -> Array:
 
 @dataclass(frozen=True)
 class ReducedClearance:
-    """A pair that is nearer than the clearance at the start or the goal of a motion, and what it keeps there."""
+    """A pair that is nearer than the clearance at the start or the goal of a motion, and the distances it keeps."""
 
     pair: Pair
     names: tuple[str, str]
-    """Names of the link and of what it is near."""
+    """Names of the link, and of the obstacle or link that it is near."""
     start: float
     """Distance to keep near the start, m; without effect where it is above the clearance."""
     goal: float
+    """Distance to keep near the goal, m; likewise."""
 
     def __str__(self) -> str:
         return f"{1000 * min(self.start, self.goal):.3g} mm between {self.names[0]} and {self.names[1]}"
@@ -108,7 +111,7 @@ class CollisionAvoidance:
         Raises
         ------
         ValueError, TypeError
-            A clearance that is negative, not finite or no number; a choice that is neither True nor False.
+            A clearance that is negative, not finite or not a number; a choice that is neither True nor False.
         """
         if isinstance(clearance, bool) or not isinstance(clearance, Real):
             raise TypeError(f"clearance is {clearance!r}; expected a number of at least 0, m")
@@ -117,9 +120,12 @@ class CollisionAvoidance:
         if not (math.isfinite(clearance) and clearance >= 0):
             raise ValueError(f"clearance is {clearance!r}; expected a number of at least 0, m")
         obstacles = check_obstacles(obstacles)
-        # Of copies, one is kept.
-        unlike = {(item.geometry, item.placement) if isinstance(item, Obstacle) else item: item for item in obstacles}
-        return cls(tuple(unlike.values()), float(clearance), bool(self_collision))
+        # One of each set of identical solids is kept.
+        distinct: dict[object, Obstacle | Floor] = {}
+        for item in obstacles:
+            key = (item.geometry, item.placement) if isinstance(item, Obstacle) else item
+            distinct[key] = item
+        return cls(tuple(distinct.values()), float(clearance), bool(self_collision))
 
     def __bool__(self) -> bool:
         return bool(self.obstacles) or self.self_collision
@@ -127,34 +133,45 @@ class CollisionAvoidance:
     @property
     def names(self) -> str:
         """Names of the obstacles, as text."""
-        counted = Counter([item.name for item in self.obstacles] + ["itself"] * self.self_collision)
+        names = [item.name for item in self.obstacles]
+        if self.self_collision:
+            names.append("itself")
+        counted = Counter(names)
         return ", ".join(name if count == 1 else f"{count} x {name}" for name, count in counted.items())
 
     def report(self, arm: Description, excess: float) -> dict[str, Any]:
         """Return the fields of a :class:`dhkit.planning.PlanReport`; ``excess`` is the certificate's, m."""
         if not self:
             return {}
+        clear_of = []
+        if self.obstacles:
+            clear_of.append("from obstacles")
+        if self.self_collision:
+            clear_of.append("between links")
+        reduced = (*self.reduced, *self._reduced_by_shapes)
         return {
             "clearance": self.clearance,
-            "clear_of": " and ".join(
-                ["from obstacles"] * bool(self.obstacles) + ["between links"] * self.self_collision
-            ),
+            "clear_of": " and ".join(clear_of),
             "spare_clearance": -excess,
-            "reduced_clearances": tuple(
-                str(reduced)
-                for reduced in (*self.reduced, *(pair for pair in self.by_shapes if pair.kept < self.clearance))
-            ),
+            "reduced_clearances": tuple(str(pair) for pair in reduced),
             "not_checked": not_checked(arm, self.obstacles, self.self_collision, self.clearance),
             "is_clearance_reduced_throughout": self.is_reduced_throughout,
         }
 
     @property
+    def _reduced_by_shapes(self) -> tuple[LinkClearance, ...]:
+        """Links that are measured by their shapes and keep less than the clearance."""
+        return tuple(pair for pair in self.by_shapes if pair.kept < self.clearance)
+
+    @property
     def kept_in_part(self) -> tuple[str, ...]:
-        """Where less than the clearance is kept, in words."""
+        """Places where less than the clearance is kept, in words."""
         where = "during the whole motion" if self.is_reduced_throughout else "near the ends"
-        near_ends = (f"all of the clearance {where}: {one}" for one in self.reduced if min(one.start, one.goal) > 0)
-        by_shapes = (pair for pair in self.by_shapes if pair.kept < self.clearance)
-        return (*near_ends, *(f"all of the clearance during the whole motion: {pair}" for pair in by_shapes))
+        near_ends = [pair for pair in self.reduced if min(pair.start, pair.goal) > 0]
+        return (
+            *(f"all of the clearance {where}: {pair}" for pair in near_ends),
+            *(f"all of the clearance during the whole motion: {pair}" for pair in self._reduced_by_shapes),
+        )
 
     def between(self, description: Description, start: Array, goal: Array) -> CollisionAvoidance:
         """Return the settings for a motion between two configurations (n,), with the reduced clearances of its ends.
@@ -164,21 +181,29 @@ class CollisionAvoidance:
         PlanningError
             A clearance larger than the space in which the arm moves.
         """
-        if self.clearance > (size := checked_pairs(description).size):
+        size = checked_pairs(description).size
+        if self.clearance > size:
             raise PlanningError(f"clearance is {self.clearance:.4g} m; the arm itself reaches over {size:.4g} m")
-        separation = Separation(description, self.obstacles, self.self_collision)
-        ends = separation.gaps(np.stack([start, goal])[:, None]).gap
-        reduced = []
-        for p in np.flatnonzero(ends.min(axis=0, initial=np.inf) < self.clearance):
-            pair = separation.pairs[p]
-            other = separation.capsules[pair.other].name if pair.other is not None else ""
-            names = separation.capsules[pair.capsule].name, other or self.obstacles[pair.obstacle or 0].name
-            reduced.append(ReducedClearance(pair, names, *(KEPT_SHARE * ends[:, p]).tolist()))
         at_ends = np.stack([start, goal])
+
+        separation = Separation(description, self.obstacles, self.self_collision)
+        gaps = separation.gaps(at_ends[:, None]).gap
+        reduced = []
+        for p in np.flatnonzero(gaps.min(axis=0, initial=np.inf) < self.clearance):
+            pair = separation.pairs[p]
+            if pair.other is not None:
+                near = separation.capsules[pair.other].name
+            else:
+                near = self.obstacles[pair.obstacle or 0].name
+            names = (separation.capsules[pair.capsule].name, near)
+            at_start, at_goal = (KEPT_SHARE * gaps[:, p]).tolist()
+            reduced.append(ReducedClearance(pair, names, at_start, at_goal))
+
         by_shapes = []
         for bodies in link_pairs(description).shapes if self.self_collision else ():
             gap = float(shape_distances(description, at_ends, bodies).min())
-            by_shapes.append(LinkClearance(bodies, self.clearance if gap >= self.clearance else KEPT_SHARE * gap))
+            kept = self.clearance if gap >= self.clearance else KEPT_SHARE * gap
+            by_shapes.append(LinkClearance(bodies, kept))
         return replace(self, reduced=tuple(reduced), by_shapes=tuple(by_shapes), ends=at_ends)
 
     def claims(self, description: Description) -> tuple[Claim, ...]:
@@ -186,41 +211,54 @@ class CollisionAvoidance:
 
         A clearance that is reduced at an end counts as reduced during the whole motion.
         """
+        return (*self._claims_beside_obstacles(description), *self._claims_between_links(description))
+
+    def _claims_beside_obstacles(self, description: Description) -> list[Claim]:
+        """Return the claimed distances of links from obstacles."""
         capsules = link_capsules(description)
-        with_obstacle: dict[tuple[int, int], float] = {}
-        with_link: dict[tuple[int, int], float] = {}
+
+        # Reduced distance of a link from an obstacle, m.
+        least: dict[tuple[int, int], float] = {}
         for reduced in self.reduced:
-            link = capsules[reduced.pair.capsule].link
-            gap = min(reduced.start, reduced.goal, self.clearance)
             if reduced.pair.other is None:
-                place = link, reduced.pair.obstacle or 0
-                with_obstacle[place] = min(gap, with_obstacle.get(place, gap))
-            else:
-                other = capsules[reduced.pair.other].link
-                place = min(link, other), max(link, other)
-                with_link[place] = min(gap, with_link.get(place, gap))
-        for pair in self.by_shapes:
-            links = pair.bodies[0].link, pair.bodies[1].link
-            with_link[links] = min(pair.kept, with_link.get(links, pair.kept))
+                place = (capsules[reduced.pair.capsule].link, reduced.pair.obstacle or 0)
+                gap = min(reduced.start, reduced.goal, self.clearance)
+                least[place] = min(gap, least.get(place, gap))
 
         claims = []
         for k, obstacle in enumerate(self.obstacles):
-            beside = {link for link, gap in standing(description, obstacle) if gap < self.clearance}
-            claims += [
-                Claim(link, obstacle, with_obstacle.get((link, k), self.clearance))
-                for link in range(1, description.n + 1)
-                if link not in beside
-            ]
-        if self.self_collision:
-            pairs = link_pairs(description)
-            named = {(a.link, b.link) for a, b in pairs.unchecked}
-            named |= {(a.link, b.link) for a, b, gap in pairs.steady if gap < self.clearance}
-            claims += [
-                Claim(b, a, with_link.get((a, b), self.clearance))
-                for a, b in combinations(range(description.n + 1), 2)
-                if b - a > 1 and (a, b) not in named
-            ]
-        return tuple(claims)
+            unchecked = {link for link, gap in standing(description, obstacle) if gap < self.clearance}
+            links = [link for link in range(1, description.n + 1) if link not in unchecked]
+            claims += [Claim(link, obstacle, least.get((link, k), self.clearance)) for link in links]
+        return claims
+
+    def _claims_between_links(self, description: Description) -> list[Claim]:
+        """Return the claimed distances between links that are not neighbours."""
+        if not self.self_collision:
+            return []
+        capsules = link_capsules(description)
+
+        # Reduced distance of two links, m.
+        least: dict[tuple[int, int], float] = {}
+        for reduced in self.reduced:
+            if reduced.pair.other is not None:
+                first = capsules[reduced.pair.capsule].link
+                second = capsules[reduced.pair.other].link
+                links = (min(first, second), max(first, second))
+                gap = min(reduced.start, reduced.goal, self.clearance)
+                least[links] = min(gap, least.get(links, gap))
+        for pair in self.by_shapes:
+            links = (pair.bodies[0].link, pair.bodies[1].link)
+            least[links] = min(pair.kept, least.get(links, pair.kept))
+
+        pairs = link_pairs(description)
+        unchecked = {(a.link, b.link) for a, b in pairs.unchecked}
+        unchecked |= {(a.link, b.link) for a, b, gap in pairs.steady if gap < self.clearance}
+        claims = []
+        for a, b in combinations(range(description.n + 1), 2):
+            if b - a > 1 and (a, b) not in unchecked:
+                claims.append(Claim(b, a, least.get((a, b), self.clearance)))
+        return claims
 
     @property
     def reduced_throughout(self) -> CollisionAvoidance:
@@ -238,19 +276,21 @@ class CollisionAvoidance:
         A pair that is nearer than the clearance at an end keeps less while its links are near where they are there.
         """
         need = np.full((len(q), len(pairs)), self.clearance)
-        if self.reduced and self.ends is not None:
-            axes = world_axes(description, q)
-            at_ends = world_axes(description, self.ends)
-            for p, kept in zip(range(len(pairs)), self.at_ends(pairs), strict=True):
-                links = [link for link in (pairs[p].capsule, pairs[p].other) if link is not None]
-                for end in np.flatnonzero(kept < self.clearance):
-                    travel = np.linalg.norm(axes[:, links] - at_ends[end, links], axis=-1).max(axis=(1, 2))
-                    near = (travel < LEAVING * self.clearance) | self.is_reduced_throughout
-                    need[near, p] = np.minimum(need[near, p], kept[end])
+        if not self.reduced or self.ends is None:
+            return need
+        axes = world_axes(description, q)
+        axes_at_ends = world_axes(description, self.ends)
+        for p, (pair, kept) in enumerate(zip(pairs, self.at_ends(pairs), strict=True)):
+            capsules = [capsule for capsule in (pair.capsule, pair.other) if capsule is not None]
+            for end in np.flatnonzero(kept < self.clearance):
+                # Distance of the capsules' axes from their places at that end of the motion.
+                travel = np.linalg.norm(axes[:, capsules] - axes_at_ends[end, capsules], axis=-1).max(axis=(1, 2))
+                near = (travel < LEAVING * self.clearance) | self.is_reduced_throughout
+                need[near, p] = np.minimum(need[near, p], kept[end])
         return need
 
     def shortfalls(self, states: States) -> Array:
-        """Return how much is missing of the required distances along a motion, shape (N,), m; by coal.
+        """Return the largest shortfall, required less measured distance, along a motion, shape (N,), m; by coal.
 
         At the states the distances themselves are required, and between them all but ``BETWEEN`` of them.
         """
@@ -264,17 +304,17 @@ class CollisionAvoidance:
         required = np.full(found.shape, self.clearance)
         if pairs:
             required[:, 1:] = self.required(description, states.q, pairs)
-        # Between two states, what is required at one of them.
+        # Between two states, the distance that is required at one of them.
         required_between = np.minimum(required, np.append(required[1:], required[-1:], axis=0))
         least = _without_slack(required_between)
         between = smallest_between(states, found, gaps, least)
-        missing = np.where(between < least, required_between - between, -np.inf)
-        short = np.maximum(required - found, missing).max(axis=1)
-        result: Array = np.maximum(short, self._shortfalls_of_shapes(states))
+        result: Array = np.maximum(
+            _largest_shortfall(required, found, required_between, between, least), self._shortfalls_of_shapes(states)
+        )
         return result
 
     def _shortfalls_of_shapes(self, states: States) -> Array:
-        """Return how much is missing of the distances between links that are measured by their shapes, (N,), m."""
+        """Return the largest shortfall of distances between links that are measured by their shapes, shape (N,), m."""
         if not self.by_shapes:
             return np.full(len(states.q), -np.inf)
         kept = np.array([pair.kept for pair in self.by_shapes])
@@ -287,14 +327,12 @@ class CollisionAvoidance:
         # A shape lies in its link's capsules, so that its points are at most a radius away from their axes.
         largest_radius = max(capsule.radius for capsule in link_capsules(states.description))
         between = smallest_between(states, found, gaps, least, largest_radius)
-        missing = np.where(between < least, kept - between, -np.inf)
-        shortfalls: Array = np.maximum(kept - found, missing).max(axis=1)
-        return shortfalls
+        return _largest_shortfall(kept, found, kept, between, least)
 
     def _shape_gaps(self, description: Description, q: Array, more: float) -> Array:
         """Return the distances of the links that are measured by their shapes, shape (N, E), m.
 
-        They are lower bounds where links are farther apart than they must be by ``more``, m.
+        They are lower bounds where they exceed the required distances by ``more``, m.
         """
         gaps = [shape_distances(description, q, pair.bodies, pair.kept + more) for pair in self.by_shapes]
         return np.stack(gaps, axis=1) if gaps else np.zeros((len(q), 0))
@@ -327,12 +365,29 @@ class CollisionAvoidance:
         gap = float(found.distance)
         if gap >= least and gap > 0:
             return
-        who, what = found.pair or ("the arm", "an obstacle")
+        link, obstacle = found.pair or ("the arm", "an obstacle")
         state = f"{1000 * gap:.3g} mm from" if gap > 0 else f"{-1000 * gap:.3g} mm inside"
-        raise PlanningError(f"{where}: {who} is {state} {what}, {1000 * self.clearance:.3g} mm are asked for")
+        raise PlanningError(f"{where}: {link} is {state} {obstacle}, {1000 * self.clearance:.3g} mm are asked for")
+
+
+def _largest_shortfall(required: Array, found: Array, required_between: Array, between: Array, least: Array) -> Array:
+    """Return the largest shortfall of distances at states and between them, shape (N,), m.
+
+    Parameters
+    ----------
+    required, found
+        Required and measured distances at the states, shape (N, G) or (G,) and (N, G), m.
+    required_between, between, least
+        Required distances after each state, the smallest ones found there, and those below which they count, m.
+    """
+    at_states = required - found
+    missing = np.where(between < least, required_between - between, -np.inf)
+    largest: Array = np.maximum(at_states, missing).max(axis=1)
+    return largest
 
 
 NO_AVOIDANCE = CollisionAvoidance()
+"""The settings of a motion in free space: without obstacles, and without distances between links."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -354,9 +409,9 @@ class Clearance(Constraint):
         return bool(self.avoidance)
 
     def measured(self, states: States, parameters: Array) -> Array:
-        """Return 1 plus what is missing of the required distances in m, shape (N, 1); at least 0."""
-        short = self.avoidance.shortfalls(states)
-        return 1 + np.maximum(short[:, None], -1.0)
+        """Return 1 plus the largest shortfall of the required distances in m, shape (N, 1); at least 0."""
+        shortfalls = self.avoidance.shortfalls(states)
+        return 1 + np.maximum(shortfalls[:, None], -1.0)
 
 
 def motion_constraints(

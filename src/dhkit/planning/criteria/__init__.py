@@ -1,4 +1,4 @@
-"""Criteria of motions: what is minimized, what is limited, and the states in which both are written."""
+"""Criteria of motions: objectives, constraints, and the states in which both are written."""
 
 from dhkit.planning.criteria.constraints import (
     Constraint,

@@ -31,13 +31,15 @@ def require_value(thing: object) -> None:
     Raises
     ------
     TypeError
-        Attributes that are no fields of a frozen dataclass, or a field that cannot be hashed.
+        Attributes that are not fields of a frozen dataclass, or a field that cannot be hashed.
     """
     kind = type(thing).__name__
     known = {field.name for field in fields(thing)} if is_dataclass(thing) else set()
-    if others := sorted({*getattr(thing, "__dict__", ())} - known):
+    others = sorted({*getattr(thing, "__dict__", ())} - known)
+    if others:
         raise TypeError(
-            f"{kind}.{others[0]} is no field; expected a class with @dataclass(frozen=True) and {others[0]}: ..."
+            f"{kind} has an attribute {others[0]} that is not a dataclass field; declare it in the body of a class "
+            f"with @dataclass(frozen=True)"
         )
     try:
         hash(thing)
@@ -88,7 +90,7 @@ class Constraint:
         Raises
         ------
         TypeError
-            They are no column of CasADi's symbols.
+            They are not a column of CasADi's symbols.
         """
         import casadi
 
@@ -104,7 +106,7 @@ class Constraint:
         Raises
         ------
         ValueError, TypeError
-            ``measured`` returned another shape, or no real numbers.
+            ``measured`` returned another shape, or values that are not real numbers.
         PlanningError
             It returned NaN: whether the limit is kept cannot be decided.
         """
@@ -126,7 +128,8 @@ class Constraint:
             Margins at P points as shares of the limit, shape (P, k).
         """
         high = 1 - shares
-        return -high if self.two_sided else np.full_like(high, -np.inf), high
+        low = -high if self.two_sided else np.full_like(high, -np.inf)
+        return low, high
 
     def size(self, description: Description) -> int:
         """Return the number of parameters."""
@@ -239,7 +242,7 @@ class JointLimit(Constraint):
 
     kind: Limit
     limit: Array
-    """Shape (n,), infinite where there is none."""
+    """Limit of each joint in the unit of the quantity, shape (n,); infinite where there is none."""
     two_sided = True
     of_joints = True
 
@@ -291,7 +294,7 @@ class PositionLimit(Constraint):
 
     @property
     def sizes(self) -> Array:
-        """Lengths that count as 1 outside the limits, shape (n,): the larger limit, at least 1 rad or m."""
+        """Lengths of which an excess is a share, shape (n,): the larger limit; 1 rad or m if it is 0 or infinite."""
         size = np.maximum(np.abs(self.limits.lower), np.abs(self.limits.upper))
         return np.where(np.isfinite(size) & (size > 0), size, 1.0)
 
@@ -307,15 +310,13 @@ class PositionLimit(Constraint):
 
 def joint_limits(limits: Limits) -> tuple[Constraint, ...]:
     """Return the constraints of the joint limits, in the order of :class:`Limit`."""
-    return (
-        PositionLimit(limits),
-        *(JointLimit(kind, getattr(limits, kind.what)) for kind in Limit if Limit.POSITION < kind <= Limit.TORQUE),
-    )
+    of_magnitude = (Limit.VELOCITY, Limit.ACCELERATION, Limit.JERK, Limit.TORQUE)
+    return (PositionLimit(limits), *(JointLimit(kind, getattr(limits, kind.what)) for kind in of_magnitude))
 
 
 @dataclass(frozen=True)
 class ToolSpeed(Constraint):
-    """Limit of the speed of the tool's origin, m/s."""
+    """Limit of the speed of the tool's origin, m/s: |v|^2 / limit^2 <= 1, which has a derivative at v = 0."""
 
     limit: float
 
@@ -341,7 +342,7 @@ class ToolSpeed(Constraint):
 
 @dataclass(frozen=True)
 class ToolAcceleration(Constraint):
-    """Limit of the magnitude of the acceleration of the tool's origin, m/s^2."""
+    """Limit of the acceleration of the tool's origin, m/s^2: |a|^2 / limit^2 <= 1."""
 
     limit: float
 
@@ -367,7 +368,10 @@ class ToolAcceleration(Constraint):
 
 @dataclass(frozen=True)
 class ToolDirection(Constraint):
-    """Limit of the angle between an axis of the tool and a direction in the world, as for carrying a full glass."""
+    """Limit of the angle between an axis of the tool and a direction in the world, as for carrying a full glass.
+
+    With the unit vectors a of the axis and n of the direction, cos angle = (R a) . n.
+    """
 
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     """Axis in the tool's frame."""
@@ -397,8 +401,11 @@ class ToolDirection(Constraint):
         return 3
 
     def values(self, description: Description, T_start: Array) -> Array:
-        """Return the parameters, shape (size,), without unit."""
-        return T_start[:3, :3] @ np.array(self.axis) if self.direction is None else np.array(self.direction)
+        """Return the direction in the world, shape (3,), without unit."""
+        if self.direction is not None:
+            return np.array(self.direction)
+        at_start: Array = T_start[:3, :3] @ np.array(self.axis)
+        return at_start
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
         """Return the limited expressions, k x 1, without unit: scaled so that the bound is 1."""
@@ -418,7 +425,11 @@ class ToolDirection(Constraint):
 
 @dataclass(frozen=True)
 class ToolOrientation(Constraint):
-    """Limit of the angle between the tool's orientation and that at the start."""
+    """Limit of the angle between the tool's orientation and that at the start.
+
+    The rotation R_start' R turns by the angle with trace(R_start' R) = 1 + 2 cos angle; the trace is the sum of the
+    products of both matrices' elements.
+    """
 
     tolerance: float = math.radians(2)
     """Largest angle, rad."""
@@ -441,7 +452,7 @@ class ToolOrientation(Constraint):
         return 9
 
     def values(self, description: Description, T_start: Array) -> Array:
-        """Return the parameters, shape (size,), without unit."""
+        """Return the orientation at the start, column by column, shape (9,), without unit."""
         return T_start[:3, :3].ravel(order="F")
 
     def rows(self, point: Point, parameters: casadi.SX) -> casadi.SX:
@@ -459,12 +470,13 @@ class ToolOrientation(Constraint):
 
 
 def _share_of_angle(cosine: Any, tolerance: float) -> Any:
-    """Return (1 - cos angle) / (1 - cos tolerance)."""
+    """Return (1 - cos angle) / (1 - cos tolerance), which is smooth at the angle 0 and 1 at the tolerance."""
     return (1 - cosine) / (1 - math.cos(tolerance))
 
 
 def _angle_use_text(use: float, tolerance: float) -> str:
-    angle = math.acos(max(-1.0, 1 - use * (1 - math.cos(tolerance))))
+    cosine = 1 - use * (1 - math.cos(tolerance))
+    angle = math.acos(max(-1.0, cosine))
     return f"{math.degrees(angle):.4g} deg off, {math.degrees(tolerance):.4g} deg are"
 
 

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     import casadi
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
-"""Gauss-Legendre rule of 5 points, exact to degree 9: for squared jerk, and nearly so for squared torques."""
+"""Nodes and weights of the Gauss-Legendre rule of 5 points on [-1, 1]. It is exact to degree 9: for squared jerk, and
+nearly so for squared torques."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class Term:
 
     def integrand(self, point: Point) -> casadi.SX:
         """Return the integrand over time, 1 x 1, unit of the term over s, of terms that have one."""
-        raise NotImplementedError(f"{type(self).__name__} is no integral of a function of the state")
+        raise NotImplementedError(f"{type(self).__name__} is not an integral of a function of the state")
 
     def positive_parts(self, point: Point) -> casadi.SX:
         """Return quantities whose positive parts are added to the integrand, k x 1, unit of the term over s.
@@ -170,14 +171,20 @@ class Energy(Term):
     @property
     def constants(self) -> tuple[float, ...]:
         """The motor constants, one for all joints or one for each."""
-        return self.motor_constants if isinstance(self.motor_constants, tuple) else (self.motor_constants,)
+        constants = self.motor_constants
+        return constants if isinstance(constants, tuple) else (constants,)
 
     def integrand(self, point: Point) -> casadi.SX:
-        """Return what electrical power is besides :meth:`positive_parts`, 1 x 1, W.
+        """Return the electrical power less :meth:`positive_parts`, 1 x 1, W; its integral up to a constant.
 
-        The joints' work, the integral of P = tau qd, is what the arm's energy gains and friction takes, so that of the
-        positive power (P + abs P) / 2 only abs P and the dissipation depend on the motion. With P itself, the optimizer
-        would find motions for which the quadrature is inaccurate.
+        With the joints' power P = tau . qd and the power D that friction takes, the work is the arm's gain of energy
+        and the loss,
+
+            integral P dt = E_end - E_begin + integral D dt,
+
+        and the ends are given. Fed back, P therefore costs as much as D. If not, the sum of the positive parts P+ of
+        the joints' powers costs as much as P+ + (D - P) / 2, since P+ = (P + abs P) / 2 and abs P = 2 P+ - P. With P or
+        P+ alone, the optimizer would find motions for which the quadrature is inaccurate.
         """
         import casadi
 
@@ -187,10 +194,14 @@ class Energy(Term):
             raise ValueError(
                 "Energy: without motor constants, friction or power that is lost all motions cost the same"
             )
-        total = point.dissipation
-        if not self.regenerates:
-            total = (total - casadi.dot(point.tau, point.qd)) / 2
+        D = point.dissipation
+        if self.regenerates:
+            total = D
+        else:
+            P = casadi.dot(point.tau, point.qd)
+            total = (D - P) / 2
         if constants:
+            # A winding loses (tau_m / k)^2 with the motor's torque tau_m = tau / gear.
             total += casadi.sumsqr(point.tau / (_each("Energy", "motor constants", constants, n) * point.gear))
         return total
 
@@ -298,9 +309,12 @@ class Objective:
 
     def unit(self, prismatic: NDArray[np.bool_]) -> str:
         """Return the unit of the value for an arm with such joints, shape (n,); empty for a sum and mixed joints."""
-        revolute, slides = self.terms[0].units
-        unit = revolute if not prismatic.any() else slides if prismatic.all() or revolute == slides else ""
-        return unit if len(self.terms) == 1 else ""
+        if len(self.terms) > 1:
+            return ""
+        if_revolute, if_prismatic = self.terms[0].units
+        if not prismatic.any() or if_revolute == if_prismatic:
+            return if_revolute
+        return if_prismatic if prismatic.all() else ""
 
     @property
     def time_weight(self) -> float:
@@ -365,7 +379,10 @@ def size_of(objective: Objective, trajectory: Trajectory, arm: LoadedArm, fricti
 def _rates(
     objective: Objective, trajectory: Trajectory, arm: LoadedArm, friction: Friction | None
 ) -> tuple[list[Array], Array]:
-    """Return each term's integrand at the quadrature's nodes, shape (N,), and the weights of the nodes, s."""
+    """Return each term's integrand at the quadrature's nodes, shape (N,), and the weights of the nodes, s.
+
+    In a piece of duration h from t0, integral f dt = h/2 sum_i w_i f(t0 + h (x_i + 1) / 2).
+    """
     h = np.diff(trajectory.breaks)[:, None]
     times = trajectory.breaks[:-1, None] + h * (NODES + 1) / 2
     weights = (h * WEIGHTS / 2).ravel()

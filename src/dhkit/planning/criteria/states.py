@@ -62,7 +62,8 @@ class Point:
 
         if self.friction is None:
             return casadi.SX(0)
-        return casadi.dot(self.tau - self._torque(self._functions.layered(payload=bool(self.load.numel()))), self.qd)
+        without_friction = self._torque(self._functions.layered(payload=bool(self.load.numel())))
+        return casadi.dot(self.tau - without_friction, self.qd)
 
     def _torque(self, functions: CasadiFunctions) -> casadi.SX:
         load = self.load
@@ -81,7 +82,7 @@ class Point:
 
     @cached_property
     def tool_acceleration(self) -> casadi.SX:
-        """The acceleration of the tool's origin, 3 x 1, m/s^2, world axes."""
+        """The acceleration of the tool's origin, 3 x 1, m/s^2, world axes: of v(q, qd), dv/dq qd + dv/dqd qdd."""
         import casadi
 
         v = self.tool_velocity
@@ -196,7 +197,12 @@ class States:
         return other
 
     def slowed(self, c: float) -> States:
-        """Return the states of the motion slowed down c times, with torques g + (tau - g) / c^2."""
+        """Return the states of the motion slowed down c times.
+
+        Of q(t / c) a derivative of order k is divided by c^k. Torques of inertia are linear in qdd and quadratic in qd,
+        so that without friction tau = g + (tau(c = 1) - g) / c^2 (Hollerbach 1984, Dynamic scaling of manipulator
+        trajectories).
+        """
         slower = replace(self, times=self.times * c, qd=self.qd / c, qdd=self.qdd / c**2, jerk=self.jerk / c**3)
         slower = replace(slower, motion=None)  # their joint values are the same, and so is the clearance
         known: dict[str, Any] = slower.__dict__
@@ -210,6 +216,7 @@ class States:
 
     @cached_property
     def _rigid(self) -> Array:
+        """Joint torques without friction, shape (N, n), N m and N, with those of the drives' coupled inertias."""
         model = _model(self.description)
         if model is None:
             return dynamics.inverse_dynamics(self.description, self.q, self.qd, self.qdd)
@@ -225,6 +232,7 @@ class States:
 
     @cached_property
     def _tool(self) -> tuple[Array, Array, Array]:
+        """Poses, velocities v = J qd and accelerations a = J qdd + Jd qd of the tool."""
         model = _model(self.description)
         if model is None:
             J = kinematics.jacobian(self.description, self.q)[:, :3]

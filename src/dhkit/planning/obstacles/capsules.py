@@ -25,8 +25,10 @@ MERGE_RATIO = 1.25
 """Largest ratio of volumes, of a common capsule over two capsules, with which the two are merged."""
 RIM_CORNERS = 24
 """Number of corners of the polygon around a cylinder's rim, which is 0.9 % wider than the rim."""
-THICKNESS, LEAST_THICKNESS = 1e-6, 1e-6
-"""Thickness of a flat mesh: share of its size, and at least this, m."""
+THICKNESS = 1e-6
+"""Thickness that a flat mesh is given, as a share of its size."""
+LEAST_THICKNESS = 1e-6
+"""Smallest thickness that a flat mesh is given, m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,13 +46,15 @@ class Enclosure:
     """A capsule around balls."""
 
     start: Array
-    """Centre of one half ball, shape (3,), m."""
+    """Centre of the half ball at one end, shape (3,), m."""
     end: Array
+    """Centre of the half ball at the other end, shape (3,), m."""
     radius: float
+    """Radius, m."""
 
     @property
     def volume(self) -> float:
-        """Volume, m^3."""
+        """Volume, m^3: pi r^2 (length + 4/3 r)."""
         length = float(np.linalg.norm(self.end - self.start))
         return float(np.pi * self.radius**2 * (length + 4 / 3 * self.radius))
 
@@ -60,11 +64,17 @@ def enclose(balls: Balls) -> Enclosure:
 
     A capsule is convex, so it contains the convex hull of the balls that it contains.
     """
-    return min((_about(balls, R[:, 2], _middle(balls, R)) for R in _candidates(balls)), key=lambda c: c.volume)
+    capsules = [_about(balls, R[:, 2], _middle(balls, R)) for R in _candidates(balls)]
+    return min(capsules, key=lambda capsule: capsule.volume)
 
 
 def refine(balls: Balls) -> Enclosure:
-    """Return the capsule of :func:`enclose`, or a smaller one with a tilted axis."""
+    """Return the capsule of :func:`enclose`, or a smaller one with a tilted axis.
+
+    The axis is tilted by x_1 and x_2 and moved aside by x_3 and x_4 times the radius: in the frame R of the best axis
+    through the point m, along R (x_1, x_2, 1) through m + radius R (x_3, x_4, 0). The simplex search of Nelder and Mead
+    (1965) looks for the smallest volume.
+    """
     from scipy.optimize import minimize
 
     ranked = sorted(_candidates(balls), key=lambda R: _about(balls, R[:, 2], _middle(balls, R)).volume)
@@ -115,14 +125,23 @@ def _about(balls: Balls, axis: Array, middle: Array) -> Enclosure:
     offset = balls.centres - middle
     along = offset @ axis
     aside = np.linalg.norm(offset - along[:, None] * axis, axis=1)
-    radii = RADII[:, None] * np.max(aside + balls.radii)
-    # A ball at the distance e from the axis is inside if its centre is within r - rho of the segment.
-    reach = np.sqrt(np.maximum((radii - balls.radii) ** 2 - aside**2, 0.0))
-    low = np.min(along + reach, axis=1)
-    high = np.max(along - reach, axis=1)
-    low, high = np.where(low < high, low, (low + high) / 2), np.where(low < high, high, (low + high) / 2)
-    best = np.argmin(radii[:, 0] ** 2 * (high - low + 4 / 3 * radii[:, 0]))
-    return Enclosure(middle + low[best] * axis, middle + high[best] * axis, float(radii[best, 0]))
+    r = RADII[:, None] * np.max(aside + balls.radii)
+
+    # A ball of radius rho beside the axis by e is inside if its centre is within r - rho of the segment [low, high]:
+    #   low <= along + w  and  high >= along - w,    w^2 = (r - rho)^2 - e^2.
+    w = np.sqrt(np.maximum((r - balls.radii) ** 2 - aside**2, 0.0))
+    low = np.min(along + w, axis=1)
+    high = np.max(along - w, axis=1)
+
+    # Where low > high, one ball contains all.
+    middles = (low + high) / 2
+    is_segment = low < high
+    low = np.where(is_segment, low, middles)
+    high = np.where(is_segment, high, middles)
+
+    # The smallest volume / pi.
+    best = np.argmin(r[:, 0] ** 2 * (high - low + 4 / 3 * r[:, 0]))
+    return Enclosure(middle + low[best] * axis, middle + high[best] * axis, float(r[best, 0]))
 
 
 class LinkBody(NamedTuple):
@@ -226,9 +245,10 @@ def _link_capsules(description: Description, meshes: MeshVersions) -> tuple[Link
         for group in _merge_groups([_balls(part) for part in parts]):
             # In the body's own frame, so that the capsules of a link stay the same when it is locked to another.
             fit = refine(group)
-            start, end = (T[:3, :3] @ point + T[:3, 3] for point in (fit.start, fit.end))
-            for point in (start, end):
-                point.setflags(write=False)
+            start = T[:3, :3] @ fit.start + T[:3, 3]
+            end = T[:3, :3] @ fit.end + T[:3, 3]
+            start.setflags(write=False)
+            end.setflags(write=False)
             capsules.append(LinkCapsule(body, start, end, fit.radius))
     return tuple(capsules)
 
@@ -242,10 +262,13 @@ def _merge_groups(groups: list[Balls]) -> list[Balls]:
             volumes[members] = enclose(_merge(groups, members)).volume
         return volumes[members]
 
+    def additional(pair: tuple[frozenset[int], frozenset[int]]) -> float:
+        first, second = pair
+        return volume(first | second) - volume(first) - volume(second)
+
     sets = [frozenset([i]) for i in range(len(groups))]
     while len(sets) > 1:
-        pairs = list(combinations(sets, 2))
-        first, second = min(pairs, key=lambda pair: volume(pair[0] | pair[1]) - volume(pair[0]) - volume(pair[1]))
+        first, second = min(combinations(sets, 2), key=additional)
         if len(sets) <= MAX_CAPSULES and volume(first | second) > MERGE_RATIO * (volume(first) + volume(second)):
             break
         sets = [members for members in sets if members not in (first, second)] + [first | second]
@@ -253,6 +276,7 @@ def _merge_groups(groups: list[Balls]) -> list[Balls]:
 
 
 def _merge(groups: list[Balls], members: frozenset[int]) -> Balls:
+    """Return the balls of some groups as one group."""
     return Balls(
         np.concatenate([groups[i].centres for i in sorted(members)]),
         np.concatenate([groups[i].radii for i in sorted(members)]),
@@ -284,7 +308,10 @@ def _balls(part: Part) -> Balls:
 
 
 def _rims(radius: float, length: float) -> Array:
-    """Return the corners of polygons around a cylinder's two rims."""
+    """Return the corners of polygons around a cylinder's two rims.
+
+    The sides of a regular polygon of N corners touch the rim if its corners are at radius / cos(pi / N).
+    """
     angles = 2 * np.pi * np.arange(RIM_CORNERS) / RIM_CORNERS
     x, y = np.array([np.cos(angles), np.sin(angles)]) * radius / np.cos(np.pi / RIM_CORNERS)
     return np.concatenate([np.stack([x, y, np.full(RIM_CORNERS, z)], axis=1) for z in (-length / 2, length / 2)])

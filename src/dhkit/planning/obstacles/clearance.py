@@ -43,8 +43,8 @@ class Distances:
     itself: Array
     """Smallest distance between two links, shape (...), m; inf unless requested."""
     not_checked: tuple[str, ...] = ()
-    """What the distances do not include: links without a shape, what overlaps in all sampled
-    configurations, and parts whose distance no motion changes."""
+    """Distances that are not included: of links without a shape, of links that overlap in all sampled
+    configurations, and of parts whose distance no motion changes."""
 
     def __repr__(self) -> str:
         if self.pair is None:
@@ -60,8 +60,9 @@ class Distances:
 def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self_collision: bool = False) -> Distances:
     """Return exact distances of an arm's capsules from obstacles, and from each other.
 
-    What no motion changes is left out, see :class:`dhkit.planning.obstacles.pairs.CheckedPairs`: the base, for example,
-    and the foot of an arm on the floor. Links whose capsules are too wide are measured by their shapes.
+    Distances that no motion changes are left out, see :class:`dhkit.planning.obstacles.pairs.CheckedPairs`: those of
+    the base, for example, and of the foot of an arm on the floor. Links whose capsules are too wide are measured by
+    their shapes.
 
     Parameters
     ----------
@@ -100,7 +101,8 @@ def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self
     finite = np.all(np.isfinite(rows), axis=1)
     capsules = link_capsules(description)
     axes = world_axes(description, rows[finite])
-    found, names = [], []
+    found: list[Nearest] = []
+    names: list[list[tuple[str, str]]] = []
     for obstacle in obstacles:
         found.append(_from_one(description, capsules, axes, obstacle))
         names.append(_pair_names(description, capsules, obstacle))
@@ -133,7 +135,7 @@ def distance(description: Description, q: ArrayLike, obstacles: Scene = (), self
 def _not_checked_beside(
     description: Description, obstacles: Sequence[Obstacle | Floor], self_collision: bool, found: Array
 ) -> tuple[str, ...]:
-    """Return what distances (N, m) of an arm do not include, as far as it may be nearer than the smallest of them."""
+    """Return the parts of an arm left out of distances (N, m), if they may be nearer than the smallest of these."""
     finite = found[np.isfinite(found)]
     return not_checked(description, obstacles, self_collision, float(finite.min(initial=np.inf)))
 
@@ -141,7 +143,7 @@ def _not_checked_beside(
 def not_checked(
     description: Description, obstacles: Sequence[Obstacle | Floor], self_collision: bool, nearer_than: float
 ) -> tuple[str, ...]:
-    """Return what distances of an arm do not include, in words.
+    """Return the parts of an arm that are left out of its distances, in words.
 
     Parameters
     ----------
@@ -161,7 +163,8 @@ def not_checked(
     for a, b, gap in link_pairs(description).steady if self_collision else ():
         if gap < nearer_than:
             words.append(f"parts of {pair_text(a, b)}, {1000 * gap:.3g} mm apart in all configurations")
-    if self_collision and (overlapping := link_pairs(description).unchecked_text):
+    overlapping = link_pairs(description).unchecked_text if self_collision else ""
+    if overlapping:
         words.append(f"{overlapping}, which overlap in all sampled configurations")
     return tuple(words)
 
@@ -190,13 +193,11 @@ def smallest_distances(
         least = np.minimum(least, _from_itself(capsules, axes, pairs)[0])
     solids = [(k, item) for k, item in enumerate(obstacles) if isinstance(item, Obstacle)]
     for is_box in (False, True):
-        beside = [
-            (i, item)
-            for k, item in solids
-            if isinstance(item.geometry, Box) == is_box
-            for i in capsules_beside(description, item)
-            if (i, k, None) not in left_out
-        ]
+        beside: list[tuple[int, Obstacle]] = []
+        for k, solid in solids:
+            if isinstance(solid.geometry, Box) == is_box:
+                capsules_of = capsules_beside(description, solid)
+                beside += [(i, solid) for i in capsules_of if (i, k, None) not in left_out]
         if beside:
             least = _nearer(capsules, axes, beside, least)
     return least
@@ -210,24 +211,27 @@ def _nearer(
     solids = Solids.of([item for _, item in beside])
     radii = np.array([capsules[i].radius for i in which])
     half_lengths = np.array([capsules[i].length / 2 for i in which])
-    away = np.stack(
-        [
-            np.linalg.norm(axes[:, i].mean(axis=1) - centre, axis=1)
-            for i, centre in zip(which, solids.centres, strict=True)
-        ],
-        axis=1,
-    )
-    # Balls around the solids and the capsules bound the distances from below, their centres from above.
+    away = np.empty((len(axes), len(which)))
+    for p, (i, centre) in enumerate(zip(which, solids.centres, strict=True)):
+        away[:, p] = np.linalg.norm(axes[:, i].mean(axis=1) - centre, axis=1)
+
+    # A distance is at most that of the middles less the radii, and at least that of the balls around both solids. Pairs
+    # whose least is above the smallest of the most in a state are not the nearest there.
     bound = np.minimum(least, (away - radii - solids.radii).min(axis=1))
     low = away - radii - half_lengths - solids.bounds
-    rows, p = np.nonzero(low <= bound[:, None] + EQUAL_BOUNDS)
-    low, high = (bounds - radii[p] for bounds in axis_bounds(solids[p], axes[rows, which[p]]))
+    rows, pairs = np.nonzero(low <= bound[:, None] + EQUAL_BOUNDS)
+
+    # The same with closer bounds.
+    lower, upper = axis_bounds(solids[pairs], axes[rows, which[pairs]])
+    low = lower - radii[pairs]
+    high = upper - radii[pairs]
     np.minimum.at(bound, rows, high)
     is_candidate = low <= bound[rows] + EQUAL_BOUNDS
-    rows, p = rows[is_candidate], p[is_candidate]
+    rows = rows[is_candidate]
+    pairs = pairs[is_candidate]
     result = least.copy()
-    for pair in np.unique(p):
-        at = rows[p == pair]
+    for pair in np.unique(pairs):
+        at = rows[pairs == pair]
         i, item = beside[pair]
         result[at] = np.minimum(result[at], obstacle_distances(radii[pair], axes[at, i], item))
     return result
@@ -269,16 +273,18 @@ def _heights(
     without: Collection[int],
 ) -> Array:
     """Return the heights of the checked ends of capsules above a floor, shape (N, m), m; inf for those left out."""
-    heights = [
-        np.full(len(axes), np.inf) if i in without else axes[:, i, end, 2] - capsules[i].radius - floor.height
-        for i, end in ends_above(description, floor.height)
-    ]
-    return np.stack(heights, axis=1) if heights else np.full((len(axes), 0), np.inf)
+    ends = ends_above(description, floor.height)
+    heights = np.full((len(axes), len(ends)), np.inf)
+    for k, (i, end) in enumerate(ends):
+        if i not in without:
+            heights[:, k] = axes[:, i, end, 2] - capsules[i].radius - floor.height
+    return heights
 
 
 def _from_itself(capsules: tuple[LinkCapsule, ...], axes: Array, pairs: tuple[tuple[int, int], ...]) -> Nearest:
     """Return the distances between links; the candidates are the pairs."""
-    first, second = [i for i, _ in pairs], [j for _, j in pairs]
+    first = [i for i, _ in pairs]
+    second = [j for _, j in pairs]
     radii = [(capsules[i].radius, capsules[j].radius) for i, j in pairs]
     gaps = segment_distances(axes[:, first], axes[:, second]) - np.array(radii).reshape(-1, 2).sum(axis=1)
     return _exact(
@@ -299,6 +305,7 @@ def _exact(bounds: Bounds, measure: Callable[[int, NDArray[np.int_]], Array]) ->
 
 
 def _smallest(distances: Array) -> Nearest:
+    """Return the smallest of distances (N, m) in each state, infinite without candidates."""
     if not distances.shape[1]:
         return np.full(len(distances), np.inf), np.zeros(len(distances), dtype=int)
     return distances.min(axis=1), distances.argmin(axis=1)

@@ -18,22 +18,25 @@ from dhkit.planning.obstacles.solids import obstacle_distances, segment_distance
 SAMPLES = 4000
 """Number of random configurations from which the pairs are chosen."""
 SEED = 0
+"""Seed of the random configurations: an arm has the same pairs in every run."""
 OVERLAP_SHARE = 0.4
 """Share of configurations with an overlap from which two capsules are too wide for the shapes in them."""
 SHAPE_SAMPLES = 200
 """Number of configurations in which the shapes of two links are measured."""
 STEADY = 1e-3
-"""Change of a distance over all configurations, m, below which no motion matters to it: a proof is tried."""
+"""Change of a distance over all sampled configurations, m, below which a proof that no motion matters is tried."""
 MOST_JOINTS = 2
 """Number of joints between two links up to which their distance is computed on a grid."""
 GRID = 256
 """Number of values of a joint on that grid."""
 STILL = 1e-9
 """Largest travel, as a share of a capsule's largest coordinate, that is rounding."""
-LEAST_TURN, LEAST_STROKE = 0.2, 0.1
-"""Ranges of joints, rad and as a share of the reach, that are sampled at least."""
+LEAST_TURN = 0.2
+"""Smallest range of a revolute joint that is sampled, rad."""
+LEAST_STROKE = 0.1
+"""Smallest range of a prismatic joint that is sampled, as a share of the arm's reach."""
 STANDING_SAMPLES = 400
-"""Number of configurations in which an arm that stands in an obstacle overlaps it."""
+"""Number of configurations from which an arm is found to stand in an obstacle: it overlaps it in all of them."""
 FOOT = LinkBody(0)
 """The base itself, without links that were locked to it."""
 MAX_OBSTACLES = 65_536
@@ -42,7 +45,7 @@ MAX_OBSTACLES = 65_536
 
 @dataclass(frozen=True)
 class CheckedPairs:
-    """What is checked of an arm against obstacles and the floor: indices of ``link_capsules(description)``.
+    """Capsules of an arm that are checked against obstacles and the floor: indices of ``link_capsules(description)``.
 
     - Obstacles: capsules with an end that moves; so never the base's, nor a shoulder's that turns about its own axis.
     - Floor: ends whose height changes.
@@ -105,9 +108,10 @@ def pair_text(first: LinkBody, second: LinkBody) -> str:
 
 
 class Pair(NamedTuple):
-    """A capsule of the arm, by its index, and what it must stay away from."""
+    """A capsule of the arm, and the obstacle or other capsule from which it keeps a distance."""
 
     capsule: int
+    """Index of the capsule."""
     obstacle: int | None
     """Index of an obstacle, or None for another capsule."""
     other: int | None = None
@@ -127,8 +131,9 @@ def _checked_pairs(description: Description, meshes: MeshVersions) -> CheckedPai
     if not axes.shape[1]:
         return CheckedPairs((), (), 0.0)
     size = float(np.ptp(axes.reshape(-1, 3), axis=0).max())
-    travels = np.ptp(axes, axis=0)  # of each end of each capsule along x, y and z
-    # Each beside its own coordinates: a slide without sensible limits takes others a million kilometres away.
+    # Travel of each end of each capsule along x, y and z, compared with its own coordinates: a prismatic joint without
+    # sensible limits takes others a million kilometres away.
+    travels = np.ptp(axes, axis=0)
     rounding = STILL * np.abs(axes).max(axis=(0, 2, 3), initial=0.0)
     moves = travels > rounding[:, None, None]
     return CheckedPairs(
@@ -172,7 +177,9 @@ def _link_pairs(description: Description, meshes: MeshVersions) -> LinkPairs:
             gap = segment_distances(axes[:, i], axes[:, j]) - capsules[i].radius - capsules[j].radius
             if np.mean(gap < 0) > OVERLAP_SHARE:
                 has_wide = True
-            elif np.ptp(gap) > STEADY or (least := _least_of_turns(description, i, j)) is None:
+                continue
+            least = _least_of_turns(description, i, j) if np.ptp(gap) <= STEADY else None
+            if least is None:
                 narrow.append((i, j))
             else:
                 same = min(same, float(gap.min()), least)
@@ -192,10 +199,12 @@ def _link_pairs(description: Description, meshes: MeshVersions) -> LinkPairs:
 
 def _chain_order(description: Description) -> dict[LinkBody, int]:
     """Return the place of each body along the chain, from 0: a joint, moving or locked, connects neighbours."""
-    numbers: dict[int, int] = {}
+    last: dict[int, int] = {}
     for capsule in link_capsules(description):
-        numbers[capsule.link] = max(capsule.body.number, numbers.get(capsule.link, 0))
-    bodies = [LinkBody(link, k) for link in range(description.n + 1) for k in range(numbers.get(link, 0) + 1)]
+        last[capsule.link] = max(capsule.body.number, last.get(capsule.link, 0))
+    bodies: list[LinkBody] = []
+    for link in range(description.n + 1):
+        bodies += [LinkBody(link, k) for k in range(last.get(link, 0) + 1)]
     return {body: place for place, body in enumerate(bodies)}
 
 
@@ -213,8 +222,9 @@ def _axes_in_whole_turns(description: Description) -> Array:
 def _axes_with_locked_joints_turned(description: Description, q: Array) -> Array:
     """Return the axes of capsules at q, shape (N, n), of which locked joints turn at random.
 
-    They count as joints that turn if they slid: so what moves beside an obstacle or a floor is the same in a locked arm
-    and in the whole arm.
+    Locked prismatic joints count as revolute ones: so the same parts move beside an obstacle or a floor in a locked arm
+    and in the whole arm. A turn by an angle about the axis z through p takes a point x to R (x - p) + p, with the
+    rotation R of that angle about z.
     """
     from scipy.spatial.transform import Rotation
 
@@ -224,24 +234,29 @@ def _axes_with_locked_joints_turned(description: Description, q: Array) -> Array
     frames = {(part.link, part.body): part.T_link_body for part in link_parts(description)}
     bodies = [capsule.body for capsule in link_capsules(description)]
     rng = np.random.default_rng(SEED)
-    last = {link: max(number for other, number in frames if other == link) for link, _ in frames}
-    locked = [(link, k) for link in sorted(last, reverse=True) for k in range(last[link], 0, -1)]
-    # From the tip to the base, so that no axis has been moved before it turns what is behind it.
-    for link, joint in locked:
-        # Joint k of a link's bodies turns about z of body k - 1, in the modified convention about z of body k.
-        T = frames.get((link, joint - 1 if description.convention is Convention.STANDARD else joint))
-        carried = [
-            i for i, body in enumerate(bodies) if body.link > link or (body.link == link and body.number >= joint)
-        ]
-        if T is None:  # of a link without shapes: its axis is not known, and everything behind it moves
-            size = float(np.ptp(axes.reshape(-1, 3), axis=0).max(initial=0.0)) or 1.0
-            axes[:, carried] += rng.uniform(-size, size, (count, 1, 1, 3))
-        else:
+    last: dict[int, int] = {}
+    for link, number in frames:
+        last[link] = max(number, last.get(link, 0))
+
+    # From the tip to the base, so that no axis has been moved before it turns the links after it.
+    for link in sorted(last, reverse=True):
+        for joint in range(last[link], 0, -1):
+            # Joint k of a link's bodies turns about z of body k - 1, in the modified convention about z of body k.
+            T = frames.get((link, joint - 1 if description.convention is Convention.STANDARD else joint))
+            carried = []
+            for i, body in enumerate(bodies):
+                if body.link > link or (body.link == link and body.number >= joint):
+                    carried.append(i)
+            if T is None:  # of a link without shapes: its axis is not known, and all links after it move
+                size = float(np.ptp(axes.reshape(-1, 3), axis=0).max(initial=0.0)) or 1.0
+                axes[:, carried] += rng.uniform(-size, size, (count, 1, 1, 3))
+                continue
             T_world = links[:, link] @ T
-            turns = rng.uniform(-np.pi, np.pi, (count, 1))
-            R = Rotation.from_rotvec(turns * T_world[:, :3, 2]).as_matrix()
-            point = T_world[:, None, None, :3, 3]
-            axes[:, carried] = (axes[:, carried] - point) @ np.swapaxes(R, -1, -2)[:, None] + point
+            z = T_world[:, :3, 2]
+            p = T_world[:, None, None, :3, 3]
+            angles = rng.uniform(-np.pi, np.pi, (count, 1))
+            R = Rotation.from_rotvec(angles * z).as_matrix()
+            axes[:, carried] = (axes[:, carried] - p) @ np.swapaxes(R, -1, -2)[:, None] + p
     return axes
 
 
@@ -280,11 +295,12 @@ def _least_of_turns(description: Description, i: int, j: int) -> float | None:
     inner_ends = np.broadcast_to(np.stack([capsules[i].start, capsules[i].end]), outer_ends.shape)
     gap = segment_distances(inner_ends, outer_ends) - capsules[i].radius - capsules[j].radius
 
+    # The distance between two values of the grid differs by at most sum r_k h / 2 from that at the nearest one.
     end = max(float(np.linalg.norm(capsules[j].start)), float(np.linalg.norm(capsules[j].end)))
     lengths = np.hypot(numbers.a, numbers.d)
+    r = [abs(float(numbers.a[k])) + float(lengths[k + 1 : outer].sum()) + end for k in joints]
     half_step = np.pi / GRID
-    levers = [abs(float(numbers.a[k])) + float(lengths[k + 1 : outer].sum()) + end for k in joints]
-    change = sum(levers) * half_step
+    change = sum(r) * half_step
     is_steady = np.ptp(gap) <= STEADY and gap.min() > change
     return float(gap.min()) if is_steady else None
 
@@ -377,7 +393,10 @@ def _standing(description: Description, meshes: MeshVersions, obstacle: Obstacle
 
 
 def _configurations(description: Description, whole_turns: bool = False) -> Array:
-    """Return random configurations, shape (SAMPLES, n), inside the limits, or of whole turns about their middle."""
+    """Return random configurations, shape (SAMPLES, n), inside the limits, or of whole turns about their middle.
+
+    A range that is smaller than ``LEAST_TURN`` or ``LEAST_STROKE`` is widened about its middle.
+    """
     numbers = description.numbers
     span = np.where(numbers.prismatic, max(description.reach, 1.0), np.pi)
     lower = np.where(np.isfinite(numbers.lower), numbers.lower, -span)

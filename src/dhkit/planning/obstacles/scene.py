@@ -57,7 +57,7 @@ class Obstacle:
         Raises
         ------
         ValueError
-            Another shape, a size that is not positive and finite, or no pose.
+            Another shape, a size that is not positive and finite, or a matrix that is not a pose.
         TypeError
             Not numbers.
         """
@@ -133,7 +133,7 @@ class Obstacle:
     @classmethod
     def _placed(cls, geometry: Solid, T_world_obstacle: Array, name: str) -> Obstacle:
         if not name:
-            raise ValueError("name is empty; expected what reports should call the obstacle")
+            raise ValueError("name is empty; expected the name of the obstacle in reports")
         return cls(geometry, tuple(tuple(row) for row in T_world_obstacle.tolist()), name)
 
     @cached_property
@@ -299,7 +299,12 @@ class Solids:
         return Solids(self.are_boxes, *(array[which] for array in arrays))
 
     def reach(self, which: NDArray[np.int_], normals: Array) -> Array:
-        """Return how far P of them reach along M directions (M, 3), shape (M, P), m."""
+        """Return the support of P of them along M unit vectors n (M, 3), shape (M, P), m: the largest n . x.
+
+        With the centre c, the half edges e_a as vectors, and the radius r of the rounding,
+
+            h(n) = n . c + sum_a |n . e_a| + r.
+        """
         halves = self.placements[which, :3, :3] * self.half_sizes[which, None]  # half edges, as columns
         along = np.abs(np.einsum("ix,jxa->ija", normals, halves)).sum(axis=2)
         reach: Array = normals @ self.centres[which].T + along + self.radii[which]

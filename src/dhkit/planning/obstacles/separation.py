@@ -1,9 +1,14 @@
 """Gaps of a motion from obstacles and between links, and planes that separate each pair, for an optimizer.
 
 Solids are convex. The plane at a solid's nearest point, at right angles to the shortest connection, therefore has the
-solid on one side: while a link stays on the other side, the two cannot meet. Planes are linear in the positions of the
-links, so that an optimizer needs no distances. A plane between two links moves with one of them, so that it need not
-move when they move together.
+solid on one side: while a link stays on the other side, the two cannot meet. With the nearest points a on one solid's
+axis and b on the other's, and their radii r_a and r_b, the plane that touches the first has
+
+    n = (b - a) / |b - a|,    level = n . a + r_a,    gap = |b - a| - r_a - r_b,
+
+and points x of the other's axis keep a distance d if n . x >= level + d + r_b. Planes are linear in the positions of
+the links, so that an optimizer needs no distances. A plane between two links moves with one of them, so that it need
+not move when they move together.
 
 A plane that separates a link from one obstacle separates it from every solid behind that plane too. Of copies, and of
 the obstacles of a wall or a heap, few planes are left, with the same motions allowed.
@@ -27,10 +32,11 @@ from dhkit.planning.obstacles.solids import nearest_on_box, nearest_points
 Indices = NDArray[np.int_]
 
 ZERO = 1e-12
-"""Length (m) of the shortest connection below which its direction is undefined."""
+"""Length of the shortest connection, m, below which its direction is undefined."""
 UP = np.array([0.0, 0.0, 1.0])
+"""Normal of a plane where the direction of the shortest connection is undefined."""
 BEHIND_TOLERANCE = 1e-9
-"""Distance (m) by which a solid may stand before a plane and counts as behind it: of copies only rounding differs."""
+"""Tolerance, m, for deciding whether a solid lies behind a plane; it absorbs the rounding between identical solids."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +49,7 @@ class Gaps:
     """
 
     gap: Array
-    """Shape (K, P), m; for axes that intersect, minus the sum of the radii."""
+    """Smallest gaps, shape (K, P), m; for axes that intersect, minus the sum of the radii."""
     normal: Array
     """Normals of the planes, from the body that they touch to the other one, shape (K, P, 3)."""
     level: Array
@@ -58,12 +64,13 @@ class PlaneRow(NamedTuple):
     frame: int | None
     """Index of the DH frame in which the plane is fixed; None for the world."""
     knot: int
+    """Index of the knot."""
     point: Array
-    """In that frame, shape (3,), m."""
+    """The point in the link's frame, shape (3,), m."""
     normal: Array
-    """In that frame, shape (3,)."""
+    """Normal of the plane in the plane's frame, a unit vector, shape (3,)."""
     level: float
-    """m."""
+    """Position of the plane along its normal, m, with the distance to keep."""
 
 
 class Separation:
@@ -91,12 +98,16 @@ class Separation:
         self._groups: list[_Group] = []
         solids = [(k, item) for k, item in enumerate(self.obstacles) if isinstance(item, Obstacle)]
         for is_box in (False, True):
-            alike = [(k, item) for k, item in solids if isinstance(item.geometry, Box) == is_box]
-            self._add([Pair(i, k) for k, item in alike for i in capsules_beside(description, item)])
+            pairs = []
+            for k, solid in solids:
+                if isinstance(solid.geometry, Box) == is_box:
+                    pairs += [Pair(i, k) for i in capsules_beside(description, solid)]
+            self._add(pairs)
         for k, item in enumerate(self.obstacles):
             if isinstance(item, Floor):
-                above = ends_above(description, item.height)
-                ends = {i: tuple(end for j, end in above if j == i) for i, _ in above}
+                ends: dict[int, tuple[int, ...]] = {}
+                for i, end in ends_above(description, item.height):
+                    ends[i] = (*ends.get(i, ()), end)
                 self._add([Pair(i, k, None, which) for i, which in ends.items()])
         if self_collision:
             self._add([Pair(i, None, j) for i, j in link_pairs(description).capsules])
@@ -120,11 +131,12 @@ class Separation:
         shape = (len(q), len(self.pairs))
         found = Gaps(np.full(shape, np.inf), np.zeros((*shape, 3)), np.zeros(shape))
         for group in self._groups:
-            at = self._near(axes, group, near)
             if group.is_of_links:
                 self._measure_links(world_to_frames(self.description, q), axes, group, found)
-            elif len(at[0]):
-                self._measure(axes, group, at, found)
+                continue
+            k, p = self._near(axes, group, near)
+            if len(k):
+                self._measure(axes, group, k, p, found)
         return found
 
     def smallest(self, q: Array, near: float = np.inf) -> Array:
@@ -146,21 +158,28 @@ class Separation:
         fixed
             Knots whose joint values are given, without rows.
         """
-        rows = []
-        for k, p in np.argwhere(self._needed(gaps, active, margins)):
+        rows: list[PlaneRow] = []
+        for k, p in np.argwhere(self._needed(gaps, active, margins)).tolist():
+            # The plane touches an obstacle and the capsule stays beyond it, or the first of two capsules.
             pair = self.pairs[p]
-            n = gaps.normal[k, p]
-            capsule = self.capsules[pair.capsule]
-            need = float(margins[k, p])
-            body = capsule if pair.other is None else self.capsules[pair.other]
-            frame = None if pair.other is None else capsule.link
-            points = [(body.start, body.end)[end] for end in (pair.ends if body.length > 0 else pair.ends[:1])]
-            rows += [
-                PlaneRow(body.link, frame, knot, point, n, float(gaps.level[k, p]) + need + body.radius)
-                for point in points
-                for knot in (int(k), int(k) + 1)
-                if body.link > 0 and knot not in fixed
-            ]
+            first = self.capsules[pair.capsule]
+            if pair.other is None:
+                body = first
+                frame = None
+            else:
+                body = self.capsules[pair.other]
+                frame = first.link
+            if body.link == 0:
+                continue
+
+            # n . x >= level + margin + radius, for the ends x of the axis; a ball has one.
+            normal = gaps.normal[k, p]
+            level = float(gaps.level[k, p]) + float(margins[k, p]) + body.radius
+            ends = pair.ends if body.length > 0 else pair.ends[:1]
+            for end in ends:
+                point = (body.start, body.end)[end]
+                knots = [knot for knot in (k, k + 1) if knot not in fixed]
+                rows += [PlaneRow(body.link, frame, knot, point, normal, level) for knot in knots]
         return rows
 
     def _needed(self, gaps: Gaps, active: NDArray[np.bool_], margins: Array) -> NDArray[np.bool_]:
@@ -169,19 +188,28 @@ class Separation:
         for group in self._groups:
             if group.solids is None:
                 continue
+            active_in_group = active[:, group.part]
             for capsule in np.unique(group.capsules):
                 beside = np.flatnonzero(group.capsules == capsule)
-                for k in np.flatnonzero(active[:, beside + group.part.start].sum(axis=1) > 1):
-                    which = beside[active[k, beside + group.part.start]]
-                    which = which[np.argsort(gaps.gap[k, which + group.part.start], kind="stable")]
-                    p = which + group.part.start
-                    planes = gaps.normal[k, p], gaps.level[k, p], margins[k, p]
-                    needed[k, p] = _needed_planes(group.solids, which, *planes)
+                has_several = active_in_group[:, beside].sum(axis=1) > 1
+                for k in np.flatnonzero(has_several):
+                    # The nearest first.
+                    solids = beside[active_in_group[k, beside]]
+                    solids = solids[np.argsort(gaps.gap[k, solids + group.part.start], kind="stable")]
+                    p = solids + group.part.start
+                    needed[k, p] = _needed_planes(
+                        group.solids, solids, gaps.normal[k, p], gaps.level[k, p], margins[k, p]
+                    )
         return needed
 
     def _near(self, axes: Array, group: _Group, near: float) -> tuple[Indices, Indices]:
-        """Return the groups of states and the pairs of a group whose balls around them come nearer than ``near``."""
-        capsules, solids = group.capsules, group.solids
+        """Return indices of groups of states and of a group's pairs that may be nearer than ``near``, shape (m,) each.
+
+        A capsule and a solid lie in balls about their middles, of radius half length + radius and ``bounds``: they are
+        not nearer than that of the balls.
+        """
+        capsules = group.capsules
+        solids = group.solids
         if solids is None or np.isinf(near):
             k, p = np.indices((len(axes), len(capsules))).reshape(2, -1)
             return k, p
@@ -190,90 +218,107 @@ class Separation:
             beside = np.flatnonzero(capsules == capsule)
             middles = axes[:, :, capsule].mean(axis=2)
             away = middles[:, :, None] - solids.centres[beside]
-            reach = near + self.radii[capsule] + self._half_lengths[capsule] + solids.bounds[beside]
             squares = np.min(np.einsum("kspx,kspx->ksp", away, away), axis=1)
+            reach = near + self.radii[capsule] + self._half_lengths[capsule] + solids.bounds[beside]
             is_near[:, beside] = squares < np.maximum(reach, 0.0) ** 2
         k, p = np.nonzero(is_near)
         return k, p
 
-    def _measure(self, axes: Array, group: _Group, at: tuple[Indices, Indices], found: Gaps) -> None:
-        """Write the gaps of some groups of states and pairs, each at its smallest."""
-        k, p = at
-        pairs = self.pairs[group.part]
+    def _measure(self, axes: Array, group: _Group, k: Indices, p: Indices, found: Gaps) -> None:
+        """Write the gaps of pairs p of a group in groups k of states, shape (m,) each, each at its smallest."""
         capsules = group.capsules[p]
-        own = axes[k[:, None], np.arange(axes.shape[1]), capsules[:, None]]
+        own = axes[k[:, None], np.arange(axes.shape[1]), capsules[:, None]]  # (m, S, 2, 3)
         solids = group.solids
         radius = np.zeros(len(k))
+        ends = own[:, [0, -1]]
         if group.floor is not None:
-            is_checked = np.array([[end in pair.ends for end in (0, 1)] for pair in pairs])[p][:, None]
-            low = np.argmin(np.where(is_checked, own[..., 2], np.inf), axis=-1)[..., None, None]
-            nearest = np.take_along_axis(own, low, axis=-2)[..., 0, :]
-            on_axis = nearest.copy()
-            nearest[..., 2] = group.floor.height
-            # Gaps of axes are not negative: an axis below the floor counts as on it.
-            on_axis[..., 2] = np.maximum(on_axis[..., 2], group.floor.height)
+            on_axis, nearest = self._above_floor(own, group, p)
+            ends = on_axis[:, [0, -1], None]
         elif solids is not None and solids.are_boxes:
             on_axis, nearest = nearest_on_box(own, solids.placements[p][:, None], solids.half_sizes[p][:, None])
         elif solids is not None:
             radius = solids.radii[p]
             on_axis, nearest = nearest_points(own, solids.axes[p][:, None])
-        # The states that decide which plane is kept best.
-        ends = own[:, [0, -1]] if group.floor is None else on_axis[:, [0, -1], None]
-        _keep(found, (k, p + group.part.start), (nearest, radius), (on_axis, self.radii[capsules]), ends)
+        obstacle = _Nearest(nearest, radius)
+        link = _Nearest(on_axis, self.radii[capsules])
+        _keep(found, (k, p + group.part.start), obstacle, link, ends)
+
+    def _above_floor(self, own: Array, group: _Group, p: Indices) -> tuple[Array, Array]:
+        """Return the lower checked ends of axes (m, S, 2, 3), and the points of the floor below them, (m, S, 3), m."""
+        height = 0.0 if group.floor is None else group.floor.height
+        pairs = self.pairs[group.part]
+        is_checked = np.array([[0 in pair.ends, 1 in pair.ends] for pair in pairs])[p][:, None]
+        low = np.argmin(np.where(is_checked, own[..., 2], np.inf), axis=-1)[..., None, None]
+        on_floor = np.take_along_axis(own, low, axis=-2)[..., 0, :]
+        on_axis = on_floor.copy()
+        on_floor[..., 2] = height
+        # Gaps of axes are not negative: an axis below the floor counts as on it.
+        on_axis[..., 2] = np.maximum(on_axis[..., 2], height)
+        return on_axis, on_floor
 
     def _measure_links(self, frames: Array, axes: Array, group: _Group, found: Gaps) -> None:
         """Write the gaps between links in groups of states; frames are those of links, shape (K, S, n+1, 4, 4)."""
         K, S = axes.shape[:2]
-        firsts, seconds = group.capsules, group.others
-        frame = frames[:, :, [self.capsules[i].link for i in firsts]]
+        firsts = group.capsules
+        seconds = group.others
+        T = frames[:, :, [self.capsules[i].link for i in firsts]]
+        R = T[..., :3, :3]
+        t = T[..., None, :3, 3]
 
         def in_frame(which: Indices) -> Array:
-            """Return axes in the frames of the first capsules, shape (K P, S, 2, 3), m."""
-            away = axes[:, :, which] - frame[..., None, :3, 3]
-            return np.moveaxis(away @ frame[..., :3, :3], 1, 2).reshape(-1, S, 2, 3)
+            """Return axes in the frames of the first capsules, R' (x - t), shape (K P, S, 2, 3), m."""
+            return np.moveaxis((axes[:, :, which] - t) @ R, 1, 2).reshape(-1, S, 2, 3)
 
-        own, other = in_frame(firsts), in_frame(seconds)
-        nearest, on_other = nearest_points(own, other)
+        own = in_frame(firsts)
+        other = in_frame(seconds)
+        on_own, on_other = nearest_points(own, other)
         k, p = np.indices((K, len(firsts))).reshape(2, -1)
-        touched = (nearest, self.radii[firsts[p]])
-        beyond = (on_other, self.radii[seconds[p]])
+        touched = _Nearest(on_own, self.radii[firsts[p]])
+        beyond = _Nearest(on_other, self.radii[seconds[p]])
         _keep(found, (k, p + group.part.start), touched, beyond, other[:, [0, -1]])
 
 
-def _keep(
-    found: Gaps,
-    here: tuple[Indices, Indices],
-    touched: tuple[Array, Array],
-    other: tuple[Array, Array],
-    ends: Array,
-) -> None:
+class _Nearest(NamedTuple):
+    """The points of m bodies that are nearest to others, in S states."""
+
+    points: Array
+    """Points of the axes, shape (m, S, 3), m."""
+    radii: Array
+    """Radii about the axes, shape (m,), m."""
+
+
+def _keep(found: Gaps, here: tuple[Indices, Indices], touched: _Nearest, other: _Nearest, ends: Array) -> None:
     """Write gaps, each at its smallest, and the planes that are kept best.
 
     Parameters
     ----------
     found
-        Where they are written.
+        The gaps to write.
     here
         Groups of states and pairs, shape (m,) each.
     touched, other
-        Nearest points of the axes, shape (m, S, 3), and radii, shape (m,), of the body that the plane touches and of
-        the other one; m.
+        The body that the plane touches, and the one beyond it.
     ends
         Points of the other body at the first and the last state, shape (m, 2, e, 3), m.
     """
-    (nearest, radius) = touched
-    (on_axis, own_radius) = other
-    along = on_axis - nearest
+    a = touched.points
+    b = other.points
+    r_a = touched.radii[:, None]
+    r_b = other.radii[:, None]
+
+    along = b - a
     length = np.sqrt(np.sum(along * along, axis=-1))
     normal = along / np.maximum(length, ZERO)[..., None]
     normal[length < ZERO] = UP
-    level = np.sum(normal * nearest, axis=-1) + radius[:, None]
-    gap = length - own_radius[:, None] - radius[:, None]
-    # How far the first and the last state are on their side of each state's plane, shape (m, S).
-    beyond = np.einsum("msi,mkei->mske", normal, ends).min(axis=(2, 3)) - own_radius[:, None]
-    which = np.arange(len(gap)), np.argmax(beyond - level, axis=1)
+    level = np.sum(normal * a, axis=-1) + r_a
+    gap = length - r_b - r_a
+
+    # Distance of the other body at the first and the last state, the smaller, beyond each state's plane, shape (m, S).
+    beyond = np.einsum("msi,mkei->mske", normal, ends).min(axis=(2, 3)) - r_b
+    best = (np.arange(len(gap)), np.argmax(beyond - level, axis=1))
     found.gap[here] = gap.min(axis=1)
-    found.normal[here], found.level[here] = normal[which], level[which]
+    found.normal[here] = normal[best]
+    found.level[here] = level[best]
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,14 +326,15 @@ class _Group:
     """Pairs of one kind: with boxes, with other solids, with the floor, or between links."""
 
     part: slice
-    """Their indices."""
+    """Indices of the pairs."""
     capsules: Indices
-    """Of each pair, shape (P,)."""
+    """Capsule of each pair, shape (P,)."""
     others: Indices
     """The other capsule of each pair of links, shape (P,); -1 of other pairs."""
     solids: Solids | None
-    """Of each pair."""
+    """Solid of each pair; None for a floor and for links."""
     floor: Floor | None
+    """The floor; None for other pairs."""
 
     @property
     def is_of_links(self) -> bool:
@@ -299,7 +345,10 @@ class _Group:
 def _needed_planes(
     solids: Solids, which: NDArray[np.int_], normal: Array, level: Array, required: Array
 ) -> NDArray[np.bool_]:
-    """Return which planes between a link and solids are needed, shape (P,).
+    """Return a mask (P,) of the planes between a link and solids that are needed.
+
+    Plane i makes plane j needless if solid j, with the distance required from it, is behind the plane from which the
+    link keeps away: max over points x of solid j of n_i . x + required_j <= level_i + required_i.
 
     Parameters
     ----------
@@ -310,9 +359,10 @@ def _needed_planes(
     required
         Distances of the link from each plane, shape (P,), m.
     """
-    # Entry (i, j): whether solid j, with the distance required from it, is behind what the link keeps from plane i.
+    # Entry (i, j): whether plane i makes plane j needless.
     shields = solids.reach(which, normal) + required <= (level + required)[:, None] + BEHIND_TOLERANCE
-    needed, is_shielded = np.zeros((2, len(which)), dtype=bool)
+    needed = np.zeros(len(which), dtype=bool)
+    is_shielded = np.zeros(len(which), dtype=bool)
     for i in range(len(which)):
         if not is_shielded[i]:
             needed[i] = True

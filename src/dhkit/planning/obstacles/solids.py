@@ -37,7 +37,7 @@ POINT = 1e-9
 FAILED = -1e300
 """Largest number that coal returns where it finds a penetration and not its depth: some symmetric places."""
 SHIFTS = (np.array([3e-8, 1e-8, 2e-8]), np.array([-2e-8, 3e-8, -1e-8]))
-"""Moves of a solid, m, with which it is asked again then."""
+"""Translations of a solid, m, with which coal is asked again where it finds no depth of a penetration."""
 UNKNOWN_DEPTH = -1e-6
 """Distance, m, of solids that penetrate each other to a depth that is not found."""
 TOLERANCE = 1e-9
@@ -67,29 +67,46 @@ def segment_distances(first: Array, second: Array) -> Array:
 def nearest_points(first: Array, second: Array) -> tuple[Array, Array]:
     """Return the nearest points of segments, shape (..., 3) each, m, on the first and on the second.
 
+    The points p1 + s d1 and p2 + t d2 of the lines, with r = p1 - p2, are nearest for
+
+        s = (b f - c e) / (a e - b^2),    t = (b s + f) / e,    s = (b t - c) / a,
+
+    where a = d1 . d1, b = d1 . d2, c = d1 . r, e = d2 . d2 and f = d2 . r (Ericson, Real-Time Collision Detection,
+    2005, section 5.1.9). On segments s and t are clamped to [0, 1], each in turn with the other fixed.
+
     Parameters
     ----------
     first, second
         As in :func:`segment_distances`.
     """
-    p = first[..., 0, :]
+    p1 = first[..., 0, :]
     d1 = first[..., 1, :] - first[..., 0, :]
-    other = second[..., 0, :]
+    p2 = second[..., 0, :]
     d2 = second[..., 1, :] - second[..., 0, :]
-    r = p - other
-    a, b, e = _dot(d1, d1), _dot(d1, d2), _dot(d2, d2)
-    c, f = _dot(d1, r), _dot(d2, r)
+    r = p1 - p2
+
+    a = _dot(d1, d1)
+    b = _dot(d1, d2)
+    c = _dot(d1, r)
+    e = _dot(d2, d2)
+    f = _dot(d2, r)
+
     s = np.clip(_quotient(b * f - c * e, a * e - b * b), 0.0, 1.0)
     t = np.clip(_quotient(b * s + f, e), 0.0, 1.0)
     s = np.clip(_quotient(b * t - c, a), 0.0, 1.0)
-    return p + s[..., None] * d1, other + t[..., None] * d2
+    return p1 + s[..., None] * d1, p2 + t[..., None] * d2
 
 
 def nearest_on_box(axes: Array, T_world_box: Array, half_sizes: Array) -> tuple[Array, Array]:
     """Return the nearest points of segments and a box, shape (..., 3) each, m, on the segment and in the box.
 
-    The derivative of the squared distance along a segment is piecewise linear and grows: its zero lies between two of
-    the positions at which a coordinate enters or leaves the box.
+    In the box's frame a segment is x(s) = x_0 + s d, 0 <= s <= 1, and the point of the box nearest to x is x clamped to
+    the half sizes. Half the derivative of the squared distance,
+
+        g(s) = d . (x(s) - clamp(x(s))),
+
+    is piecewise linear and grows: its zero lies between two of the positions s at which a coordinate enters or leaves
+    the box, where it is found by linear interpolation.
 
     Parameters
     ----------
@@ -104,25 +121,37 @@ def nearest_on_box(axes: Array, T_world_box: Array, half_sizes: Array) -> tuple[
     centre = T_world_box[..., None, :3, 3]
     half = half_sizes[..., None, :]
     ends = (axes - centre) @ R
-    start = ends[..., 0, :]
-    along = ends[..., 1, :] - ends[..., 0, :]
+    x0 = ends[..., 0, :]
+    d = ends[..., 1, :] - ends[..., 0, :]
+
+    # The positions at which a coordinate is at a face, and both ends, in order.
     with np.errstate(divide="ignore", invalid="ignore"):
-        crossings = np.concatenate([(-half_sizes - start) / along, (half_sizes - start) / along], axis=-1)
-    shares = np.clip(np.nan_to_num(crossings, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
-    edges = np.zeros((*shares.shape[:-1], 1))
-    shares = np.sort(np.concatenate([edges, shares, edges + 1], axis=-1), axis=-1)
-    points = start[..., None, :] + shares[..., None] * along[..., None, :]
-    slopes = np.sum(along[..., None, :] * (points - np.clip(points, -half, half)), axis=-1)
-    last = np.maximum(np.sum(slopes < 0, axis=-1, keepdims=True) - 1, 0)
-    after = np.minimum(last + 1, shares.shape[-1] - 1)
-    (s0, g0), (s1, g1) = (
-        [np.take_along_axis(array, k, axis=-1)[..., 0] for array in (shares, slopes)] for k in (last, after)
-    )
-    s = np.where(g0 >= 0, s0, np.where(g1 < 0, s1, s0 + (s1 - s0) * _quotient(-g0, g1 - g0)))
-    own = (start + s[..., None] * along)[..., None, :]
-    R_world_box = np.swapaxes(R, -1, -2)
-    found = own @ R_world_box + centre, np.clip(own, -half, half) @ R_world_box + centre
-    return found[0][..., 0, :], found[1][..., 0, :]
+        crossings = np.concatenate([(-half_sizes - x0) / d, (half_sizes - x0) / d], axis=-1)
+    inner = np.clip(np.nan_to_num(crossings, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
+    zeros = np.zeros((*inner.shape[:-1], 1))
+    positions = np.sort(np.concatenate([zeros, inner, zeros + 1], axis=-1), axis=-1)
+
+    # g at each of them; the last one with g < 0, and the next.
+    x = x0[..., None, :] + positions[..., None] * d[..., None, :]
+    g = np.sum(d[..., None, :] * (x - np.clip(x, -half, half)), axis=-1)
+    last = np.maximum(np.sum(g < 0, axis=-1, keepdims=True) - 1, 0)
+    after = np.minimum(last + 1, positions.shape[-1] - 1)
+    s0 = np.take_along_axis(positions, last, axis=-1)[..., 0]
+    g0 = np.take_along_axis(g, last, axis=-1)[..., 0]
+    s1 = np.take_along_axis(positions, after, axis=-1)[..., 0]
+    g1 = np.take_along_axis(g, after, axis=-1)[..., 0]
+
+    # Without a zero inside, the nearest point is an end.
+    zero = s0 + (s1 - s0) * _quotient(-g0, g1 - g0)
+    s = np.where(g1 < 0, s1, zero)
+    s = np.where(g0 >= 0, s0, s)
+
+    own = (x0 + s[..., None] * d)[..., None, :]
+    in_box = np.clip(own, -half, half)
+    R_box_world = np.swapaxes(R, -1, -2)
+    on_segment = own @ R_box_world + centre
+    on_box = in_box @ R_box_world + centre
+    return on_segment[..., 0, :], on_box[..., 0, :]
 
 
 def axis_bounds(solids: Solids, axes: Array) -> Bounds:
@@ -142,17 +171,25 @@ def axis_bounds(solids: Solids, axes: Array) -> Bounds:
 
 
 def _box_bounds(solids: Solids, axes: Array) -> Bounds:
+    """Return bounds of the signed distances of segments from boxes, from ``POINTS`` points of each segment.
+
+    In the box's frame a point x is beyond its faces by e = |x| - half sizes, and its signed distance is
+
+        |max(e, 0)| + min(max_i e_i, 0).
+    """
     ends = (axes - solids.centres[:, None]) @ solids.placements[:, :3, :3]
     share = np.linspace(0, 1, POINTS)[:, None]
     points = ends[..., :1, :] + share * (ends[..., 1:, :] - ends[..., :1, :])
-    beyond = np.abs(points) - solids.half_sizes[:, None]
-    signed = np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + np.minimum(beyond.max(axis=-1), 0.0)
-    length = np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1)
-    least = signed.min(axis=-1)
+    e = np.abs(points) - solids.half_sizes[:, None]
+    signed = np.linalg.norm(np.maximum(e, 0.0), axis=-1) + np.minimum(e.max(axis=-1), 0.0)
+    upper = signed.min(axis=-1)
+
     # No point of the segment is farther than half a step from a sampled point. A segment that is partly inside is
     # bounded only by the ball around its middle, since it may have to move its own length to get out.
-    outside = least - length / (2 * (POINTS - 1))
-    return np.where(outside > 0, outside, signed[..., POINTS // 2] - length / 2), least
+    length = np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1)
+    outside = upper - length / (2 * (POINTS - 1))
+    lower = np.where(outside > 0, outside, signed[..., POINTS // 2] - length / 2)
+    return lower, upper
 
 
 def _dot(first: Array, second: Array) -> Array:
@@ -284,7 +321,7 @@ class _Solid:
     """A convex solid that moves with a link."""
 
     shape: Any
-    """coal's."""
+    """The solid as coal's shape."""
     T_link_solid: Array
     """Pose in the link's DH frame, shape (4, 4), m."""
     extent: Callable[[Array], Array]
@@ -305,7 +342,7 @@ def shape_distances(
     bodies
         The two bodies.
     enough
-        Distance, m, from which a lower bound of the distance is returned in its place: it takes 2 µs a state, and the
+        Distance, m, from which a lower bound of the distance is returned instead: it takes 2 µs a state, and the
         distance itself 50 µs.
 
     Raises
@@ -326,13 +363,16 @@ def shape_distances(
         decided = bound >= np.minimum(least, enough)
         least[decided] = np.minimum(least, bound)[decided]
         for k in np.flatnonzero(~decided):
-            here, there = (
-                coal.Transform3s(np.ascontiguousarray(T[k, :3, :3]), np.ascontiguousarray(T[k, :3, 3]))
-                for T in (T1, T2)
-            )
-            gap = signed_distance(coal, first.shape, here, second.shape, there, request, result)
+            pose1 = _transform(coal, T1[k])
+            pose2 = _transform(coal, T2[k])
+            gap = signed_distance(coal, first.shape, pose1, second.shape, pose2, request, result)
             least[k] = min(least[k], gap)
     return least
+
+
+def _transform(coal: CoalModule, T: Array) -> Any:
+    """Return a pose (4, 4) as coal's."""
+    return coal.Transform3s(np.ascontiguousarray(T[:3, :3]), np.ascontiguousarray(T[:3, 3]))
 
 
 def _separation(first: _Solid, T1: Array, second: _Solid, T2: Array) -> Array:
@@ -352,8 +392,9 @@ def _separation(first: _Solid, T1: Array, second: _Solid, T2: Array) -> Array:
     z1 = R1[:, :, 2]
     z2 = R2[:, :, 2]
     across = [line - np.sum(line * z, axis=1, keepdims=True) * z for z in (z1, z2)]
-    axes = [R[:, :, i] for R in (R1, R2) for i in range(3)]
-    n = np.stack([*axes, line, *across, np.cross(z1, z2)], axis=1)
+    axes1 = [R1[:, :, i] for i in range(3)]
+    axes2 = [R2[:, :, i] for i in range(3)]
+    n = np.stack([*axes1, *axes2, line, *across, np.cross(z1, z2)], axis=1)
 
     length = np.linalg.norm(n, axis=2, keepdims=True)
     n = np.divide(n, length, out=np.broadcast_to(z1[:, None], n.shape).copy(), where=length > SHORT)
@@ -377,6 +418,14 @@ def _solids(description: Description, meshes: MeshVersions) -> dict[LinkBody, tu
 
 
 def _solid(part: Part) -> _Solid:
+    """Return the solid of a part, with its support function h(n) = max n . x over its points x.
+
+    With n = (n_x, n_y, n_z), radius r and half length l along z, or half edges e:
+
+        sphere r,    capsule r + l |n_z|,    cylinder r hypot(n_x, n_y) + l |n_z|,    box sum e_i |n_i|,
+
+    and the largest n . x of the corners for a mesh.
+    """
     coal = coal_module()
     T = part.T_link_part
     match part.geometry:
@@ -390,9 +439,8 @@ def _solid(part: Part) -> _Solid:
         case Cylinder():
             r = float(part.geometry.radius)
             half = float(part.geometry.length) / 2
-            return _Solid(
-                coal.Cylinder(r, 2 * half), T, lambda n: r * np.hypot(n[..., 0], n[..., 1]) + half * np.abs(n[..., 2])
-            )
+            shape = coal.Cylinder(r, 2 * half)
+            return _Solid(shape, T, lambda n: r * np.hypot(n[..., 0], n[..., 1]) + half * np.abs(n[..., 2]))
         case Box():
             edges = np.array([float(edge) for edge in part.geometry.size])
             return _Solid(coal.Box(*edges.tolist()), T, lambda n: np.abs(n) @ (edges / 2))

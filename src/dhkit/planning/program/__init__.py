@@ -1,4 +1,4 @@
-"""Programs: what the optimizer is given for a task, in blocks of variables and rows, and the optimizer itself."""
+"""Nonlinear programs of tasks, in blocks of variables and rows, and the optimizer that solves them."""
 
 from dhkit.planning.program.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows, Scaling
 from dhkit.planning.program.mesh import MIN_LEG_INTERVALS, Curve, Knots, Mesh, corrected, knots_along

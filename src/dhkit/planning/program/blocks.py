@@ -24,7 +24,10 @@ Indices = NDArray[np.int_]
 
 
 class LocalFunction:
-    """Rows and a cost of a few variables, with their first and second derivatives.
+    """Rows g(z, p) and a cost f(z, p) of a few variables, with their first and second derivatives.
+
+    Derivatives are the gradient df/dz, the Jacobian dg/dz, and the upper triangle of the Lagrangian's Hessian
+    d^2 (w f + lam . g) / dz^2 for a weight w and multipliers lam of the rows.
 
     Parameters
     ----------
@@ -43,18 +46,21 @@ class LocalFunction:
         rows = casadi.densify(rows)
         self.has_cost = cost.nnz() > 0
         self.count: int = rows.numel()
-        multipliers = casadi.SX.sym("multipliers", self.count)
-        weight = casadi.SX.sym("weight")
         jacobian = casadi.jacobian(rows, z)
         gradient = casadi.jacobian(cost, z).T
-        hessian = casadi.triu(casadi.hessian(weight * cost + casadi.dot(multipliers, rows), z)[0])
+
+        multipliers = casadi.SX.sym("multipliers", self.count)
+        weight = casadi.SX.sym("weight")
+        lagrangian = weight * cost + casadi.dot(multipliers, rows)
+        hessian = casadi.triu(casadi.hessian(lagrangian, z)[0])
 
         def function(name: str, inputs: list[casadi.SX], result: casadi.SX) -> casadi.Function:
             return casadi.Function(name, inputs, [result], {"cse": True})
 
         self.rows = function("rows", [z, p], rows)
         self.cost = function("cost", [z, p], casadi.densify(cost))
-        # Derivatives return their nonzeros, (nonzeros, 1), whose rows and columns are these.
+
+        # Derivatives return their nonzeros, shape (nonzeros, 1); their rows and columns are in the attributes ``_at``.
         self.jacobian = function("jacobian", [z, p], _nonzeros(jacobian))
         self.jacobian_at = _triplet(jacobian)
         self.gradient = function("gradient", [z, p], _nonzeros(gradient))
@@ -65,7 +71,7 @@ class LocalFunction:
 
 
 class RowKind(Enum):
-    """What rows are for, which decides their bounds and units."""
+    """Purpose of rows, which decides their bounds and units."""
 
     CONTINUITY = "continuity"
     """Zero: a variable equals an expression."""
@@ -185,58 +191,72 @@ class BlockProgram:
     def functions(self) -> tuple[casadi.Function, dict[str, casadi.Function]]:
         """The program's function of x and p for :func:`casadi.nlpsol`, and its derivatives as options of it.
 
-        The function's x are the variables less an offset over a scale, its rows are scaled, and its p are the
-        parameters followed by those of a :class:`Scaling`.
+        The program is solved in the units of a :class:`Scaling`: with variables y and rows h such that
+
+            x = offset + unit y,    h = g / row_unit,
+
+        and its p are the parameters followed by those of the scaling. With D = diag(unit), R = diag(row_unit) and
+        multipliers lam of h, those of g are R^-1 lam, and the derivatives by y are
+
+            D df/dx,    R^-1 (dg/dx) D,    D (d^2 (w f + (R^-1 lam) . g) / dx^2) D.
         """
         import casadi
 
-        scaled = casadi.MX.sym("x", self.variables)
+        y = casadi.MX.sym("x", self.variables)
         given = casadi.MX.sym("p", self.parameters + 2 * self.variables + self.rows)
         edges = np.cumsum([0, self.parameters, self.variables, self.variables, self.rows])
         p, offset, unit, row_unit = casadi.vertsplit(given, edges.tolist())
+        x = offset + unit * y
+
         scaled_multipliers = casadi.MX.sym("lam_g", self.rows)
-        weight = casadi.MX.sym("lam_f")
-        x = offset + unit * scaled
         multipliers = scaled_multipliers / row_unit
+        weight = casadi.MX.sym("lam_f")
+
         cost = casadi.MX(1, 1)
         rows = []
-        jacobian, gradient, hessian = (
-            _Nonzeros(shape) for shape in ((self.rows, self.variables), (self.variables, 1), (self.variables,) * 2)
-        )
+        jacobian = _Nonzeros((self.rows, self.variables))
+        gradient = _Nonzeros((self.variables, 1))
+        hessian = _Nonzeros((self.variables, self.variables))
         begin = 0
         for block in self.blocks:
             function = block.function
             points = block.points
             at = block.variables
-            local = _gather(x, at), _gather(p, block.parameters)
+            local = (_gather(x, at), _gather(p, block.parameters))
+
+            # Entry (i, j) of a point's derivatives is one of the program's, at that point's rows and variables.
             if function.count:
                 rows.append(casadi.vec(function.rows.map(points)(*local)))
                 i, j = function.jacobian_at
-                here = begin + i[:, None] + function.count * np.arange(points)
-                jacobian.add(here, at[j], function.jacobian.map(points)(*local))
+                row = begin + i[:, None] + function.count * np.arange(points)
+                jacobian.add(row, at[j], function.jacobian.map(points)(*local))
             if function.has_cost:
                 cost += casadi.sum2(function.cost.map(points)(*local))
                 i, _ = function.gradient_at
                 gradient.add(at[i], np.zeros_like(at[i]), function.gradient.map(points)(*local))
             i, j = function.hessian_at
             if len(i):
-                multiplied = casadi.reshape(multipliers[begin : begin + block.count], function.count, points)
-                values = function.hessian.map(points)(*local, multiplied, casadi.repmat(weight, 1, points))
-                hessian.add(np.minimum(at[i], at[j]), np.maximum(at[i], at[j]), values)
+                of_rows = casadi.reshape(multipliers[begin : begin + block.count], function.count, points)
+                values = function.hessian.map(points)(*local, of_rows, casadi.repmat(weight, 1, points))
+                hessian.add(np.minimum(at[i], at[j]), np.maximum(at[i], at[j]), values)  # the upper triangle
             begin += block.count
-        g = casadi.vertcat(casadi.MX(0, 1), *rows) / row_unit
+        scaled_rows = casadi.vertcat(casadi.MX(0, 1), *rows) / row_unit
 
-        inputs = {"x": scaled, "p": given}
-        weights = {"lam_f": weight, "lam_g": scaled_multipliers}
+        inputs = {"x": y, "p": given}
+        with_weights = {**inputs, "lam_f": weight, "lam_g": scaled_multipliers}
 
         def function_of(arguments: dict[str, casadi.MX], results: dict[str, casadi.MX]) -> casadi.Function:
-            symbols, values = list(arguments.values()), list(results.values())
+            symbols = list(arguments.values())
+            values = list(results.values())
             return casadi.Function("program", symbols, values, list(arguments), list(results))
 
-        return function_of(inputs, {"f": cost, "g": g}), {
-            "grad_f": function_of(inputs, {"f": cost, "grad_f_x": casadi.densify(gradient.matrix()) * unit}),
-            "jac_g": function_of(inputs, {"g": g, "jac_g_x": jacobian.matrix(1 / row_unit, unit)}),
-            "hess_lag": function_of({**inputs, **weights}, {"triu_hess_gamma_x_x": hessian.matrix(unit, unit)}),
+        scaled_gradient = casadi.densify(gradient.matrix()) * unit
+        scaled_jacobian = jacobian.matrix(1 / row_unit, unit)
+        scaled_hessian = hessian.matrix(unit, unit)
+        return function_of(inputs, {"f": cost, "g": scaled_rows}), {
+            "grad_f": function_of(inputs, {"f": cost, "grad_f_x": scaled_gradient}),
+            "jac_g": function_of(inputs, {"g": scaled_rows, "jac_g_x": scaled_jacobian}),
+            "hess_lag": function_of(with_weights, {"triu_hess_gamma_x_x": scaled_hessian}),
         }
 
 
@@ -263,16 +283,19 @@ class _Nonzeros:
 
         if not self._values:
             return casadi.MX(*self.shape)
-        rows, columns = np.concatenate(self._rows), np.concatenate(self._columns)
+        rows = np.concatenate(self._rows)
+        columns = np.concatenate(self._columns)
         values = casadi.vertcat(*self._values)
-        # In CasADi's order, by columns; values at the same place are added.
-        places, order = np.unique(columns * self.shape[0] + rows, return_inverse=True)
-        i = (places % self.shape[0]).tolist()
-        j = (places // self.shape[0]).tolist()
-        if len(places) == len(order):
-            nonzeros = values[np.argsort(order).tolist()]
+
+        # The nonzeros in CasADi's order, by columns: place of each value among them.
+        positions, place = np.unique(columns * self.shape[0] + rows, return_inverse=True)
+        i = (positions % self.shape[0]).tolist()
+        j = (positions // self.shape[0]).tolist()
+        if len(positions) == len(place):
+            nonzeros = values[np.argsort(place).tolist()]
         else:
-            adding = casadi.Sparsity.triplet(len(places), len(order), order.tolist(), list(range(len(order))))
+            # Values at the same place are added, by a matrix with a 1 at (place, value).
+            adding = casadi.Sparsity.triplet(len(positions), len(place), place.tolist(), list(range(len(place))))
             nonzeros = casadi.DM(adding, 1.0) @ values
         if row_factors is not None and column_factors is not None:
             nonzeros = nonzeros * row_factors[i] * column_factors[j]
@@ -280,6 +303,7 @@ class _Nonzeros:
 
 
 def _gather(vector: casadi.MX, indices: Indices) -> casadi.MX:
+    """Return the entries of a vector at indices, in the shape of the indices."""
     import casadi
 
     if not indices.size:
@@ -293,5 +317,6 @@ def _nonzeros(matrix: casadi.SX) -> casadi.SX:
 
 
 def _triplet(matrix: casadi.SX) -> tuple[Indices, Indices]:
+    """Return the rows and the columns of a matrix's nonzeros."""
     rows, columns = matrix.sparsity().get_triplet()
     return np.array(rows, dtype=int), np.array(columns, dtype=int)

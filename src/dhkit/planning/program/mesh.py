@@ -23,7 +23,7 @@ GRADING = 0.9
 MIN_LEG_INTERVALS = 6
 """Smallest number of intervals of a leg."""
 ROUNDS = 2
-"""Number of corrections: the second removes the rounding error of the first."""
+"""Number of least-squares corrections of a solution: the second removes the rounding error of the first."""
 
 
 class Curve(Enum):
@@ -38,33 +38,62 @@ class Curve(Enum):
     QUADRATIC = 3
     """Quadratic and continuous, given at knots and midpoints: smooth objectives converge fast."""
 
+    @property
+    def is_continuous(self) -> bool:
+        """Whether neighbouring intervals share the acceleration at their common knot."""
+        return self in (Curve.LINEAR, Curve.QUADRATIC)
+
+    @property
+    def stride(self) -> int:
+        """Number of columns, acceleration variables of each joint, from one interval to the next."""
+        return 2 if self in (Curve.JUMPING, Curve.QUADRATIC) else 1
+
     def columns(self, intervals: int) -> int:
         """Return the number of acceleration variables of each joint."""
-        return (intervals, 2 * intervals, intervals + 1, 2 * intervals + 1)[self.value]
+        return self.stride * intervals + (1 if self.is_continuous else 0)
 
     def columns_of(self, interval: int) -> tuple[int, ...]:
         """Return the columns of acceleration variables that an interval depends on, in order of time."""
-        k = interval
-        return ((k,), (2 * k, 2 * k + 1), (k, k + 1), (2 * k, 2 * k + 1, 2 * k + 2))[self.value]
+        first = self.stride * interval
+        return tuple(range(first, first + len(self.column_weights)))
 
     @property
     def column_weights(self) -> tuple[float, ...]:
-        """Weights of an interval's columns in a sum over all columns, by their shares of time."""
-        return ((1.0,), (1 / 2, 1 / 2), (1 / 2, 1 / 2), (1 / 6, 2 / 3, 1 / 6))[self.value]
+        """Weights of an interval's columns in its change of velocity, as shares of h; their sum is 1."""
+        match self:
+            case Curve.CONSTANT:
+                return (1.0,)
+            case Curve.JUMPING | Curve.LINEAR:
+                return (1 / 2, 1 / 2)
+            case Curve.QUADRATIC:
+                return (1 / 6, 2 / 3, 1 / 6)
+
+    @property
+    def position_weights(self) -> tuple[float, ...]:
+        """Weights of an interval's columns in its change of position, as shares of h^2; their sum is 1/2."""
+        match self:
+            case Curve.CONSTANT:
+                return (1 / 2,)
+            case Curve.JUMPING | Curve.LINEAR:
+                return (1 / 3, 1 / 6)
+            case Curve.QUADRATIC:
+                return (1 / 6, 1 / 3, 0.0)
 
     def abc(self, columns: Sequence[Any]) -> tuple[Any, Any, Any]:
         """Return the accelerations at the beginning, the middle and the end of an interval, from its columns."""
-        if self is Curve.CONSTANT:
-            return columns[0], columns[0], columns[0]
-        if self is Curve.QUADRATIC:
-            return columns[0], columns[1], columns[2]
-        return columns[0], (columns[0] + columns[1]) / 2, columns[1]
+        match self:
+            case Curve.CONSTANT:
+                return columns[0], columns[0], columns[0]
+            case Curve.JUMPING | Curve.LINEAR:
+                return columns[0], (columns[0] + columns[1]) / 2, columns[1]
+            case Curve.QUADRATIC:
+                return columns[0], columns[1], columns[2]
 
     def values(self, qdd: Array) -> tuple[Array, Array, Array]:
         """Return the same of all intervals, shape (intervals, n) each, from all columns, shape (columns, n)."""
-        step = (1, 2, 1, 2)[self.value]
-        count = (len(qdd) // step) if self in (Curve.CONSTANT, Curve.JUMPING) else (len(qdd) - 1) // step
-        return self.abc([qdd[k : k + step * count : step] for k in range(len(self.columns_of(0)))])
+        step = self.stride
+        end = len(qdd) - 1 if self.is_continuous else len(qdd)
+        return self.abc([qdd[k : k + end : step] for k in range(len(self.column_weights))])
 
 
 @dataclass(frozen=True)
@@ -78,7 +107,8 @@ class Mesh:
     @classmethod
     def of(cls, intervals: int, legs: int, curve: Curve) -> Mesh:
         """Return a mesh that divides intervals among legs, at least ``MIN_LEG_INTERVALS`` for each."""
-        each = max(MIN_LEG_INTERVALS, -(-intervals // legs))
+        rounded_up = -(-intervals // legs)
+        each = max(MIN_LEG_INTERVALS, rounded_up)
         return cls((each,) * legs, curve)
 
     @property
@@ -107,17 +137,26 @@ class Mesh:
 
 
 def graded(intervals: int) -> Array:
-    """Return knots from 0 to 1 that are closer together at the ends, shape (intervals + 1,)."""
+    """Return knots from 0 to 1 that are closer together at the ends, shape (intervals + 1,).
+
+    They blend uniform knots x_k = k / K with those of Chebyshev's points, (1 - cos(pi x_k)) / 2.
+    """
     x = np.linspace(0.0, 1.0, intervals + 1)
-    knots: Array = (1 - GRADING) * x + GRADING * (1 - np.cos(np.pi * x)) / 2
+    chebyshev = (1 - np.cos(np.pi * x)) / 2
+    knots: Array = (1 - GRADING) * x + GRADING * chebyshev
     return knots
 
 
 class Interval(NamedTuple):
     """One interval of a motion: its duration h (s), the state at its beginning, and the acceleration in it.
 
-    The acceleration is at most quadratic, given by its values a, b and c at the beginning, the middle and the end; a
-    linear one has b = (a + c) / 2, a constant one a = b = c. All may be arrays or CasADi's symbols.
+    The acceleration is at most quadratic, given by its values a, b and c at the beginning, the middle and the end. With
+    x = t / h it is Lagrange's polynomial through them,
+
+        qdd(x) = a + (-3 a + 4 b - c) x + 2 (a - 2 b + c) x^2,
+
+    of which all properties are integrals or derivatives. A linear one has b = (a + c) / 2, a constant one a = b = c.
+    All fields may be arrays or CasADi's symbols.
     """
 
     h: Any
@@ -129,28 +168,30 @@ class Interval(NamedTuple):
 
     @property
     def q_end(self) -> Any:
-        """Joint values at the end, rad and m."""
+        """Joint values at the end, rad and m: those at x = 1."""
         return self.q + self.h * self.qd + self.h**2 * (self.a / 6 + self.b / 3)
 
     @property
     def qd_end(self) -> Any:
-        """Joint rates at the end, rad/s and m/s."""
+        """Joint rates at the end, rad/s and m/s: Simpson's rule, exact for quadratic accelerations."""
         return self.qd + self.h * (self.a + 4 * self.b + self.c) / 6
 
     @property
     def q_middle(self) -> Any:
-        """Joint values halfway in time."""
+        """Joint values halfway in time, rad and m: those at x = 1/2."""
         return self.q + self.h / 2 * self.qd + self.h**2 * (7 * self.a + 6 * self.b - self.c) / 96
 
     @property
     def qd_middle(self) -> Any:
-        """Joint rates halfway in time."""
+        """Joint rates halfway in time, rad/s and m/s: those at x = 1/2."""
         return self.qd + self.h * (5 * self.a + 8 * self.b - self.c) / 24
 
     @property
     def jerks(self) -> tuple[Any, Any]:
         """Jerks at both ends, rad/s^3 and m/s^3; the jerk is linear between them."""
-        return (-3 * self.a + 4 * self.b - self.c) / self.h, (self.a - 4 * self.b + 3 * self.c) / self.h
+        at_begin = (-3 * self.a + 4 * self.b - self.c) / self.h
+        at_end = (self.a - 4 * self.b + 3 * self.c) / self.h
+        return at_begin, at_end
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,6 +232,14 @@ def assemble_trajectory(description: Description, mesh: Mesh, knots: Knots, *, f
 def corrected(curve: Curve, h: Array, ends: Indices, knots: Knots, *, fixed_ends: bool) -> Array:
     """Return a motion's polynomials after that correction, shape (K, p+1, columns), ascending powers.
 
+    With accelerations A, shape (columns, n), and rows W_k and U_k of weights, the motion is
+
+        v_(k+1) = v_k + h_k W_k A,    q_(k+1) = q_k + h_k v_k + h_k^2 U_k A.
+
+    The states at the legs' ends are linear in A. The correction dA is the one of least norm for which they are the
+    given ones: S dA = gap, where S holds the sums of these weights up to each end, and positions are divided by the
+    motion's duration so that both have the unit of a velocity.
+
     Parameters
     ----------
     h
@@ -199,46 +248,54 @@ def corrected(curve: Curve, h: Array, ends: Indices, knots: Knots, *, fixed_ends
         Indices of the knots at which legs end.
     """
     W, U = _weights(curve, len(h))
-    qdd = knots.qdd.copy()
+    A = knots.qdd.copy()
     free = slice(1, -1) if fixed_ends else slice(None)
-    # The state at the legs' ends is linear in the accelerations: v = v0 + sum h W a, q = q0 + sum (h v + h^2 U a).
-    velocity = np.cumsum(h[:, None] * W, axis=0)
-    before = np.vstack([np.zeros(W.shape[1]), velocity[:-1]])
-    position = np.cumsum(h[:, None] * before + (h**2)[:, None] * U, axis=0)
-    length = max(float(h.sum()), 1e-12)
-    influence = np.vstack([position[ends - 1] / length, velocity[ends - 1]])[:, free]
+
+    # Influence of A on v and q at the ends of the intervals, shape (K, columns) each.
+    dv = np.cumsum(h[:, None] * W, axis=0)
+    dv_before = np.vstack([np.zeros(W.shape[1]), dv[:-1]])
+    dq = np.cumsum(h[:, None] * dv_before + (h**2)[:, None] * U, axis=0)
+
+    duration = max(float(h.sum()), 1e-12)
+    S = np.vstack([dq[ends - 1] / duration, dv[ends - 1]])[:, free]
     for _ in range(ROUNDS):
-        q, qd = _integrated(knots, qdd, h, W, U)
-        gap = np.vstack([(knots.q[ends] - q[ends]) / length, knots.qd[ends] - qd[ends]])
-        qdd[free] += np.linalg.lstsq(influence, gap, rcond=None)[0]
-    q, qd = _integrated(knots, qdd, h, W, U)
-    interval = Interval(h[:, None], q[:-1], qd[:-1], *curve.values(qdd))
-    first, last = interval.jerks
-    coefficients = np.stack([q[:-1], qd[:-1], interval.a / 2, first / 6, (last - first) / (24 * interval.h)], axis=1)
-    degree = (2, 3, 3, 4)[curve.value]
+        q, qd = _integrated(knots, A, h, W, U)
+        gap = np.vstack([(knots.q[ends] - q[ends]) / duration, knots.qd[ends] - qd[ends]])
+        A[free] += np.linalg.lstsq(S, gap, rcond=None)[0]
+    q, qd = _integrated(knots, A, h, W, U)
+
+    # q(t) = q + qd t + a t^2 / 2 + j0 t^3 / 6 + (j1 - j0) / h t^4 / 24, with a jerk from j0 to j1.
+    interval = Interval(h[:, None], q[:-1], qd[:-1], *curve.values(A))
+    j0, j1 = interval.jerks
+    coefficients = np.stack([q[:-1], qd[:-1], interval.a / 2, j0 / 6, (j1 - j0) / (24 * interval.h)], axis=1)
+    degree = len(curve.column_weights) + 1
     return coefficients[:, : degree + 1]
 
 
-def _integrated(knots: Knots, qdd: Array, h: Array, W: Array, U: Array) -> tuple[Array, Array]:
-    steps = h[:, None] * (W @ qdd)
-    qd = np.vstack([knots.qd[:1], knots.qd[0] + np.cumsum(steps, axis=0)])
-    moves = h[:, None] * qd[:-1] + (h**2)[:, None] * (U @ qdd)
-    return np.vstack([knots.q[:1], knots.q[0] + np.cumsum(moves, axis=0)]), qd
+def _integrated(knots: Knots, A: Array, h: Array, W: Array, U: Array) -> tuple[Array, Array]:
+    """Return joint values and rates at the knots, shape (K+1, n) each, of accelerations A from the first knot's state.
+
+    The sums are those of :func:`corrected`.
+    """
+    gained = h[:, None] * (W @ A)
+    qd = np.vstack([knots.qd[:1], knots.qd[0] + np.cumsum(gained, axis=0)])
+    moved = h[:, None] * qd[:-1] + (h**2)[:, None] * (U @ A)
+    q = np.vstack([knots.q[:1], knots.q[0] + np.cumsum(moved, axis=0)])
+    return q, qd
 
 
 @lru_cache(maxsize=32)
 def _weights(curve: Curve, intervals: int) -> tuple[Array, Array]:
-    """Return the weights of accelerations in an interval's changes of velocity (times h) and position (times h^2).
+    """Return the weights W and U of accelerations in an interval's changes of velocity (/ h) and position (/ h^2).
 
     Shape (K, columns) each.
     """
-    step = (1, 2, 1, 2)[curve.value]
-    w = ((1.0,), (1 / 2, 1 / 2), (1 / 2, 1 / 2), (1 / 6, 4 / 6, 1 / 6))[curve.value]
-    u = ((1 / 2,), (1 / 3, 1 / 6), (1 / 3, 1 / 6), (1 / 6, 1 / 3, 0.0))[curve.value]
-    W, U = np.zeros((2, intervals, curve.columns(intervals)))
+    W = np.zeros((intervals, curve.columns(intervals)))
+    U = np.zeros_like(W)
     for k in range(intervals):
-        W[k, step * k : step * k + len(w)] = w
-        U[k, step * k : step * k + len(u)] = u
+        columns = curve.columns_of(k)
+        W[k, columns] = curve.column_weights
+        U[k, columns] = curve.position_weights
     return W, U
 
 
@@ -257,11 +314,13 @@ def knots_along(trajectory: Trajectory, mesh: Mesh, ends: Array) -> Knots:
         case Curve.CONSTANT:
             qdd = trajectory.qdd(middle)
         case Curve.JUMPING:
+            # Columns alternate: the acceleration after a knot, and that before the next.
             both = [trajectory.qdd(t[:-1], "right"), trajectory.qdd(t[1:], "left")]
             qdd = np.stack(both, axis=1).reshape(-1, trajectory.n)
         case Curve.LINEAR:
             qdd = trajectory.qdd(t)
         case Curve.QUADRATIC:
             qdd = np.empty((2 * len(middle) + 1, trajectory.n))
-            qdd[0::2], qdd[1::2] = trajectory.qdd(t), trajectory.qdd(middle)
+            qdd[0::2] = trajectory.qdd(t)
+            qdd[1::2] = trajectory.qdd(middle)
     return Knots(durations, trajectory.q(t), trajectory.qd(t), qdd)

@@ -35,15 +35,18 @@ MAX_SMALL_JOINTS = 3
 RESTART_FACTORS = (2.5, 0.6)
 """Factors of the guessed durations for further starts, if the first one fails."""
 DETOURS = 3
-"""Number of detours from which programs are solved too: those of arms of two or three joints are small and have several
-local optima; with a given duration they are what is tried if the straight path fails."""
+"""Number of detours from which programs are solved too. Programs of arms of two or three joints are small and have
+several local optima; with a given duration, detours are tried if the straight path fails."""
 MIN_LEG_SHARE = 1e-4
 """Shortest duration of a leg, as a share of the guessed duration of the motion."""
 STILL_DURATION = 1e-3
 """Guessed duration (s) of a motion that nothing limits."""
-MAX_GUESSED_DURATION, GUESSED_DURATIONS = 100.0, 24
-"""Longest duration (s) and number of durations that are compared for the initial guess of mixed objectives."""
+MAX_GUESSED_DURATION = 100.0
+"""Longest duration, s, that is compared for the initial guess of a mixed objective."""
+GUESSED_DURATIONS = 24
+"""Number of durations that are compared for the initial guess of a mixed objective."""
 MIN_COST_SCALE = 1e-9
+"""Smallest scale of an objective, in its unit: the cost of a guess may be 0, and the objective is divided by it."""
 
 
 def leg_durations(arm: LoadedArm, limits: Limits, points: Array) -> Array:
@@ -55,25 +58,39 @@ def leg_durations(arm: LoadedArm, limits: Limits, points: Array) -> Array:
 
 
 def _leg(arm: LoadedArm, limits: Limits, start: Array, goal: Array) -> float:
+    """Return the estimate of one leg's duration, s.
+
+    The cubic from rest to rest, with x = t / T, is q = start + step (3 x^2 - 2 x^3). Its derivatives by x are those by
+    t for T = 1; in a duration T they are divided by T, T^2 and T^3, and torques beyond gravity's by T^2. Each limit
+    thus gives the shortest T.
+    """
     step = goal - start
     x = np.linspace(0.0, 1.0, SAMPLES)[:, None]
     q = start + step * x * x * (3 - 2 * x)
     qd = step * 6 * x * (1 - x)
     qdd = step * (6 - 12 * x)
-    found = [np.max(np.abs(qd) / limits.velocity), np.sqrt(np.max(np.abs(qdd) / limits.acceleration))]
-    found.append(np.cbrt(np.max(12 * np.abs(step) / limits.jerk)))
+    jerk = 12 * np.abs(step)
+
+    durations = [
+        np.max(np.abs(qd) / limits.velocity),
+        np.sqrt(np.max(np.abs(qdd) / limits.acceleration)),
+        np.cbrt(np.max(jerk / limits.jerk)),
+    ]
     if np.isfinite(limits.torque).any():
         states = States(arm, x[:, 0], q, qd, qdd)
-        room = np.maximum(limits.torque - np.abs(states.gravity_torque), MIN_TORQUE_SHARE * limits.torque)
-        found.append(np.sqrt(np.max(np.abs(states.tau - states.gravity_torque) / room)))
-    return float(max(found))
+        g = states.gravity_torque
+        room = np.maximum(limits.torque - np.abs(g), MIN_TORQUE_SHARE * limits.torque)
+        durations.append(np.sqrt(np.max(np.abs(states.tau - g) / room)))
+    return float(max(durations))
 
 
 def straight_motion(task: Task, durations: Array) -> Trajectory:
     """Return cubics between a task's configurations, at rest in between; durations of legs (legs,), s."""
     velocities = np.zeros_like(task.points)
-    velocities[0], velocities[-1] = task.start_velocity, task.goal_velocity
-    return Trajectory.from_samples(task.arm, np.concatenate([[0.0], np.cumsum(durations)]), task.points, velocities)
+    velocities[0] = task.start_velocity
+    velocities[-1] = task.goal_velocity
+    times = np.concatenate([[0.0], np.cumsum(durations)])
+    return Trajectory.from_samples(task.arm, times, task.points, velocities)
 
 
 def straight_knots(task: Task, mesh: Mesh, durations: Array) -> Knots:
@@ -84,38 +101,47 @@ def straight_knots(task: Task, mesh: Mesh, durations: Array) -> Knots:
 def usual_accelerations(task: Task, guess: Knots) -> Array:
     """Return the scales of accelerations, shape (n,), rad/s^2 and m/s^2.
 
-    The acceleration that the torque limit gives a joint alone, or its limit of acceleration; where neither is limited,
-    twice the largest of the initial guess.
+    A scale is the acceleration that the torque limit gives a joint alone, tau_max / M_ii, or its limit of acceleration,
+    whichever is less; where neither is limited, twice the largest of the initial guess.
     """
     limits = task.limits
     n = task.arm.n
-    largest = np.maximum(2 * np.abs(guess.qdd).max(axis=0), 1e-3)
     usual = np.where(np.isfinite(limits.acceleration), limits.acceleration, np.inf)
     if np.isfinite(limits.torque).any():
+        # With unit accelerations at rest, row i of tau - g is column i of M, halfway between start and goal.
         q = np.tile((task.points[0] + task.points[-1]) / 2, (n, 1))
         pushed = States(task.loaded, np.zeros(n), q, np.zeros((n, n)), np.eye(n))
-        inertia = np.diagonal(pushed.tau - pushed.gravity_torque)
-        usual = np.minimum(usual, limits.torque / np.maximum(inertia, 1e-12))
-    return np.where(np.isfinite(usual), usual, np.maximum(largest, 0.05 * largest.max()))
+        M_ii = np.diagonal(pushed.tau - pushed.gravity_torque)
+        usual = np.minimum(usual, limits.torque / np.maximum(M_ii, 1e-12))
+
+    of_guess = np.maximum(2 * np.abs(guess.qdd).max(axis=0), 1e-3)
+    of_guess = np.maximum(of_guess, 0.05 * of_guess.max())
+    return np.where(np.isfinite(usual), usual, of_guess)
 
 
 def detour(task: Task, mesh: Mesh, durations: Array, seed: int) -> Knots:
     """Return a guess through random configurations, one halfway along each leg; durations (legs,), s."""
     rng = np.random.default_rng(seed)
     limits = task.limits
-    points = task.points
+    legs = len(durations)
     reach = np.where(task.arm.numbers.prismatic, max(task.arm.reach, 1e-3), np.pi)
-    half = np.where(np.isfinite(limits.upper - limits.lower), (limits.upper - limits.lower) / 2, reach)
-    halfway = (points[1:] + points[:-1]) / 2 + DETOUR_SHARE * half * rng.uniform(-1, 1, (len(durations), task.arm.n))
-    rows = np.empty((2 * len(durations) + 1, task.arm.n))
-    rows[0::2] = points
-    rows[1::2] = np.clip(halfway, limits.lower, limits.upper)
-    velocities = np.zeros_like(rows)
-    velocities[0], velocities[-1] = task.start_velocity, task.goal_velocity
-    times = np.concatenate(
-        [[0.0], np.cumsum(np.repeat(durations * (1.0 if task.duration else DETOUR_DURATION_FACTOR) / 2, 2))]
-    )
-    return knots_along(Trajectory.from_samples(task.arm, times, rows, velocities), mesh, times[2::2])
+    width = limits.upper - limits.lower
+    half_range = np.where(np.isfinite(width), width / 2, reach)
+
+    middles = (task.points[1:] + task.points[:-1]) / 2
+    halfway = middles + DETOUR_SHARE * half_range * rng.uniform(-1, 1, (legs, task.arm.n))
+    q = np.empty((2 * legs + 1, task.arm.n))
+    q[0::2] = task.points
+    q[1::2] = np.clip(halfway, limits.lower, limits.upper)
+    qd = np.zeros_like(q)
+    qd[0] = task.start_velocity
+    qd[-1] = task.goal_velocity
+
+    # Each leg in two halves of equal duration.
+    factor = 1.0 if task.duration else DETOUR_DURATION_FACTOR
+    halves = np.repeat(durations * factor / 2, 2)
+    times = np.concatenate([[0.0], np.cumsum(halves)])
+    return knots_along(Trajectory.from_samples(task.arm, times, q, qd), mesh, times[2::2])
 
 
 class MotionProgram(Program[Knots]):
@@ -167,24 +193,26 @@ class MotionProgram(Program[Knots]):
     def guessed_durations(self, task: Task) -> Array:
         """Return durations of the legs for an initial guess, shape (legs,), s."""
         durations = leg_durations(task.loaded, task.limits, task.points)
-        durations = np.maximum(durations, 10 * MIN_LEG_SHARE * float(durations.sum()) or STILL_DURATION)
+        shortest = 10 * MIN_LEG_SHARE * float(durations.sum()) or STILL_DURATION
+        durations = np.maximum(durations, shortest)
         if task.duration is not None:
             durations *= task.duration / durations.sum()
-        else:
-            if task.rests and any(constraint.moving for constraint in task.checker.constraints):
-                durations *= self._slowness(task, durations)
-            if not task.objective.only_time:
-                durations *= self._best_factor(task, durations)
+            return durations
+        if task.rests and any(constraint.moving for constraint in task.checker.constraints):
+            durations *= self._slowness(task, durations)
+        if not task.objective.only_time:
+            durations *= self._best_factor(task, durations)
         return durations
 
     def _slowness(self, task: Task, durations: Array) -> float:
-        """Return how much slower the straight path must be for constraints, which may be far below the limits."""
-        slower = task.checker.slow_down(task.checker.states(straight_motion(task, durations)))
-        return slower if np.isfinite(slower) else 1.0
+        """Return the factor by which constraints, which may be far below the limits, slow the straight path down."""
+        c = task.checker.slow_down(task.checker.states(straight_motion(task, durations)))
+        return c if np.isfinite(c) else 1.0
 
     def _best_factor(self, task: Task, durations: Array) -> float:
         """Return the factor of the durations with which the straight path costs least."""
-        factors = np.geomspace(1.0, MAX_GUESSED_DURATION / max(float(durations.sum()), 1e-6), GUESSED_DURATIONS)
+        largest = MAX_GUESSED_DURATION / max(float(durations.sum()), 1e-6)
+        factors = np.geomspace(1.0, largest, GUESSED_DURATIONS)
         motions = (self._assembled(task, straight_knots(task, self.mesh, durations * factor)) for factor in factors)
         costs = [cost_of(task.objective, motion, task.loaded, task.friction) for motion in motions]
         return float(factors[int(np.argmin(costs))])
@@ -200,10 +228,12 @@ class MotionProgram(Program[Knots]):
         each = [parameters for _, parameters in task.checker.every]
         cost = self._cost_scale(task, guess)
         usual = usual_accelerations(task, guess)
+        parameters = problem.parameters(task.load, each, 1 / cost, usual)
+        shortest_leg = MIN_LEG_SHARE * float(guess.durations.sum())
         return Arguments(
             problem.vector(guess, task.load),
-            np.append(problem.parameters(task.load, each, 1 / cost, usual), self._planes),
-            self._bounds(task, margins, MIN_LEG_SHARE * float(guess.durations.sum())),
+            np.append(parameters, self._planes),
+            self._bounds(task, margins, shortest_leg),
             problem.scaling(self.blocks, guess, cost),
         )
 
@@ -228,12 +258,13 @@ class MotionProgram(Program[Knots]):
         n = task.arm.n
         low = np.full(at.count, -np.inf)
         high = np.full(at.count, np.inf)
-        position, given = task.checker.every[Limit.POSITION]
 
-        def set_bounds(indices: Indices, lower: Array, upper: Array) -> None:
+        def set_bounds(indices: Indices, lower: Array | float, upper: Array | float) -> None:
             low[indices] = lower
             high[indices] = upper
 
+        # The joint limits, less their margins.
+        position, given = task.checker.every[Limit.POSITION]
         lower, upper = position.bounds(given, margins.at_knots(Limit.POSITION, n))
         set_bounds(at.q, lower.T, upper.T)
         if at.middles[0].size:
@@ -242,16 +273,19 @@ class MotionProgram(Program[Knots]):
         speed = limits.velocity[:, None] * (1 - margins.at_knots(Limit.VELOCITY, n).T)
         set_bounds(at.qd, -speed, speed)
         set_bounds(at.qdd, -limits.acceleration[:, None], limits.acceleration[:, None])
+
+        # The given configurations at the ends of legs, and the states at the start and the goal.
         for k, point in zip((0, *mesh.ends), task.points, strict=True):
             set_bounds(at.q[:, k], point, point)
         for k, velocity in ((0, task.start_velocity), (-1, task.goal_velocity)):
             set_bounds(at.qd[:, k], velocity, velocity)
             if self.problem.jerk_counts:
                 set_bounds(at.qdd[:, k], np.zeros(n), np.zeros(n))
+
         low[at.durations] = shortest_leg
         low[at.positive_parts] = 0.0
         if task.duration is not None and len(mesh.legs) == 1:
-            low[at.durations] = high[at.durations] = task.duration
+            set_bounds(at.durations, task.duration, task.duration)
         return low, high
 
     # Solutions
@@ -289,7 +323,9 @@ def curves_for(n: int, objective: Objective, *, jerk_counts: bool, friction: boo
     if objective.has_time:
         if jerk_counts:
             return (Curve.LINEAR,)
-        return (Curve.JUMPING if n <= MAX_SMALL_JOINTS else Curve.CONSTANT,)
+        return (Curve.JUMPING,) if n <= MAX_SMALL_JOINTS else (Curve.CONSTANT,)
     if jerk_counts:
         return (Curve.QUADRATIC, Curve.LINEAR)
-    return (Curve.QUADRATIC, Curve.CONSTANT) if objective.is_smooth and not friction else (Curve.CONSTANT,)
+    if objective.is_smooth and not friction:
+        return (Curve.QUADRATIC, Curve.CONSTANT)
+    return (Curve.CONSTANT,)

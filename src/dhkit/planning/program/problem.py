@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +32,10 @@ if TYPE_CHECKING:
 SMOOTHING_WEIGHTS = {Curve.CONSTANT: 1e-3, Curve.JUMPING: 1e-5, Curve.LINEAR: 1e-4, Curve.QUADRATIC: 1e-3}
 """Weight of squared accelerations in objectives of time or energy, as a share of the objective: joints with spare time
 then move smoothly. Curves for arms of few joints, whose joints have little spare time, get less."""
-USUAL_MOVE, USUAL_DURATIONS = 0.1, (0.1, 10.0)
-"""Smallest largest move (rad or m) and range of durations (s) of motions that are planned in SI units."""
+USUAL_MOVE = 0.1
+"""Largest joint move, rad or m, from which a motion is planned in SI units; a smaller one is scaled to order 1."""
+USUAL_DURATIONS = (0.1, 10.0)
+"""Range of durations, s, of motions that are planned with the second as the unit of time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,29 +43,32 @@ class Variables:
     """Indices of a program's variables: a row for each joint, a column for each point; empty where there are none."""
 
     durations: Indices
-    """Of each leg, shape (legs,)."""
+    """Durations of the legs, shape (legs,)."""
     q: Indices
-    """At the knots, shape (n, intervals + 1)."""
+    """Joint values at the knots, shape (n, intervals + 1)."""
     qd: Indices
+    """Joint rates at the knots, shape (n, intervals + 1)."""
     qdd: Indices
-    """Shape (n, columns), see :class:`Curve`."""
+    """Accelerations, shape (n, columns), see :class:`Curve`."""
     middles: tuple[Indices, Indices, Indices]
     """Joint values, rates and accelerations at the middles of intervals, shape (n, intervals) each or empty."""
     positive_parts: Indices
-    """Of the objective's quantities at the points of the states, shape (k, P)."""
+    """Positive parts of the objective's quantities at the points of the states, shape (k, P)."""
 
     @classmethod
     def of(cls, n: int, mesh: Mesh, middles: tuple[bool, bool, bool]) -> Variables:
         """Return the indices of variables in the order of the fields, point by point."""
         K = mesh.intervals
-        counts = (K + 1, K + 1, mesh.curve.columns(K), *(K * is_there for is_there in middles))
-        edges = len(mesh.legs) + n * np.cumsum([0, *counts])
-        q, qd, qdd, *rest = (
+        legs = len(mesh.legs)
+        counts = [K + 1, K + 1, mesh.curve.columns(K), *(K * is_there for is_there in middles)]
+        edges = legs + n * np.cumsum([0, *counts])
+        blocks = [
             np.arange(edge, edge + n * count).reshape(n, count, order="F")
             for edge, count in zip(edges[:-1], counts, strict=True)
-        )
+        ]
+        q, qd, qdd, q_middle, qd_middle, qdd_middle = blocks
         none = np.zeros((0, 0), dtype=int)
-        return cls(np.arange(len(mesh.legs)), q, qd, qdd, (rest[0], rest[1], rest[2]), none)
+        return cls(np.arange(legs), q, qd, qdd, (q_middle, qd_middle, qdd_middle), none)
 
     def with_positive_parts(self, quantities: int, points: int) -> Variables:
         """Return the same with the positive parts of so many quantities at so many points of the states."""
@@ -82,62 +87,86 @@ class StatePoints:
     """Points of a motion: the indices of their variables, their intervals, and their weights in an integral."""
 
     q: Indices
-    """Shape (n, P)."""
+    """Joint values, shape (n, P)."""
     qd: Indices
+    """Joint rates, shape (n, P)."""
     qdd: Indices
+    """Accelerations, shape (n, P)."""
     intervals: Indices
     """First and last interval of each point, shape (P, 2)."""
     weights: Array
-    """Shape (P,), shares of the leg's duration."""
+    """Weights in an integral over time as shares of the leg's duration, shape (P,)."""
     leg: Indices
-    """Shape (P,)."""
+    """Leg of each point, shape (P,)."""
     is_limited: NDArray[np.bool_]
     """Whether limits apply, shape (P,): a point that appears twice is limited once."""
 
     @classmethod
     def of(cls, mesh: Mesh, at: Variables, *, with_middles: bool) -> StatePoints:
-        """Return the ends of intervals, and their middles on request; a curve without jumps has both ends in common."""
-        K = mesh.intervals
-        step = np.arange(mesh.intervals)
-        columns = np.array([mesh.curve.columns_of(k) for k in range(K)])
-        each = np.stack([step, step], axis=1)
+        """Return the ends of intervals, and their middles on request; a curve without jumps has both ends in common.
+
+        The weights are those of Simpson's rule with middles, else of the trapezoidal rule, for an interval of length h:
+
+            integral f dt = h/6 (f_begin + 4 f_middle + f_end),    integral f dt = h/2 (f_begin + f_end).
+        """
         if mesh.curve in (Curve.CONSTANT, Curve.JUMPING):
-            ends = cls._of(
-                np.hstack([at.q[:, :-1], at.q[:, 1:]]),
-                np.hstack([at.qd[:, :-1], at.qd[:, 1:]]),
-                np.hstack([at.qdd[:, columns[:, 0]], at.qdd[:, columns[:, -1]]]),
-                np.vstack([each, each]),
-                np.tile(mesh.shares, 2) * (1 / 6 if with_middles else 1 / 2),
-                np.tile(mesh.leg, 2),
-            )
+            ends = cls._ends_of_intervals(mesh, at, weight=1 / 6 if with_middles else 1 / 2)
         else:
-            # A knot between two legs appears once for each, since its weights depend on both durations.
-            leg, shares = mesh.leg, mesh.shares
-            knots = [(leg[0], 0, 0, 0, shares[0] / 6)]
-            for k in range(1, K):
-                before = shares[k - 1] / 6
-                after = shares[k] / 6
-                if leg[k] == leg[k - 1]:
-                    knots.append((leg[k], k, k - 1, k, before + after))
-                else:
-                    knots += [(leg[k - 1], k, k - 1, k, before), (leg[k], k, k - 1, k, after)]
-            knots.append((leg[-1], K, K - 1, K - 1, shares[-1] / 6))
-            which = np.array([knot[:4] for knot in knots], dtype=int)
-            at_knot = np.append(columns[:, 0], columns[-1, -1])
-            ends = cls._of(
-                at.q[:, which[:, 1]],
-                at.qd[:, which[:, 1]],
-                at.qdd[:, at_knot[which[:, 1]]],
-                which[:, 2:],
-                np.array([knot[4] for knot in knots]),
-                which[:, 0],
-                np.append(True, np.diff(which[:, 1]) > 0),
-            )
+            ends = cls._knots(mesh, at)
         if not with_middles:
             return ends
+
+        k = np.arange(mesh.intervals)
         q, qd, qdd = at.middles
-        qdd = qdd if qdd.size else at.qdd[:, columns[:, 1]]
-        return ends._with_points(cls._of(q, qd, qdd, each, 2 / 3 * mesh.shares, mesh.leg))
+        if not qdd.size:  # quadratic accelerations: those at the middles are variables of the curve
+            qdd = at.qdd[:, [mesh.curve.columns_of(i)[1] for i in range(mesh.intervals)]]
+        return ends._with_points(cls._of(q, qd, qdd, np.stack([k, k], axis=1), 2 / 3 * mesh.shares, mesh.leg))
+
+    @classmethod
+    def _ends_of_intervals(cls, mesh: Mesh, at: Variables, weight: float) -> StatePoints:
+        """Return the beginnings of all intervals, then their ends: two points a knot, where accelerations jump."""
+        k = np.arange(mesh.intervals)
+        each = np.stack([k, k], axis=1)
+        columns = np.array([mesh.curve.columns_of(i) for i in range(mesh.intervals)])
+        return cls._of(
+            np.hstack([at.q[:, :-1], at.q[:, 1:]]),
+            np.hstack([at.qd[:, :-1], at.qd[:, 1:]]),
+            np.hstack([at.qdd[:, columns[:, 0]], at.qdd[:, columns[:, -1]]]),
+            np.vstack([each, each]),
+            np.tile(mesh.shares, 2) * weight,
+            np.tile(mesh.leg, 2),
+        )
+
+    @classmethod
+    def _knots(cls, mesh: Mesh, at: Variables) -> StatePoints:
+        """Return the knots, with the weights of Simpson's rule; a knot between two legs appears once for each.
+
+        Its weights depend on both durations.
+        """
+        K = mesh.intervals
+        leg = mesh.leg
+        sixth = mesh.shares / 6
+        points = [_KnotPoint(leg[0], 0, 0, 0, sixth[0])]
+        for k in range(1, K):
+            if leg[k] == leg[k - 1]:
+                points.append(_KnotPoint(leg[k], k, k - 1, k, sixth[k - 1] + sixth[k]))
+            else:
+                points.append(_KnotPoint(leg[k - 1], k, k - 1, k, sixth[k - 1]))
+                points.append(_KnotPoint(leg[k], k, k - 1, k, sixth[k]))
+        points.append(_KnotPoint(leg[-1], K, K - 1, K - 1, sixth[-1]))
+
+        knot = np.array([point.knot for point in points])
+        columns = [mesh.curve.columns_of(k) for k in range(K)]
+        column_at = np.array([*(of_interval[0] for of_interval in columns), columns[-1][-1]])
+        return cls._of(
+            at.q[:, knot],
+            at.qd[:, knot],
+            at.qdd[:, column_at[knot]],
+            np.array([(point.before, point.after) for point in points]),
+            np.array([point.weight for point in points]),
+            np.array([point.leg for point in points]),
+            np.append(True, np.diff(knot) > 0),
+        )
 
     @classmethod
     def _of(
@@ -172,6 +201,47 @@ class StatePoints:
         )
 
 
+class _KnotPoint(NamedTuple):
+    """A knot of a mesh as a point of one leg's integral."""
+
+    leg: int
+    knot: int
+    before: int
+    """Interval before the knot; that after the first one."""
+    after: int
+    weight: float
+    """Share of the leg's duration."""
+
+
+@dataclass(frozen=True, eq=False)
+class _ParameterIndices:
+    """Indices of a program's parameters."""
+
+    load: Indices
+    """Indices of the payload's parameters; empty without a payload."""
+    constraints: list[Indices]
+    """Indices of the parameters of each constraint of the motion."""
+    scale: Indices
+    """Index of the scale of the cost, shape (1,)."""
+    usual: Indices
+    """Indices of the reciprocals of the accelerations' scales, shape (n,)."""
+    shares: Indices
+    """Indices of the shares of intervals in their legs, shape (K,)."""
+    weights: Indices
+    """Indices of the weights of the states in an integral, shape (P,) or empty."""
+
+    @property
+    def count(self) -> int:
+        """The number of parameters."""
+        others = (self.scale, self.usual, self.shares, self.weights)
+        return len(self.of_point) + sum(len(indices) for indices in others)
+
+    @property
+    def of_point(self) -> Indices:
+        """Indices of the parameters of the payload and of all constraints."""
+        return np.concatenate([self.load, *self.constraints])
+
+
 class Problem:
     """The nonlinear program of one arm, objective and set of constraints on one mesh.
 
@@ -199,11 +269,10 @@ class Problem:
         self.jerk_limited = jerk_limited
         self.point = Point(description, limits, friction, payload)
         self._plane_functions: dict[tuple[int, int | None], LocalFunction] = {}
-        every = enumerate(motion_constraints(limits, NO_AVOIDANCE, constraints))
+        self._every = dict(enumerate(motion_constraints(limits, NO_AVOIDANCE, constraints)))
+
         # Positions, rates and accelerations are variables; their limits are bounds, and rows inside intervals.
-        self._every = dict(every)
-        others = [(k, constraint) for k, constraint in self._every.items() if k >= Limit.TORQUE]
-        others = [(k, constraint) for k, constraint in others if constraint.is_limiting]
+        others = [pair for pair in self._every.items() if pair[0] >= Limit.TORQUE and pair[1].is_limiting]
         self.moving = tuple(pair for pair in others if pair[1].moving)
         self.places = tuple(pair for pair in others if not pair[1].moving)
         self.with_states = bool(self.moving) or objective.has_integral
@@ -237,21 +306,23 @@ class Problem:
 
     @property
     def _states_at_middles(self) -> bool:
+        curve = self.mesh.curve
         has_constraints = any(k > Limit.CLEARANCE for k, _ in self.moving)
-        return self.mesh.curve in (Curve.LINEAR, Curve.QUADRATIC) or (
-            self.mesh.curve is Curve.JUMPING and has_constraints
-        )
+        return curve in (Curve.LINEAR, Curve.QUADRATIC) or (curve is Curve.JUMPING and has_constraints)
 
     def vector(self, knots: Knots, load: Array | None) -> Array:
         """Return the variables of a motion, shape (variables,), SI units; a payload's parameters are shape (10,)."""
         at = self.variables
         interval = knots.intervals(self.mesh)
         x = np.empty(at.count)
-        middles = (interval.q_middle, interval.qd_middle, interval.b)
-        given = zip((at.q, at.qd, at.qdd, *at.middles), (knots.q, knots.qd, knots.qdd, *middles), strict=True)
         x[at.durations] = knots.durations
-        for indices, values in given:
-            x[indices.ravel()] = values.T.ravel() if indices.size else []
+        x[at.q] = knots.q.T
+        x[at.qd] = knots.qd.T
+        x[at.qdd] = knots.qdd.T
+        middles = (interval.q_middle, interval.qd_middle, interval.b)
+        for indices, values in zip(at.middles, middles, strict=True):
+            if indices.size:
+                x[indices] = values.T
         if at.positive_parts.size:
             points = self._state_points
             states = (x[points.q], x[points.qd], x[points.qdd])
@@ -285,10 +356,13 @@ class Problem:
         total = float(guess.durations.sum())
         length = span if 0 < span < USUAL_MOVE else 1.0
         time = 1.0 if USUAL_DURATIONS[0] < total < USUAL_DURATIONS[1] else total
-        units = program.unscaled
         rate = cost / total
-        for k, indices in enumerate((at.q, at.qd, at.qdd, *at.middles)):
-            units.unit[indices] = length / time ** (k % 3)
+
+        # A derivative of order k has the unit length / time^k.
+        units = program.unscaled
+        for order, (at_knots, at_middles) in enumerate(zip((at.q, at.qd, at.qdd), at.middles, strict=True)):
+            units.unit[at_knots] = length / time**order
+            units.unit[at_middles] = length / time**order
         units.unit[at.durations] = time
         units.unit[at.positive_parts] = rate
         if length < 1.0:
@@ -300,10 +374,20 @@ class Problem:
     # Arguments
 
     @cached_property
-    def parameter_sizes(self) -> tuple[int, ...]:
-        """Lengths of the parameters: payload, each constraint, scale of the cost, scales of accelerations, shares."""
-        each = (constraint.size(self.description) for constraint in self._every.values())
-        return (LOAD if self.payload else 0, *each, 1, self.n, self.mesh.intervals, len(self._weights))
+    def _parameter_indices(self) -> _ParameterIndices:
+        """Indices of the program's parameters, in the order of :meth:`parameters`."""
+        of_constraints = [constraint.size(self.description) for constraint in self._every.values()]
+        counts = [
+            LOAD if self.payload else 0,
+            *of_constraints,
+            1,
+            self.n,
+            self.mesh.intervals,
+            len(self._weights),
+        ]
+        edges = np.cumsum([0, *counts])
+        load, *constraints, scale, usual, shares, weights = [np.arange(a, b) for a, b in pairwise(edges)]
+        return _ParameterIndices(load, constraints, scale, usual, shares, weights)
 
     def parameters(self, load: Array | None, each: Sequence[Array], scale: float, usual: Array) -> Array:
         """Return the program's parameters as one array.
@@ -318,12 +402,6 @@ class Problem:
         given = [np.zeros(0) if load is None else load, *each, [scale], 1 / usual]
         return np.concatenate([*given, self.mesh.shares, self._weights])
 
-    @cached_property
-    def _parameter_indices(self) -> list[Indices]:
-        """Indices of each of ``parameter_sizes``."""
-        edges = np.cumsum([0, *self.parameter_sizes])
-        return [np.arange(a, b) for a, b in pairwise(edges)]
-
     # The program
 
     @cached_property
@@ -334,7 +412,7 @@ class Problem:
             blocks.append(self._states)
         if self.places:
             blocks.append(self._resting_places)
-        return BlockProgram(self.variables.count, sum(self.parameter_sizes), tuple(blocks))
+        return BlockProgram(self.variables.count, self._parameter_indices.count, tuple(blocks))
 
     def apart(self, rows: Sequence[PlaneRow]) -> tuple[BlockProgram, Array]:
         """Return the program with points of links kept on their sides of planes, and its additional parameters."""
@@ -355,42 +433,49 @@ class Problem:
         return BlockProgram(at.count, begin, tuple(blocks)), np.concatenate(values)
 
     def _beside_plane(self, link: int, frame: int | None) -> LocalFunction:
-        """Return how far a point of a link, given in its frame, is beyond a plane of the world or another frame, m."""
+        """Return how far a point of a link, given in its frame, is beyond a plane of the world or another frame, m.
+
+        With the point p in frame ``link`` and the plane n . x = level in frame f, or in the world w with f = 0:
+
+            n . x - level,    x = A_(f+1) ... A_link p,    before which T_w0 stands for a plane of the world.
+        """
         import casadi
 
-        if (link, frame) not in self._plane_functions:
-            point = casadi.SX.sym("point", 3)
-            normal = casadi.SX.sym("normal", 3)
-            level = casadi.SX.sym("level")
-            table = SymbolicTable.of(self.description)
-            q = self.point.q
-            x = casadi.vertcat(point, 1)
-            for i in reversed(range(frame or 0, link)):
-                x = table.link_transform(i, q[i]) @ x
-            if frame is None:
-                x = table.world_to_frames(q)[0] @ x
-            x = x[:3]
-            parameters = casadi.vertcat(point, normal, level)
-            beyond = casadi.dot(normal, x) - level
-            self._plane_functions[link, frame] = LocalFunction(self.point.q, parameters, beyond)
-        return self._plane_functions[link, frame]
+        if (link, frame) in self._plane_functions:
+            return self._plane_functions[link, frame]
+        p = casadi.SX.sym("point", 3)
+        normal = casadi.SX.sym("normal", 3)
+        level = casadi.SX.sym("level")
+        table = SymbolicTable.of(self.description)
+        q = self.point.q
+
+        x = casadi.vertcat(p, 1)
+        for i in reversed(range(frame or 0, link)):
+            x = table.link_transform(i, q[i]) @ x
+        if frame is None:
+            x = table.world_to_frames(q)[0] @ x
+
+        beyond = casadi.dot(normal, x[:3]) - level
+        function = LocalFunction(q, casadi.vertcat(p, normal, level), beyond)
+        self._plane_functions[link, frame] = function
+        return function
 
     @property
     def _durations(self) -> Block:
-        """The block of the legs' durations."""
+        """The block of the legs' durations D: the row sum D, and the objective's w_time sum D, scaled."""
         import casadi
 
         D = casadi.SX.sym("durations", len(self.mesh.legs))
         scale = casadi.SX.sym("scale")
         total = casadi.sum1(D)
         function = LocalFunction(D, scale, total, scale * self.objective.time_weight * total)
-        scale_index = self._parameter_indices[-4]
+        scale_index = self._parameter_indices.scale
         kinds = (Rows(RowKind.DURATION, "duration", 1),)
         return Block(function, self.variables.durations[:, None], scale_index[:, None], kinds)
 
     @property
     def _intervals(self) -> Block:
-        """The block of the intervals: continuity, and bounds of what lies inside."""
+        """The block of the intervals: continuity, bounds inside them, and costs of accelerations and jerks."""
         import casadi
 
         n = self.n
@@ -399,27 +484,42 @@ class Problem:
         K = mesh.intervals
         curve = mesh.curve
         symbol = casadi.SX.sym
+
+        # Interval k lasts h = share * (duration of its leg). Its variables are the states at both its ends, the columns
+        # of its accelerations, and the state at its middle where limits apply there.
         duration = symbol("duration")
         share = symbol("share")
+        q = symbol("q", n)
+        qd = symbol("qd", n)
+        q_next = symbol("q_next", n)
+        qd_next = symbol("qd_next", n)
+        columns = [symbol(f"qdd{k}", n) for k in range(len(curve.columns_of(0)))]
+        lifted = [symbol(f"middle{k}", n if indices.size else 0) for k, indices in enumerate(at.middles)]
         scale = symbol("scale")
         usual = symbol("usual", n)
-        q, qd, q_next, qd_next = (symbol(name, n) for name in ("q", "qd", "q_next", "qd_next"))
-        accelerations = [symbol(f"qdd{k}", n) for k in range(len(curve.columns_of(0)))]
-        lifted = [symbol(f"middle{k}", n if indices.size else 0) for k, indices in enumerate(at.middles)]
-        interval = Interval(share * duration, q, qd, *curve.abc(accelerations))
+        interval = Interval(share * duration, q, qd, *curve.abc(columns))
+        h = interval.h
         a = interval.a
         b = interval.b
         c = interval.c
-        h = interval.h
-        continuity = [
+
+        # Continuity: the variables at the end and at the middle are those of the motion.
+        position, velocity, acceleration = (
             Rows(RowKind.CONTINUITY, f"continuity of {what}", n, order=order, of_joints=True)
             for order, what in enumerate(("position", "velocity", "acceleration"))
-        ]
-        rows = [(continuity[0], q_next - interval.q_end), (continuity[1], qd_next - interval.qd_end)]
-        for kind, symbols, value in zip(continuity, lifted, (interval.q_middle, interval.qd_middle, b), strict=True):
-            if symbols.numel():
-                rows.append((kind, symbols - value))
-        # Polynomials are inside the hull of their Bernstein coefficients: of positions, velocities, accelerations.
+        )
+        rows = [(position, q_next - interval.q_end), (velocity, qd_next - interval.qd_end)]
+        of_motion = (interval.q_middle, interval.qd_middle, b)
+        for kind, variable, value in zip((position, velocity, acceleration), lifted, of_motion, strict=True):
+            if variable.numel():
+                rows.append((kind, variable - value))
+
+        # Inside an interval a polynomial lies in the convex hull of its Bernstein coefficients (Farin, Curves and
+        # Surfaces for CAGD, 2002, ch. 5). The first and the last are its values at the ends, which are bounded as
+        # variables; those between them are rows. With v = qd, from the derivatives at the ends:
+        #   square    x,  x + h/2 x',  x_next
+        #   cubic     x,  x + h/3 x',  x_next - h/3 x'_next,  x_next
+        # A quadratic acceleration through a, b, c has the middle coefficient 2 b - (a + c) / 2.
         inside: dict[Limit, list[casadi.SX]] = {}
         match curve:
             case Curve.CONSTANT:
@@ -431,34 +531,48 @@ class Problem:
                 inside[Limit.VELOCITY] = [qd + h / 3 * a, qd_next - h / 3 * c]
                 inside[Limit.ACCELERATION] = [2 * b - (a + c) / 2]
         if self.jerk_limited:
+            # The jerk is linear, and constant where the acceleration is linear.
             inside[Limit.JERK] = list(interval.jerks)[: 1 if curve is Curve.LINEAR else 2]
+
+        # Rows of positions are in rad and m; the others are shares of their limits.
         reciprocals = {limit: symbol(limit.what, n) for limit in inside if limit is not Limit.POSITION}
         for limit, values in inside.items():
-            order = 0 if limit is Limit.POSITION else None
-            kind = Rows(RowKind.LIMIT, limit.what, n, limit, order, of_joints=True)
-            rows += [(kind, value * reciprocals[limit] if limit in reciprocals else value) for value in values]
+            if limit is Limit.POSITION:
+                kind = Rows(RowKind.LIMIT, limit.what, n, limit, order=0, of_joints=True)
+                rows += [(kind, value) for value in values]
+            else:
+                kind = Rows(RowKind.LIMIT, limit.what, n, limit, of_joints=True)
+                rows += [(kind, value * reciprocals[limit]) for value in values]
+
         cost = casadi.SX(1, 1)
         if self.objective.needs_smoothing:
+            # The mean square of accelerations relative to the usual ones. Intervals count by their shares of time,
+            # since meshes are finer at their ends.
             weights = curve.column_weights
-            mean = sum(w * casadi.sumsqr(x * usual) for w, x in zip(weights, accelerations, strict=True))
-            # Weighted by shares of time, since meshes are finer at their ends.
-            cost += SMOOTHING_WEIGHTS[curve] / (n * len(mesh.legs)) * share * mean
+            mean_square = sum(w * casadi.sumsqr(x * usual) for w, x in zip(weights, columns, strict=True))
+            cost += SMOOTHING_WEIGHTS[curve] / (n * len(mesh.legs)) * share * mean_square
         if self.objective.has_jerk:
-            first, last = interval.jerks
-            squares = casadi.sum1(first * first + first * last + last * last) / 3
-            cost += scale * self.objective.jerk_weight * h * squares
-        z = casadi.vertcat(duration, q, qd, q_next, qd_next, *accelerations, *lifted)
-        p = casadi.vertcat(share, scale, usual, *reciprocals.values())
-        columns = np.array([curve.columns_of(k) for k in range(K)])
-        *_, scale_at, usual_at, shares_at, _ = self._parameter_indices
+            # The jerk is linear from j0 to j1, so that the integral of its square is h/3 (j0^2 + j0 j1 + j1^2).
+            j0, j1 = interval.jerks
+            mean_square = casadi.sum1(j0 * j0 + j0 * j1 + j1 * j1) / 3
+            cost += scale * self.objective.jerk_weight * h * mean_square
+
+        z = casadi.vertcat(duration, q, qd, q_next, qd_next, *columns, *lifted)
+        column_at = np.array([curve.columns_of(k) for k in range(K)])
         variables = [
             at.durations[mesh.leg][None],
-            *(side for ends in (slice(None, -1), slice(1, None)) for side in (at.q[:, ends], at.qd[:, ends])),
-            *(at.qdd[:, column] for column in columns.T),
+            at.q[:, :-1],
+            at.qd[:, :-1],
+            at.q[:, 1:],
+            at.qd[:, 1:],
+            *(at.qdd[:, column] for column in column_at.T),
             *(indices for indices in at.middles if indices.size),
         ]
-        of_limits = [self._parameter_indices[1 + limit] for limit in reciprocals]
-        parameters = [shares_at[None], np.tile(np.concatenate([scale_at, usual_at, *of_limits])[:, None], K)]
+
+        p = casadi.vertcat(share, scale, usual, *reciprocals.values())
+        indices = self._parameter_indices
+        common = np.concatenate([indices.scale, indices.usual, *(indices.constraints[limit] for limit in reciprocals)])
+        parameters = [indices.shares[None], np.tile(common[:, None], K)]
         return Block(
             LocalFunction(z, p, casadi.vertcat(*(value for _, value in rows)), cost),
             np.vstack(variables),
@@ -479,30 +593,42 @@ class Problem:
 
     @property
     def _states(self) -> Block:
-        """The block of the states: torques, moving constraints, and the integrands of the objective."""
+        """The block of the states: torques, moving constraints, and the integrands of the objective.
+
+        An objective's positive parts max(0, P) are not smooth. Each is replaced by a variable u >= 0 with the row
+        u - P >= 0, which a minimum keeps at max(0, P). The cost of a point is
+
+            scale * weight * duration * (integrand + sum u).
+        """
         import casadi
 
         point = self.point
         points = self._state_points
         symbols = self._parameter_symbols
         rows = limit_rows(self.moving, point, symbols[1:])
-        duration, scale, weight = (casadi.SX.sym(name) for name in ("duration", "scale", "weight"))
-        z = [point.q, point.qd, point.qdd]
-        p = list(symbols)
         cost = None
+
+        z = [point.q, point.qd, point.qdd]
         variables: list[Indices] = [points.q, points.qd, points.qdd]
-        parameters = np.concatenate(self._parameter_indices[: len(symbols)])[:, None]
-        parameters = np.tile(parameters, points.count)
+        p = list(symbols)
+        indices = self._parameter_indices
+        parameters = np.tile(indices.of_point[:, None], points.count)
+
         if self.objective.has_integral:
+            duration = casadi.SX.sym("duration")
+            scale = casadi.SX.sym("scale")
+            weight = casadi.SX.sym("weight")
             power = self._power
-            parts = casadi.SX.sym("parts", self._power.numel())
-            rows.append((Rows(RowKind.POSITIVE_PART, "positive power", power.numel()), parts - power))
-            cost = scale * weight * duration * (self.objective.integrand(point) + casadi.sum1(parts))
-            z += [duration, parts]
+            u = casadi.SX.sym("parts", power.numel())
+            rows.append((Rows(RowKind.POSITIVE_PART, "positive power", power.numel()), u - power))
+            cost = scale * weight * duration * (self.objective.integrand(point) + casadi.sum1(u))
+
+            z += [duration, u]
             variables += [self.variables.durations[points.leg][None], self.variables.positive_parts]
-            *_, scale_at, _, _, weights_at = self._parameter_indices
-            parameters = np.vstack([parameters, np.tile(scale_at, points.count)[None], weights_at[None]])
             p += [scale, weight]
+            scales = np.tile(indices.scale, points.count)
+            parameters = np.vstack([parameters, scales[None], indices.weights[None]])
+
         return Block(
             LocalFunction(casadi.vertcat(*z), casadi.vertcat(*p), casadi.vertcat(*(value for _, value in rows)), cost),
             np.vstack(variables),
@@ -521,14 +647,16 @@ class Problem:
         K = self.mesh.intervals
         symbols = self._parameter_symbols
         rows = limit_rows(self.places, self.point, symbols[1:])
-        step = np.arange(K)
-        parameters = np.concatenate(self._parameter_indices[: len(symbols)])[:, None]
+        parameters = self._parameter_indices.of_point[:, None]
+        k = np.arange(K)
+        beside_knots = np.stack([k[:-1], k[1:]], axis=1)
+        around_middles = np.stack([k, k], axis=1)
         return Block(
             LocalFunction(self.point.q, casadi.vertcat(*symbols), casadi.vertcat(*(value for _, value in rows))),
             np.hstack([at.q[:, 1:-1], at.middles[0]]),
             np.tile(parameters, 2 * K - 1),
             tuple(kind for kind, _ in rows),
-            np.vstack([np.stack([step[:-1], step[1:]], axis=1), np.stack([step, step], axis=1)]),
+            np.vstack([beside_knots, around_middles]),
         )
 
     @cached_property
@@ -536,8 +664,8 @@ class Problem:
         """Symbols of the payload and of each constraint's parameters."""
         import casadi
 
-        sizes = self.parameter_sizes[1 : 1 + len(self._every)]
-        return [self.point.load, *(casadi.SX.sym(f"p{k}", size) for k, size in enumerate(sizes))]
+        constraints = self._parameter_indices.constraints
+        return [self.point.load, *(casadi.SX.sym(f"p{k}", len(at)) for k, at in enumerate(constraints))]
 
 
 def _unit(rows: Rows, length: float, time: float, rate: float) -> float:

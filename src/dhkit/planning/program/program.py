@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -118,7 +118,9 @@ class Margins:
     def at_knots(self, limit: int, count: int) -> Array:
         """Return the margins at knots, shape (intervals + 1, count), without unit."""
         k = np.arange(self.intervals + 1)
-        return self.at_points(limit, count, np.stack([np.maximum(k - 1, 0), np.minimum(k, k[-1] - 1)], axis=1))
+        before = np.maximum(k - 1, 0)
+        after = np.minimum(k, self.intervals - 1)
+        return self.at_points(limit, count, np.stack([before, after], axis=1))
 
     def raised(self, more: dict[int, Array]) -> Margins:
         """Return margins raised by shares of limits, shape (intervals, rows) each."""
@@ -140,7 +142,7 @@ class Arguments:
     x: Array
     """Variables of the guess, shape (variables,), SI units."""
     parameters: Array
-    """Shape (parameters,)."""
+    """Parameters of the program, shape (parameters,)."""
     bounds: tuple[Array, Array]
     """Lower and upper bounds of the variables, shape (variables,) each, SI units."""
     scaling: Scaling
@@ -200,14 +202,14 @@ class Program(ABC, Generic[Iterate]):
 
 def row_bounds(task: Task, blocks: BlockProgram, margins: Margins) -> tuple[Array, Array]:
     """Return the lower and upper bounds of a program's rows, shape (rows,) each, in the units of the rows."""
-    lows, highs = [np.zeros(0)], [np.zeros(0)]
+    lows = [np.zeros(0)]
+    highs = [np.zeros(0)]
     for block in blocks.blocks:
         if not block.rows:
             continue
         each = [_bounds(task, margins, block, rows) for rows in block.rows]
-        low, high = (np.concatenate(side, axis=1) for side in zip(*each, strict=True))
-        lows.append(low.ravel())
-        highs.append(high.ravel())
+        lows.append(np.concatenate([low for low, _ in each], axis=1).ravel())
+        highs.append(np.concatenate([high for _, high in each], axis=1).ravel())
     return np.concatenate(lows), np.concatenate(highs)
 
 
@@ -239,22 +241,37 @@ def _bounds(task: Task, margins: Margins, block: Block, rows: Rows) -> tuple[Arr
     return zero, zero
 
 
-def worst_row(solution: Solution, blocks: BlockProgram, bounds: tuple[Array, Array]) -> tuple[Rows, int, float, float]:
-    """Return the rows with the largest violation of bounds (rows,), its index in them, its interval, the violation."""
-    misses = np.maximum(bounds[0] - solution.g, solution.g - bounds[1])
+class RowViolation(NamedTuple):
+    """A row that misses its bounds."""
+
+    rows: Rows
+    """The rows of one kind to which it belongs."""
+    place: int
+    """Its index in them."""
+    interval: float
+    """The mean of the mesh's intervals to which its point belongs; infinite for the whole motion."""
+    violation: float
+    """Distance from its bounds, in the unit of the row; infinite if the row is not a number."""
+
+
+def worst_row(solution: Solution, blocks: BlockProgram, bounds: tuple[Array, Array]) -> RowViolation:
+    """Return the row with the largest violation of bounds (rows,)."""
+    lower, upper = bounds
+    misses = np.maximum(lower - solution.g, solution.g - upper)
     misses = np.where(np.isnan(misses), np.inf, misses)
-    at = int(np.argmax(misses))
-    begin = 0
-    for block in blocks.blocks:
-        if at < begin + block.count:
-            point, which = divmod(at - begin, block.function.count)
-            interval = np.inf if block.intervals is None else block.intervals[point].mean()
-            for rows in block.rows:
-                if which < rows.count:
-                    return rows, which, float(interval), float(misses[at])
-                which -= rows.count
-        begin += block.count
-    raise AssertionError("a row of none")
+    worst = int(np.argmax(misses))
+
+    # Rows are in the order of blocks, of their points, and of their kinds.
+    ends = np.cumsum([block.count for block in blocks.blocks])
+    k = int(np.searchsorted(ends, worst, side="right"))
+    block = blocks.blocks[k]
+    point, row = divmod(worst - int(ends[k] - block.count), block.function.count)
+    interval = np.inf if block.intervals is None else block.intervals[point].mean()
+
+    ends = np.cumsum([rows.count for rows in block.rows])
+    kind = int(np.searchsorted(ends, row, side="right"))
+    rows = block.rows[kind]
+    return RowViolation(rows, row - int(ends[kind] - rows.count), float(interval), float(misses[worst]))
 
 
 def limit_rows(

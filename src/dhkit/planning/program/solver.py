@@ -40,9 +40,10 @@ OPTIONS: dict[str, Any] = {
 Where the Hessian is not positive definite, Ipopt adds a multiple of 1 to it. Its first try, 1e-4, is large for
 variables of order one, and made some motions creep along curved paths in 60 to 70 iterations; so tries begin at 1e-8.
 They end at 1e4, beyond which a step is next to nothing: with Ipopt's 1e20 an iteration that diverges factorizes its
-matrix thirty times, and took 130 ms in place of 10.
+matrix thirty times, and took 130 ms instead of 10.
 """
 WARM_PUSH = 1e-6
+"""Least distance from bounds, in scaled units, to which Ipopt moves a warm start; its default, 1e-3, moves it far."""
 WARM_OPTIONS: dict[str, Any] = {
     **OPTIONS,
     "mu_init": 1e-6,
@@ -93,7 +94,7 @@ class Solution:
     infeasibility: float
     cost: float
     multipliers: tuple[Any, Any]
-    """Of the variables' bounds and of the rows, in the units of the solution."""
+    """Multipliers of the variables' bounds and of the rows, in the units of the solution."""
 
 
 class Solver:
@@ -140,7 +141,7 @@ class Solver:
         Parameters
         ----------
         warm
-            A solution with other bounds in the same units, to start from in place of x0.
+            A solution with other bounds in the same units, to start from instead of x0.
         scaling
             Units in which tolerances hold.
         work
@@ -152,8 +153,12 @@ class Solver:
             The limit of the work was reached.
         """
         units = scaling or self._unscaled
-        lbx, ubx = (units.scaled(bound) for bound in x_bounds)
-        lbg, ubg = (bound / units.row_unit for bound in g_bounds)
+        lower_x, upper_x = x_bounds
+        lower_g, upper_g = g_bounds
+        lbx = units.scaled(lower_x)
+        ubx = units.scaled(upper_x)
+        lbg = lower_g / units.row_unit
+        ubg = upper_g / units.row_unit
         p = np.concatenate([parameters, units.vector])
         with self._turn, delayed_interrupts() as interrupts:
             self._watch.begin((lbg, ubg), units, work, progress, interrupts)
@@ -216,6 +221,7 @@ def delayed_interrupts() -> Iterator[list[BaseException]]:
 
 
 def _outside(values: Array, low: Array, high: Array) -> float:
+    """Return the largest violation of bounds; infinite if it is not a number."""
     worst = np.max(np.maximum(low - values, values - high), initial=0.0)
     return float(worst) if np.isfinite(worst) else float("inf")
 

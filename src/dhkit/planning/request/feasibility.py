@@ -50,9 +50,10 @@ def _require_speed(description: Description, limits: Limits, qd: Array, where: s
     if not excess.max() > 0:
         return
     i = int(np.argmax(excess))
-    slides = bool(description.numbers.prismatic[i])
-    durations, bound = (joint_text(x, slides=slides, rate="/s") for x in (abs(qd[i]), limits.velocity[i]))
-    raise PlanningError(f"{where}: joint {description.joints[i].name} moves with {durations}, above its limit, {bound}")
+    is_prismatic = bool(description.numbers.prismatic[i])
+    speed = joint_text(abs(qd[i]), slides=is_prismatic, rate="/s")
+    bound = joint_text(limits.velocity[i], slides=is_prismatic, rate="/s")
+    raise PlanningError(f"{where}: joint {description.joints[i].name} moves with {speed}, above its limit, {bound}")
 
 
 def require_holdable(description: LoadedArm, limits: Limits, q: Array, where: str) -> None:

@@ -19,12 +19,12 @@ from dhkit.trajectories.timing import check_duration
 
 @dataclass(frozen=True, kw_only=True, repr=False, eq=False)
 class PathOptions(Options):
-    """Options of :func:`along_path`, and of every other search: what the motion keeps, and how long it is looked for.
+    """Options of :func:`along_path`, and of every other search: limits of the motion, and limits of the search.
 
     Raises
     ------
     ValueError, TypeError
-        A value that does not fit: says which, and what is expected.
+        A value that does not fit: says which, and the expected one.
     """
 
     duration: float | None = None
@@ -62,7 +62,7 @@ class PathOptions(Options):
         self.work()
 
     def avoidance(self) -> CollisionAvoidance:
-        """Return what the motion keeps away from."""
+        """Return the obstacles of the motion and the clearance from them, checked."""
         return CollisionAvoidance.of(self.obstacles, self.clearance, self.self_collision)
 
     def work(self) -> Work:
@@ -91,7 +91,7 @@ class PlanOptions(PathOptions):
     Raises
     ------
     ValueError, TypeError
-        A value that does not fit: says which, and what is expected.
+        A value that does not fit: says which, and the expected one.
 
     Examples
     --------

@@ -22,8 +22,10 @@ ITERATION_STARTS = 24
 """Number of starts of the iterative solution, for arms without a closed form."""
 SAME_SOLUTION = 1e-3
 """Largest difference of joint values (rad or m) between two solutions that count as the same."""
-MAX_POSITION_ERROR, MAX_ROTATION_ERROR = 1e-6, 1e-6
-"""Largest distance (m) and difference of a rotation's entries with which a pose counts as met."""
+MAX_POSITION_ERROR = 1e-6
+"""Largest distance of the tool, m, from a pose that counts as met."""
+MAX_ROTATION_ERROR = 1e-6
+"""Largest difference of an entry of the tool's rotation matrix from that of a pose that counts as met."""
 MAX_ROUTES = 32
 """Largest number of routes through the branches of all places; the shortest are kept."""
 
@@ -137,12 +139,10 @@ def find_routes(
                 longer.append(([*points, q], [*labels, label] if label else labels))
         longer.sort(key=lambda route: _length(limits, np.stack(route[0])))
         routes = longer[:MAX_ROUTES]
-    made = [
-        Route(
-            np.stack(points), " then ".join(labels), _bound(limits, np.stack(points)), _length(limits, np.stack(points))
-        )
-        for points, labels in routes
-    ]
+    made = []
+    for configurations, labels in routes:
+        q = np.stack(configurations)
+        made.append(Route(q, " then ".join(labels), _bound(limits, q), _length(limits, q)))
     return sorted(made, key=lambda route: (route.bound, route.length))
 
 
@@ -177,9 +177,9 @@ def _configurations(
         raise UnreachableError(f"{place.name}: {problem}")
     if coordinates is None or tuple(coordinates) != met:
         _require_met(description, place, every, met)
-    inside = np.atleast_1d(
-        ((angles >= limits.lower - SAME_SOLUTION**3) & (angles <= limits.upper + SAME_SOLUTION**3)).all(axis=-1)
-    )
+    rounding = SAME_SOLUTION**3
+    is_inside = (angles >= limits.lower - rounding) & (angles <= limits.upper + rounding)
+    inside = np.atleast_1d(is_inside.all(axis=-1))
     if not inside.any():
         raise PlanningError(
             f"{place.name}: {_count(every)} of the pose at {_position_text(T)}, all outside the joint limits: "
@@ -207,6 +207,7 @@ def _require_met(description: Description, place: Place, every: Array, met: tupl
     if ((away <= MAX_POSITION_ERROR) & (turned <= MAX_ROTATION_ERROR)).any():
         return
     best = int(np.argmin(away / MAX_POSITION_ERROR + turned / MAX_ROTATION_ERROR))
+    # R - R' = 2 sin(angle) [axis]x, of Frobenius norm 2 sqrt(2) sin(angle), and trace R = 1 + 2 cos(angle).
     R = found[best, :3, :3].T @ T[:3, :3]
     angle = np.degrees(np.arctan2(np.linalg.norm(R - R.T) / np.sqrt(2), np.trace(R) - 1))
     raise PlanningError(
@@ -250,7 +251,7 @@ def _iterative_solutions(description: Description, T: Array, near: Array | None)
 
 
 def _bound(limits: Limits, points: Array) -> float:
-    """Return the lower bound of the duration from the speed limits, s."""
+    """Return the lower bound of the duration from the speed limits v, s: the sum of max_i |dq_i| / v_i."""
     return float(sum(np.max(np.abs(b - a) / limits.velocity) for a, b in pairwise(points)))
 
 

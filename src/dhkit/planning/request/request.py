@@ -60,7 +60,7 @@ def end_velocity(description: Description, value: ArrayLike | None, name: str) -
     Raises
     ------
     ValueError, TypeError
-        Another shape, numbers that are not finite, or no numbers.
+        Another shape, or values that are not finite numbers.
     """
     if value is None:
         return np.zeros(description.n)
@@ -76,7 +76,7 @@ def checked_constraints(constraints: Constraint | Sequence[Constraint]) -> tuple
     Raises
     ------
     TypeError
-        Something else, or a class that is no frozen dataclass.
+        Something else, or a class that is not a frozen dataclass.
     """
     given = (constraints,) if isinstance(constraints, Constraint) else tuple(constraints)
     for constraint in given:
@@ -87,7 +87,7 @@ def checked_constraints(constraints: Constraint | Sequence[Constraint]) -> tuple
 
 
 SMOOTH_FRICTION = Friction(width=1e-2)
-"""Smooth friction in place of friction that is a step, of this width in rad/s or m/s."""
+"""Friction that replaces one with a step at rest: it is smooth over a width of 0.01 rad/s or m/s."""
 
 
 def smoothed(friction: Friction | None) -> Friction | None:

@@ -1,4 +1,4 @@
-"""Search: solve a program, certify its motion, tighten what it exceeds, solve again; around obstacles likewise."""
+"""Search: solve a program, certify its motion, tighten exceeded limits, solve again; around obstacles likewise."""
 
 from dhkit.planning.search.avoiding import FINER, motion_around
 from dhkit.planning.search.search import RESOLUTION, TIME_SCALING_MARGIN, PlannedMotion, Search, coarser

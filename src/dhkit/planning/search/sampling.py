@@ -72,9 +72,11 @@ class PathSampler:
         """
         if self.is_way_free(start, goal):
             return np.stack([start, goal])
-        trees = _Tree(start, self.scale), _Tree(goal, self.scale)
+        trees = (_Tree(start, self.scale), _Tree(goal, self.scale))
         for turn in range(self.samples):
             self.work.require_left()
+
+            # Extend: one tree, each in turn, grows by a step towards a random sample.
             grown = trees[turn % 2]
             other = trees[1 - turn % 2]
             sample = self.rng.uniform(self.lower, self.upper)
@@ -84,6 +86,8 @@ class PathSampler:
             new = self._extend(grown, near, grown.nodes[near] + share * away * self.scale)
             if new is None:
                 continue
+
+            # Connect: the other tree grows towards the new node as far as the way is free.
             target = grown.nodes[new]
             last = self._extend(other, other.nearest(target), target)
             if last is not None and np.array_equal(other.nodes[last], target):
@@ -99,12 +103,12 @@ class PathSampler:
             lengths = np.linalg.norm(np.diff(path, axis=0) / self.scale, axis=1)
             along = np.concatenate([[0.0], np.cumsum(lengths)])
             u, v = np.sort(self.rng.uniform(0.0, along[-1], 2))
-            i, j = (min(int(np.searchsorted(along, x, side="right")) - 1, len(path) - 2) for x in (u, v))
+            i = _side_at(along, u)
+            j = _side_at(along, v)
             if i == j:
                 continue
-            a, b = (
-                path[k] + (path[k + 1] - path[k]) * (x - along[k]) / max(lengths[k], 1e-12) for k, x in ((i, u), (j, v))
-            )
+            a = path[i] + (path[i + 1] - path[i]) * (u - along[i]) / max(lengths[i], 1e-12)
+            b = path[j] + (path[j + 1] - path[j]) * (v - along[j]) / max(lengths[j], 1e-12)
             if self.is_way_free(a, b):
                 path = np.vstack([path[: i + 1], a, b, path[j + 1 :]])
         return path
@@ -121,11 +125,15 @@ class PathSampler:
         """Go straight to a target as far as the way is free; return the new node, or None if there is none."""
         way = _way(tree.nodes[near], target)
         free = self._free(way)
-        count = len(way) if free.all() else int(np.argmin(free))
-        return tree.add(way[count - 1] if count < len(way) else target, near) if count else None
+        if free.all():
+            return tree.add(target, near)
+        count = int(np.argmin(free))
+        return tree.add(way[count - 1], near) if count else None
 
 
 class _Tree:
+    """Configurations that free straight lines join to a root."""
+
     def __init__(self, root: Array, scale: Array) -> None:
         self.nodes = [root]
         self._parents = [-1]
@@ -146,6 +154,11 @@ class _Tree:
             path.append(self.nodes[node])
             node = self._parents[node]
         return path
+
+
+def _side_at(along: Array, length: float) -> int:
+    """Return the side of a polygon at a length from its start; its corners are at ``along`` (k,)."""
+    return min(int(np.searchsorted(along, length, side="right")) - 1, len(along) - 2)
 
 
 def _way(start: Array, goal: Array) -> Array:

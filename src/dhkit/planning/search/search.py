@@ -29,16 +29,17 @@ from dhkit.planning.program import (
 from dhkit.trajectories import Trajectory, quintic
 
 FEASIBILITY_TOLERANCE = 1e-5
-"""Largest violation of a solution's rows with which it is used; the certificate then decides."""
+"""Largest violation of rows, in their units, with which a solution is used; the certificate then decides."""
 STEP_GROWTH = 3.0
 """Growth of the largest slow-down in each round: some excesses move from interval to interval."""
 LAST_STEP = 1.0
 """Largest relative slow-down after the last round."""
-MARGIN_FACTOR, MARGIN_GROWTH = 1.1, 2.0
-"""Factor of an excess that is added to the margin of a limit, and its growth in each round: some limits are exceeded
-only between knots."""
+MARGIN_FACTOR = 1.1
+"""Factor of an excess that is added to the margin of a limit, in the first round."""
+MARGIN_GROWTH = 2.0
+"""Growth of that factor in each round: some limits are exceeded only between knots."""
 UNCONVERGED_TOLERANCE = 1e-7
-"""Largest violation of a solution's rows with which it is used although it is not optimal."""
+"""Largest violation of rows, in their units, with which a solution is used although it is not optimal."""
 FIRST_ROUNDS = 3
 """Largest number of solutions with tightened limits, before another curve of accelerations is tried."""
 MAX_ROUNDS = 8
@@ -48,9 +49,9 @@ TIME_SCALING_MARGIN = 2e-7
 RESOLUTION = 1e-10
 """Smallest move (rad or m) that is optimized: below it, joint values are rounded by more than a millionth of it."""
 SHORTEST_DURATION = 1e-6
-"""Shortest duration of smaller moves, s."""
+"""Shortest duration of a move that is not optimized, s."""
 SLOWNESS = 2.0
-"""Duration of smaller moves over that of the fastest cubic."""
+"""Ratio of durations, of a move that is too small to be optimized over the fastest cubic that keeps its limits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +72,7 @@ class PlannedMotion:
     attempt: int = 0
     """Index of the curve of accelerations of its program."""
     failure: str = ""
-    """Why the optimizer found nothing, for a given path slowed down that is returned then."""
+    """The optimizer's error, for a given path slowed down that is returned instead of an optimum; else empty."""
 
     @classmethod
     def unresolved(cls, task: Task) -> PlannedMotion:
@@ -113,6 +114,25 @@ class PlannedMotion:
         return cls(trajectory, certificate, cost, intervals, is_converged=False, failure=str(failure))
 
 
+@dataclass(frozen=True, eq=False)
+class _Solved(Generic[Iterate]):
+    """A guess, its solution as a motion, and Ipopt's result."""
+
+    guess: Iterate
+    found: Iterate
+    solution: Solution
+
+
+@dataclass(frozen=True, eq=False)
+class _Slowed:
+    """A motion that was slowed down by a factor, which may be 1, with its states and certificate."""
+
+    trajectory: Trajectory
+    states: States
+    certificate: Certificate
+    factor: float
+
+
 @dataclass(eq=False)
 class Search(Generic[Iterate]):
     """The search for one motion."""
@@ -142,10 +162,10 @@ class Search(Generic[Iterate]):
             No start converges, limits stay exceeded, or the limit of the work is reached.
         """
         try:
-            for guess, found, last in self._solutions(starts or self.program.starts(self.task, warm)):
-                self._last = last
+            for start in self._solutions(starts or self.program.starts(self.task, warm)):
+                self._last = start.solution
                 try:
-                    return self._certify(guess, found)
+                    return self._certify(start.guess, start.found)
                 except PlanningError as error:
                     self.keep_first_failure(error)
         except SearchLimitError as limit:
@@ -160,30 +180,27 @@ class Search(Generic[Iterate]):
             raise error
         self.failure = self.failure or error
 
-    def _solutions(self, starts: Starts[Iterate]) -> Iterator[tuple[Iterate, Iterate, Solution]]:
-        """Yield guesses with their solutions; those that are compared, by their cost."""
-        solved: list[tuple[Iterate, Iterate, Solution]] = []
-
-        def compared() -> Iterator[tuple[Iterate, Iterate, Solution]]:
-            yield from sorted(solved, key=lambda item: item[2].cost)
-            solved.clear()
-
+    def _solutions(self, starts: Starts[Iterate]) -> Iterator[_Solved[Iterate]]:
+        """Yield guesses with their solutions; those that are compared come first, in the order of their cost."""
+        compared: list[_Solved[Iterate]] = []
         for k, make in enumerate(starts.guesses):
             if k == starts.compared:
-                yield from compared()
+                yield from sorted(compared, key=lambda solved: solved.solution.cost)
+                compared.clear()
             guess = make()
             try:
                 found = self.solution(guess)
             except PlanningError as error:
-                if solved and isinstance(error, SearchLimitError):
+                if compared and isinstance(error, SearchLimitError):
                     break
                 self.keep_first_failure(error)
                 continue
+            solved = _Solved(guess, found, self._last)
             if k < starts.compared:
-                solved.append((guess, found, self._last))
+                compared.append(solved)
             else:
-                yield guess, found, self._last
-        yield from compared()
+                yield solved
+        yield from sorted(compared, key=lambda solved: solved.solution.cost)
 
     def _certify(self, guess: Iterate, found: Iterate) -> PlannedMotion:
         """Return a solution as a certified motion, solved again with tightened limits where necessary."""
@@ -219,34 +236,38 @@ class Search(Generic[Iterate]):
         return MAX_ROUNDS if self.is_last else FIRST_ROUNDS
 
     def checked(self, found: Iterate, turn: int, *, is_last: bool = False) -> PlannedMotion | Excess:
-        """Return a solution as a certified motion, or what it exceeds; in later turns it may be slowed down further."""
-        task, program = self.task, self.program
-        trajectory = program.trajectory(task, found)
+        """Return a solution as a certified motion, or its excess; in later turns it may be slowed down further."""
+        task = self.task
+        program = self.program
         step = LAST_STEP if is_last else program.small_step * STEP_GROWTH**turn
-        trajectory, states, certificate, c = self._slow_down(trajectory, step)
+        slowed = self._slow_down(program.trajectory(task, found), step)
+        certificate = slowed.certificate
         if certificate.ok:
             self.found = found
             return PlannedMotion(
-                trajectory,
+                slowed.trajectory,
                 certificate,
-                cost_of(task.objective, trajectory, task.loaded, task.friction),
+                cost_of(task.objective, slowed.trajectory, task.loaded, task.friction),
                 program.intervals,
-                c,
+                slowed.factor,
                 tuple(self.tightened),
                 is_converged=self._last.converged,
             )
         exceeded = [check.what for check in certificate.checks if check.excess > 0]
         self.tightened += [what for what in exceeded if what not in self.tightened]
-        return Excess(trajectory, states, certificate)
+        return Excess(slowed.trajectory, slowed.states, certificate)
 
     def stays_exceeded(self, certificate: Certificate) -> PlanningError:
         """Return the error for a limit that tightening does not help."""
         worst = max(certificate.checks, key=lambda check: check.excess)
         name = self._row_name(worst.what, worst.row, of_joint=worst.of_joint)
-        return PlanningError(f"{name} stays exceeded at {worst.time:.3g} s, after {self._rounds} rounds")
+        return PlanningError(
+            f"limit of {name} is still exceeded at {worst.time:.3g} s after {self._rounds} solutions with tightened "
+            f"limits; try more intervals"
+        )
 
-    def _slow_down(self, trajectory: Trajectory, step: float) -> tuple[Trajectory, States, Certificate, float]:
-        """Return a motion, slowed down if a factor up to 1 + ``step`` suffices, its states, certificate and factor."""
+    def _slow_down(self, trajectory: Trajectory, step: float) -> _Slowed:
+        """Return a motion with its certificate, slowed down if a factor up to 1 + ``step`` suffices."""
         task = self.task
         states = task.checker.states(trajectory)
         c = 1.0
@@ -259,7 +280,7 @@ class Search(Generic[Iterate]):
                 states = task.checker.states(trajectory)
             else:
                 c = 1.0
-        return trajectory, states, task.checker.check(trajectory, states), c
+        return _Slowed(trajectory, states, task.checker.check(trajectory, states), c)
 
     def widen_margins(self, margins: Margins, found: Iterate, excess: Excess, turn: int) -> Margins:
         """Return margins raised in each interval in proportion to the excess of a motion, more in later turns.
@@ -270,6 +291,7 @@ class Search(Generic[Iterate]):
         factor = MARGIN_FACTOR * MARGIN_GROWTH**turn
         more = {}
         for limit, use in self.task.checker.peaks(excess.states).items():
+            # The largest excess in each piece of the motion, then in each interval of the mesh.
             over = use.reshape(len(interval), -1, use.shape[1]).max(axis=1) - 1
             worst = np.zeros((self.program.intervals, use.shape[1]))
             np.maximum.at(worst, interval, over)
@@ -307,11 +329,12 @@ class Search(Generic[Iterate]):
         if is_usable and solution.infeasibility <= FEASIBILITY_TOLERANCE:
             self._last = solution
             return program.iterate(solution.x)
-        worst, which, interval, misses = worst_row(solution, program.blocks, rows)
-        state = f"misses its bound by {misses:.2g}" if np.isfinite(misses) else "is not a number"
+        worst = worst_row(solution, program.blocks, rows)
+        name = self._row_name(worst.rows.what, worst.place, of_joint=worst.rows.of_joints)
+        state = f"misses its bound by {worst.violation:.2g}" if np.isfinite(worst.violation) else "is not a number"
         raise PlanningError(
             f"not converged ({solution.status.replace('_', ' ').lower()}, {solution.iterations} iterations): "
-            f"{self._row_name(worst.what, which, of_joint=worst.of_joints)} {state} at {program.place(interval)}"
+            f"{name} {state} at {program.place(worst.interval)}"
         )
 
     def _row_name(self, what: str, row: int, *, of_joint: bool) -> str:

@@ -1,6 +1,6 @@
 """A second check of a motion, which shares nothing with the first: dense samples, Pinocchio, and coal on drawn shapes.
 
-The first check (:mod:`dhkit.planning.certificate`) bounds what lies between its states, measures capsules around the
+The first check (:mod:`dhkit.planning.certificate`) bounds the motion between its states, measures capsules around the
 links, and computes torques and poses by dhkit's own programs. This one proves nothing; it refutes a certificate that is
 wrong. It
 

@@ -25,17 +25,21 @@ FIRST_TURN = 0.06
 HALVINGS = 12
 """Number of times that the time between two states is halved."""
 MEASURED = 0.02
-"""Distance, m, above the required one from which a lower bound of the distance takes its place."""
+"""Distance, m, above the required one from which a lower bound of the distance is used instead."""
 RANDOM_STATES = 100
 """Number of random configurations in which two solids that no motion can move apart are recognised."""
-SAME_SHARE, FIXED_SHARE = 1e-3, 0.1
-"""Share of the spread of distances below which two are the same, and of configurations in which they must be."""
+SAME_SHARE = 1e-3
+"""Difference of two distances, as a share of the spread of all, below which they are the same."""
+FIXED_SHARE = 0.1
+"""Smallest share of random configurations with the same distance of two solids that no motion can move apart."""
 CURVED = 1.1
-"""A path between two states is at most so many times as long as the straight line."""
+"""Largest ratio of lengths, of a point's path between two states over the straight line."""
 FLAT = 1e-6
 """Thickness of a mesh, as a share of its size and at least in m, below which it is made so thick."""
-FAILED, SHIFT = -1e300, np.array([3e-8, 1e-8, 2e-8])
-"""What coal returns for some symmetric penetrations, and a move, m, of one solid with which it is asked again."""
+FAILED = -1e300
+"""Largest number that coal returns where it finds a penetration and not its depth: in some symmetric places."""
+SHIFT = np.array([3e-8, 1e-8, 2e-8])
+"""Translation of one solid, m, with which coal is asked again then."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,14 +47,14 @@ class Solid:
     """A solid on a link, or at rest in the world."""
 
     shape: Any
-    """coal's."""
+    """The solid as coal's shape."""
     link: int | None
     """Its link; None if it is at rest."""
     T: Array
     """Pose in the DH frame of the link, or in the world, shape (4, 4), m."""
 
     height: float | None = None
-    """Of a floor, m, world z; None for others."""
+    """Height of a floor, m, world z; None for other solids."""
 
     @cached_property
     def radius(self) -> float:
@@ -82,7 +86,8 @@ class DrawnArm:
         self._coal: Any = coal
         self._request = coal.DistanceRequest()
         self._request.enable_signed_distance = True
-        self._request.gjk_tolerance = self._request.epa_tolerance = 1e-9
+        self._request.gjk_tolerance = 1e-9
+        self._request.epa_tolerance = 1e-9
         self._pin = import_pinocchio()
         self._model: Any = pinocchio_model(description)
         self._data = self._model.createData()
@@ -105,15 +110,15 @@ class DrawnArm:
         return found
 
     def smallest(self, claim: Claim) -> tuple[float, Array]:
-        """Return the smallest distance of what a claim is about, m, and its instant, shape (2,)."""
+        """Return the smallest distance of the solids of a claim, m, and its instant, shape (2,)."""
         found = [self._smallest_of(pair, claim) for pair in self._pairs(claim) if not self._is_fixed(pair, claim)]
         return min(found, key=lambda one: one[0], default=(np.inf, self.instants[0]))
 
     def _is_fixed(self, pair: tuple[Solid, Solid], claim: Claim) -> bool:
         """Return whether two solids stand in each other, and no motion moves them apart: an arm's foot and the floor.
 
-        They are then too near in all random configurations, and in many of these by the same depth, that of what does
-        not move.
+        They are then too near in all random configurations, and in many of these by the same depth, that of the parts
+        that do not move.
         """
         gaps = self._gaps(pair, self._anywhere, claim.refuting)
         if np.any(gaps >= claim.refuting):
@@ -138,7 +143,8 @@ class DrawnArm:
         Between two states of distances d1 and d2, between which the solids travel w, the distance is at least
         (d1 + d2 - w) / 2: where that is too little, the time between them is halved.
         """
-        instants, frames = self.instants, self._along
+        instants = self.instants
+        frames = self._along
         enough = claim.kept + MEASURED
         gaps = self._gaps(pair, frames, enough)
         for _ in range(HALVINGS):
@@ -197,7 +203,8 @@ class DrawnArm:
         if len(vertices) < 4 or spread[2] <= FLAT * spread[0]:
             # qhull needs a volume, and crashes without: copies of the corners around each give one.
             shift = max(FLAT * spread[0], FLAT)
-            vertices = np.concatenate([vertices + sign * shift * axis for axis in np.eye(3) for sign in (-1, 1)])
+            moves = shift * np.stack([-np.eye(3), np.eye(3)], axis=1).reshape(-1, 3)
+            vertices = np.concatenate([vertices + move for move in moves])
         surface = coal.BVHModelOBBRSS()
         surface.beginModel(0, len(vertices))
         surface.addVertices(vertices)
@@ -207,21 +214,25 @@ class DrawnArm:
 
 
 def _travels(pair: tuple[Solid, Solid], frames: Array) -> Array:
-    """Return how far points of the first solid travel at most, as seen from the second, shape (N - 1,), m."""
-    T_second_first = np.linalg.inv(pair[1].placed(frames)) @ pair[0].placed(frames)
-    way = np.linalg.norm(np.diff(T_second_first[:, :3, 3], axis=0), axis=1)
+    """Return bounds of the travel of the first solid's points, as seen from the second, shape (N - 1,), m.
+
+    A point of the ball of radius r about the origin moves by at most |t1 - t0| + angle r.
+    """
+    first, second = pair
+    T_second_first = np.linalg.inv(second.placed(frames)) @ first.placed(frames)
+    of_origin = np.linalg.norm(np.diff(T_second_first[:, :3, 3], axis=0), axis=1)
     # The Frobenius norm of R1 - R0 is 2 sqrt(2) sin(angle / 2): the angle, or more, up to 2 rad.
     angle = np.linalg.norm(np.diff(T_second_first[:, :3, :3], axis=0), axis=(1, 2))
-    travels: Array = CURVED * (way + angle * pair[0].radius)
+    travels: Array = CURVED * (of_origin + angle * first.radius)
     return travels
 
 
 def _random_configurations(description: Description) -> Array:
     """Return random joint values, shape (RANDOM_STATES, n), rad and m: all turns, and strokes inside their limits."""
     numbers = description.numbers
-    slides = numbers.prismatic
-    bound = np.where(slides, description.reach or 1.0, np.pi)
-    lower = np.where(slides & np.isfinite(numbers.lower), numbers.lower, -bound)
-    upper = np.where(slides & np.isfinite(numbers.upper), numbers.upper, bound)
+    prismatic = numbers.prismatic
+    bound = np.where(prismatic, description.reach or 1.0, np.pi)
+    lower = np.where(prismatic & np.isfinite(numbers.lower), numbers.lower, -bound)
+    upper = np.where(prismatic & np.isfinite(numbers.upper), numbers.upper, bound)
     random: Array = np.random.default_rng(1).uniform(lower, np.maximum(lower, upper), (RANDOM_STATES, description.n))
     return random

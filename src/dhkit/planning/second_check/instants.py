@@ -13,8 +13,10 @@ import numpy as np
 from dhkit.description import Array
 from dhkit.trajectories import Trajectory
 
-MIN_STATES, MAX_STATES = 33, 5001
-"""Numbers of instants in a piece of a motion."""
+MIN_STATES = 33
+"""Smallest number of instants in a piece of a motion."""
+MAX_STATES = 5001
+"""Largest number of instants in a piece of a motion."""
 
 
 def dense(motion: Trajectory, turn: float) -> Array:
@@ -25,7 +27,7 @@ def dense(motion: Trajectory, turn: float) -> Array:
     motion
         The motion.
     turn
-        rad; m for prismatic joints.
+        Largest turn of a joint between two instants, rad; m for prismatic joints.
     """
     found = []
     for k, duration in enumerate(np.diff(motion.breaks)):

@@ -1,4 +1,4 @@
-"""Limits of joints, searched for what exceeds them in dense states of a motion."""
+"""Limits of joints, searched for excesses in dense states of a motion."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ from dhkit.trajectories import Limits, Trajectory
 
 ACCEPTED = 1e-6
 """Share of a limit by which it may be exceeded: what certificates promise."""
-ZOOMS, ZOOM_STATES = 3, 33
-"""Number of times that the states around a largest value are replaced by closer ones, and their number."""
+ZOOMS = 3
+"""Number of times that the states around a largest value are replaced by closer ones."""
+ZOOM_STATES = 33
+"""Number of these closer states."""
 
 Measure = Callable[[Array], Array]
 """A function of instants (N, 2) that returns shares of the limits of all joints, shape (N, n), 1 at the limit."""
@@ -56,7 +58,7 @@ def exceeded_limits(
     limits
         Limits of position, velocity, acceleration, jerk and torque.
     payload, friction
-        What torques include.
+        Payload and friction that the torques include.
     """
     bound = np.maximum(np.abs(limits.lower), np.abs(limits.upper))
     size = np.where(np.isfinite(bound) & (bound > 0), bound, 1.0)
@@ -122,11 +124,14 @@ def _torques(
     data = model.createData()
 
     def torques(at: Array) -> Array:
-        q, qd, qdd = (derivative(motion, at, order) for order in range(3))
+        q = derivative(motion, at, 0)
+        qd = derivative(motion, at, 1)
+        qdd = derivative(motion, at, 2)
         tau = np.array([pin.rnea(model, data, *state) for state in zip(q, qd, qdd, strict=True)])
         tau += qdd @ numbers.coupling  # of drives that two joints turn; Pinocchio has no place for it
         if friction is not None:
-            # s goes from -1 to 1 with the direction of motion.
+            # s goes from -1 to 1 with the direction of motion; dry friction is c+ at s = 1 and c- at s = -1:
+            #   viscous qd + (c+ - c-) / 2 s + (c+ + c-) / 2 s^2.
             s = np.sign(qd) if friction.width == 0 else qd / np.hypot(qd, friction.width)
             forwards, backwards = numbers.coulomb.T
             tau += numbers.viscous * qd + (forwards - backwards) / 2 * s + (forwards + backwards) / 2 * s**2

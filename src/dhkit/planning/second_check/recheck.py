@@ -37,7 +37,7 @@ def recheck(
     limits
         Limits of position, velocity, acceleration, jerk and torque.
     payload, friction
-        What torques include.
+        Payload and friction that the torques include.
     claims
         Distances that are claimed.
 

@@ -1,4 +1,4 @@
-"""What a certificate claims about distances, and what a second check has found."""
+"""Claims of a certificate about distances, and the findings of a second check."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Claim:
 
     link: int
     other: int | Obstacle | Floor
-    """Another link, or what is around the arm."""
+    """Another link, or an obstacle around the arm."""
     kept: float
     """Distance that is kept, m."""
 
@@ -55,7 +55,7 @@ class Recheck:
     states: int
     """Number of states in which the joints were looked at first."""
     smallest_distance: float
-    """Smallest distance that was measured, m; a lower bound from 20 mm above what is required; inf without any."""
+    """Smallest distance that was measured, m; a lower bound from 20 mm above the required one; inf without any."""
     refutations: tuple[Refutation, ...]
 
     @property
