@@ -7,6 +7,7 @@ import importlib
 import json
 import os
 import pkgutil
+import random
 import re
 import shutil
 import signal
@@ -898,3 +899,36 @@ def test_no_exception_but_an_answer_error_comes_out(law):
         signal.signal(signal.SIGPROF, before)
     law.size = count
     law.holds("exceptions other than AnswerError", 0, 0)
+
+
+# Random tokens, which are no file of anybody: short statements reach places that edited files seldom do.
+
+TOKENS = {
+    ".m": "= M ( 1 , ) [ ] ; += ++ m1 * l1 ' syms function end ... { } . g V : @ if for ~ % - && == clear q(1)",
+    ".py": '= M ( 1 , ) [ ] += m1 * l1 return . V g : if # " == ** @ with %time x lambda import for in def',
+    ".tex": r"= M { } \begin{align} \end{align} & \\ _ ^ m_1 \frac \dot V $$ \left( \right) \newcommand \[ \] g 1 , +",
+}
+KNOWN_TOKENS = [
+    (".m", " = m1*l1;\n"),
+    (".m", "q(1) += ,"),
+    (".m", "++ M * function \n q(1) += ; ="),
+    (".tex", r"\begin{align} V &= $$\end{align}"),
+]
+
+
+def random_tokens(count, seed):
+    rng = random.Random(seed)
+    for _ in range(count):
+        suffix = rng.choice(sorted(TOKENS))
+        tokens = rng.choices(TOKENS[suffix].split(), k=rng.randint(1, 14))
+        text = "".join(token + rng.choice(" \n") for token in tokens)
+        yield suffix, rf"\begin{{align}} V &= {text}\end{{align}}" if suffix == ".tex" and rng.random() < 0.7 else text
+
+
+def test_random_tokens_are_answers_or_are_refused(law, tmp_path):
+    cases = [*KNOWN_TOKENS, *random_tokens(law.samples(100_000, quick=300), seed=4)]
+    for suffix, text in cases:
+        path = tmp_path / f"answer{suffix}"
+        path.write_text(text)
+        with contextlib.suppress(AnswerError):
+            grade(path, PLANAR, explain=False)

@@ -364,7 +364,7 @@ class AvoidingSearch:
         if best is not None:
             return best
         if isinstance(found, Excess):
-            raise search.stays_exceeded(found.certificate)
+            raise search.stays_exceeded(found.certificate, MAX_SOLUTIONS)
         raise PlanningError(
             f"a distance is still {1000 * shortfall:.2g} mm below the clearance after {MAX_SOLUTIONS} solutions"
         )

@@ -218,7 +218,7 @@ class Search(Generic[Iterate]):
                     continue
                 guess = self.program.again(guess, found)
                 found = self.solution(guess, margins)
-            raise self.stays_exceeded(checked.certificate)
+            raise self.stays_exceeded(checked.certificate, self._rounds)
         finally:
             self.program = program
 
@@ -257,12 +257,12 @@ class Search(Generic[Iterate]):
         self.tightened += [what for what in exceeded if what not in self.tightened]
         return Excess(slowed.trajectory, slowed.states, certificate)
 
-    def stays_exceeded(self, certificate: Certificate) -> PlanningError:
-        """Return the error for a limit that tightening does not help."""
+    def stays_exceeded(self, certificate: Certificate, solutions: int) -> PlanningError:
+        """Return the error for a limit that is exceeded after some solutions with tightened limits."""
         worst = max(certificate.checks, key=lambda check: check.excess)
         name = self._row_name(worst.what, worst.row, of_joint=worst.of_joint)
         return PlanningError(
-            f"limit of {name} is still exceeded at {worst.time:.3g} s after {self._rounds} solutions with tightened "
+            f"limit of {name} is still exceeded at {worst.time:.3g} s after {solutions} solutions with tightened "
             f"limits; try more intervals"
         )
 

@@ -286,10 +286,11 @@ class _DocumentAnswers:
         except AnswerError:
             return []
         names = []
-        for token, after in zip(tokens, [*tokens[1:], None], strict=True):
+        for k, token in enumerate(tokens):
             if token.kind == "name":
                 name = plain_name(token.text)
-                number = after.text if after is not None and after.kind == "number" else ""
+                has_number = k + 1 < len(tokens) and tokens[k + 1].kind == "number"
+                number = tokens[k + 1].text if has_number else ""
                 names += [name, f"{name}{number}"]
         return list(dict.fromkeys(names))
 

@@ -426,6 +426,9 @@ class MatlabProgram:
         return matrix_of([[x] for x in scalars] if lengths[0] > 1 else [scalars])
 
     def _assign(self, statement: MatlabStatement, left: Tokens, right: Tokens, scope: Scope, line: str) -> None:
+        if not left:
+            self._change(statement, scope, "an assignment without a name", line)
+            return
         if left[0].is_sign("[") and closing(left, 0) == len(left) - 1:
             self._assign_several(statement, left, right, scope, line)
             return
@@ -541,6 +544,8 @@ class MatlabProgram:
         UnreadError
             It is not read.
         """
+        if not tokens:
+            raise UnreadError("an expression is missing")
         if tokens[0].text == "@":
             return self._handle(tokens, name, scope)
         parser = _Expression(self, tokens, scope, count)
