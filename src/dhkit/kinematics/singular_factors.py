@@ -35,7 +35,7 @@ class AngleFactor:
     size: float
     """Factor of the measure, m^2 or 1."""
     descriptions: tuple[str, str]
-    """What the singularity means geometrically at angle 0 and at angle pi, for printing."""
+    """Geometric meaning of the singularity at angle 0 and at angle pi, for printing."""
 
     def measure(self, q: Array) -> Array:
         """Return abs(sin), shape (...), at joint positions (..., n), rad and m."""

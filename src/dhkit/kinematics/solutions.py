@@ -22,7 +22,7 @@ _FIRST = 5
 
 
 class IKStatus(IntEnum):
-    """What became of a pose: the numbers of ``IKSolutions.status_code``."""
+    """Outcome of a pose: the numbers of ``IKSolutions.status_code``."""
 
     ok = 0
     singular = 1
@@ -75,7 +75,7 @@ class IKSolutions:
     branches: tuple[str, ...]
     """The branches' names, in words that :meth:`branch` understands."""
     met: tuple[str, ...]
-    """Which coordinates of a pose the arm meets: all six, or fewer for arms of fewer freedoms."""
+    """Coordinates of a pose that the arm meets: all six, or fewer for arms of fewer freedoms."""
     description: Description
     """The robot."""
     complete: bool = True
