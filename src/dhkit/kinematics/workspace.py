@@ -298,13 +298,17 @@ def first_axis(description: Description) -> Array:
     numbers = description.numbers
     if description.convention is Convention.STANDARD:
         return numbers.T_world_base
-    a, c, s = numbers.a[0], numbers.cos_alpha[0], numbers.sin_alpha[0]
+    a = numbers.a[0]
+    c = numbers.cos_alpha[0]
+    s = numbers.sin_alpha[0]
+
+    # Tx(a_0) Rx(alpha_0)
     T: Array = numbers.T_world_base @ [[1, 0, 0, a], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1]]
     return T
 
 
 def _ranges(description: Description) -> tuple[Array, Array, tuple[str, ...]]:
-    """Return what joints are sampled from and to, and what was assumed."""
+    """Return the lower and upper ends of the ranges in which joints are sampled, and the assumptions in words."""
     numbers = description.numbers
     lower = numbers.lower.copy()
     upper = numbers.upper.copy()
