@@ -90,18 +90,21 @@ class Axes:
 
     def meeting_point(self, i: int, j: int) -> Array | None:
         """Return the point, shape (3,), m, where axes i and j intersect; None if they are parallel or skew."""
-        a, b = self.direction(i), self.direction(j)
+        a = self.direction(i)
+        b = self.direction(j)
         normal = np.cross(a, b)
-        size = normal @ normal
-        if size <= self.tolerance**2:
+        square = normal @ normal
+        if square <= self.tolerance**2:
             return None
-        along = np.cross(self.point(j) - self.point(i), b) @ normal / size
-        point: Array = self.point(i) + along * a
+
+        # The point of line p_i + s a nearest to p_j + t b: s = ((p_j - p_i) x b) . (a x b) / |a x b|^2.
+        s = np.cross(self.point(j) - self.point(i), b) @ normal / square
+        point: Array = self.point(i) + s * a
         return point if self.on(j, point) else None
 
 
 def inverse_pose(T: Array) -> Array:
-    """Return the inverse of a rigid transform T (4, 4), m, by its transposed rotation, shape (4, 4)."""
+    """Return the inverse of a rigid transform (R, p), T (4, 4), m, shape (4, 4): (R^T, -R^T p)."""
     inverse = np.eye(4)
     inverse[:3, :3] = T[:3, :3].T
     inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]

@@ -30,6 +30,7 @@ _NAMES = {
     "three_parallel": "meeting point of axes 5 and 6",
 }
 _CIRCLE_SEGMENTS = 180
+"""Number of chords that a circle, or a part of one, is drawn with."""
 _TOUCHING = 1e-9
 """Share of a1 by which two circles that touch may miss each other; at x = 0 each touches its mirror image."""
 _MIN_RADIUS = 1e-3
@@ -41,7 +42,7 @@ class Boundary:
     """A surface that bounds the positions of a point of an arm, as two curves in the world."""
 
     name: str
-    """Which boundary: outer, inner or shoulder."""
+    """Name of the boundary: outer, inner or shoulder."""
     point: str
     """The point whose positions it bounds, such as ``wrist centre``."""
     section: Array
@@ -67,7 +68,8 @@ def boundaries(description: Description) -> tuple[Boundary, ...]:
     ['outer', 'inner', 'shoulder']
     """
     found = classify(description)
-    family, fit = found.family, found.fit
+    family = found.family
+    fit = found.fit
     if family is None or fit is None or not description.joints[0].is_revolute:
         return ()
     if family.name in _ARMS_IN_A_PLANE:
@@ -112,8 +114,9 @@ class _Ring:
     a1: float
     """Distance of the ring's centre from the axis, m, not negative."""
     least: float
+    """Inner radius, m."""
     most: float
-    """Radii, least then most, m; the larger may be infinite."""
+    """Outer radius, m; may be infinite."""
 
     @property
     def outer(self) -> Array:
@@ -136,11 +139,14 @@ class _Ring:
     @property
     def edge(self) -> Array:
         """The covered part of the axis x = 0, shape (k, 2), m, NaN at the hole."""
-        high, low = (np.sqrt(max(0.0, radius**2 - self.a1**2)) for radius in (self.most, self.least))
-        upper = np.linspace(low, high, _CIRCLE_SEGMENTS + 1)
-        heights = (
-            np.concatenate([-upper[::-1], [np.nan], upper]) if low else np.linspace(-high, high, _CIRCLE_SEGMENTS + 1)
-        )
+        # A circle of radius rho about (a1, 0) meets the axis at u = +-sqrt(rho^2 - a1^2).
+        high = np.sqrt(max(0.0, self.most**2 - self.a1**2))
+        low = np.sqrt(max(0.0, self.least**2 - self.a1**2))
+        if low:
+            upper = np.linspace(low, high, _CIRCLE_SEGMENTS + 1)
+            heights = np.concatenate([-upper[::-1], [np.nan], upper])
+        else:
+            heights = np.linspace(-high, high, _CIRCLE_SEGMENTS + 1)
         return np.stack([0.0 * heights, heights], axis=1)
 
     def _circle(self, centre: float, radius: float) -> Array:

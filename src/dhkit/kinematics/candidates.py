@@ -57,8 +57,10 @@ def collect(
     if flags is not None:
         special[valid] = flags[valid]
     singular = np.any(special & SINGULARITIES != 0, axis=-1)
+
+    reached = np.where(singular, IKStatus.singular, IKStatus.ok)
     missed = np.where(is_beyond_all_links(description, positions), IKStatus.out_of_reach, IKStatus.not_found)
-    status = np.where(found, np.where(singular, IKStatus.singular, IKStatus.ok), missed)
+    status = np.where(found, reached, missed)
     status = np.where(posed, status, IKStatus.not_a_pose)
     return IKSolutions(
         q=q,
@@ -101,7 +103,8 @@ def orthonormal(T: Array) -> Array:
 def wrap_angles(q: Array, turning: NDArray[np.bool_]) -> Array:
     """Return joint values q (..., n), rad and m, with angles of the marked joints (n,) reduced to (-pi, pi]."""
     inside = (q > -np.pi) & (q <= np.pi)
-    return np.where(turning & ~inside, q - math.tau * np.ceil((q - np.pi) / math.tau), q)
+    whole_turns = math.tau * np.ceil((q - np.pi) / math.tau)
+    return np.where(turning & ~inside, q - whole_turns, q)
 
 
 def is_beyond_all_links(description: Description, positions: Array) -> NDArray[np.bool_]:

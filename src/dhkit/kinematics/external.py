@@ -80,7 +80,8 @@ def solve_externally(description: Description, T: ArrayLike) -> IKSolutions:
     owner = np.repeat(np.flatnonzero(posed), counts)
     q = np.concatenate([np.empty((0, n)), *found])
     q, closed = refined(description, q, np.repeat(goals.reshape(-1, 16), counts, axis=0))
-    q, owner = q[closed], owner[closed]
+    q = q[closed]
+    owner = owner[closed]
     if n == _RESTARTED_JOINTS or solver is None:
         q, owner = _with_restarts(description, poses.reshape(-1, 4, 4), np.flatnonzero(posed), q, owner)
     table = _ordered(q, owner, posed.size)

@@ -43,8 +43,10 @@ _CHUNK = 2048
 _SAMPLES = 64
 """Number of random states at which the neighbour's miss is measured."""
 _MISSES = 4.0
-"""Displacement of a pose near the boundary, over the neighbour's largest miss: of the six directions along the axes
-one has a share of 0.58 of it or more towards the workspace."""
+"""Displacement of a pose near the boundary, over the neighbour's largest miss.
+
+The pose is displaced along each axis to both sides. The direction towards the workspace has an angle to one of those of
+at most arccos(1 / sqrt(3)), so that the pose moves there by 0.58 of the displacement, more than twice the miss."""
 _PATH_STEPS = 32
 """Number of steps in which a solution is followed from the pose of its start to the required one."""
 _PATH_ERROR = 1e-9
@@ -77,6 +79,7 @@ def solve_from_neighbour(description: Description, T: ArrayLike, seed: ArrayLike
     free = free_angles(description, solver.fit, seed, batch).reshape(-1, 2)
     rows = poses.reshape(-1, 4, 4)
     posed = are_poses(rows)
+
     B = len(solver.fit.branches) + 1
     q = np.full((len(rows), B, description.n), np.nan)
     flags = np.zeros((len(rows), B), dtype=np.uint8)
@@ -106,7 +109,9 @@ def _neighbour(description: Description) -> Solver:
     """Return the closed form of an arm's neighbour."""
     neighbour = classify(description).neighbour
     if neighbour is None:
-        raise ValueError(f"{description.name} is {classify(description).words}; expected an arm that is nearly of one")
+        raise ValueError(
+            f"{description.name} is {classify(description).words}; expected an arm that nearly has a closed form"
+        )
     return solver_for(description, *neighbour)
 
 
@@ -139,20 +144,24 @@ def _followed(description: Description, starts: Array, goals: Array) -> Array:
     """Return solutions of poses (K, 16), shape (K, n), by following a path of poses from those of the starts (K, n).
 
     Each start is an exact solution of its own pose. Near a singularity, where two solutions are close to each other,
-    small steps stay with one of them. NaN where no solution is found.
+    small steps stay with one of them. NaN where no solution is found. With poses (R, p), from start 0 to goal g, the
+    path of s in [0, 1] is a straight line and a rotation about a fixed axis, by the rotation vector phi:
+
+        p(s) = p_0 + s (p_g - p_0),    R(s) = exp(s [phi]) R_0,    exp([phi]) = R_g R_0^T.
     """
     if not len(starts):
         return starts
     newton = Newton.of(description, position_only=False, limits=False)
     T_start = world_to_tool(description, starts)
     T_goal = goals.reshape(-1, 4, 4)
-    way = T_goal[:, :3, 3] - T_start[:, :3, 3]
-    turn = Rotation.from_matrix(T_goal[:, :3, :3] @ np.swapaxes(T_start[:, :3, :3], 1, 2)).as_rotvec()
+    displacement = T_goal[:, :3, 3] - T_start[:, :3, 3]
+    phi = Rotation.from_matrix(T_goal[:, :3, :3] @ np.swapaxes(T_start[:, :3, :3], 1, 2)).as_rotvec()
+
     q = starts
-    for share in np.arange(1, _PATH_STEPS) / _PATH_STEPS:
+    for s in np.arange(1, _PATH_STEPS) / _PATH_STEPS:
         T = T_start.copy()
-        T[:, :3, 3] += share * way
-        T[:, :3, :3] = Rotation.from_rotvec(share * turn).as_matrix() @ T[:, :3, :3]
+        T[:, :3, 3] += s * displacement
+        T[:, :3, :3] = Rotation.from_rotvec(s * phi).as_matrix() @ T[:, :3, :3]
         with np.errstate(all="ignore"):
             q, _ = descend(newton, T.reshape(-1, 16), q, _PATH_ERROR)
     return _refined(description, q, goals)
@@ -160,12 +169,16 @@ def _followed(description: Description, starts: Array, goals: Array) -> Array:
 
 def _starts(description: Description, solver: Solver, poses: Array, free: Array) -> tuple[Array, NDArray[np.uint8]]:
     """Return the neighbour's solutions (N, B, n) at poses (N, 4, 4), or at displaced ones if it has none, and flags."""
-    at = solve_in_closed_form(description, solver, poses, free)
-    q, flags = at.q, at.flags
-    lacking = np.flatnonzero(~at.valid.all(axis=1))
+    exact = solve_in_closed_form(description, solver, poses, free)
+    q = exact.q
+    flags = exact.flags
+
+    # The first displaced pose at which a branch has a solution gives its start.
+    lacking = np.flatnonzero(~exact.valid.all(axis=1))
     for displaced in _displaced(description, poses[lacking]):
         near = solve_in_closed_form(description, solver, displaced, free[lacking])
-        new = near.valid & np.isnan(q[lacking]).any(axis=-1)
+        is_missing = np.isnan(q[lacking]).any(axis=-1)
+        new = near.valid & is_missing
         row, branch = np.nonzero(new)
         q[lacking[row], branch] = near.q[new]
         flags[lacking[row], branch] = near.flags[new]
@@ -175,11 +188,12 @@ def _starts(description: Description, solver: Solver, poses: Array, free: Array)
 def _displaced(description: Description, poses: Array) -> Iterator[Array]:
     """Yield poses (N, 4, 4) moved along each axis of the world, to both sides, and turned about each axis."""
     size = _MISSES * _largest_miss(description)
-    for direction in (*np.eye(3), *-np.eye(3)):
+    directions = (*np.eye(3), *-np.eye(3))
+    for direction in directions:
         moved = poses.copy()
         moved[:, :3, 3] += size * Axes.of(description).scale * direction
         yield moved
-    for direction in (*np.eye(3), *-np.eye(3)):
+    for direction in directions:
         turned = poses.copy()
         turned[:, :3, :3] = Rotation.from_rotvec(size * direction).as_matrix() @ poses[:, :3, :3]
         yield turned
@@ -193,9 +207,11 @@ def _largest_miss(description: Description) -> float:
     states = np.random.default_rng(0).uniform(-span, span, (_SAMPLES, description.n))
     T = world_to_tool(description, states)
     found = solve_in_closed_form(description, solver, T, np.zeros((_SAMPLES, 2)))
+
     goals = np.broadcast_to(T[:, None], (*found.valid.shape, 4, 4))[found.valid]
     newton = Newton.of(description, position_only=False, limits=False)
-    return float(np.abs(newton.error(found.q[found.valid], goals.reshape(-1, 16))).max(initial=0.0))
+    misses = newton.error(found.q[found.valid], goals.reshape(-1, 16))
+    return float(np.abs(misses).max(initial=0.0))
 
 
 def _are_twins(description: Description, starts: Array, q: Array) -> NDArray[np.bool_]:
@@ -203,11 +219,18 @@ def _are_twins(description: Description, starts: Array, q: Array) -> NDArray[np.
 
     Branches whose starts coincide, at singularities of the neighbour, are not twins.
     """
+    # Pairs of branches (i, j) of a pose, shape (N, B, B): one solution from two starts.
     together = _largest_difference(description, q[:, :, None], q[:, None]) < _SAME_ANGLE
     apart = _largest_difference(description, starts[:, :, None], starts[:, None]) > _SAME_ANGLE
+
+    # Branch i moved farther than j from its start, or as far and comes later.
     moved = _largest_difference(description, q, starts)
+    moved_i = moved[:, :, None]
+    moved_j = moved[:, None]
     order = np.arange(q.shape[1])
-    farther = (moved[:, :, None] > moved[:, None]) | ((moved[:, :, None] == moved[:, None]) & (order[:, None] > order))
+    is_later = order[:, None] > order
+    farther = (moved_i > moved_j) | ((moved_i == moved_j) & is_later)
+
     twins: NDArray[np.bool_] = (together & apart & farther).any(axis=2)
     return twins
 
@@ -216,7 +239,8 @@ def _largest_difference(description: Description, a: Array, b: Array) -> Array:
     """Return the largest difference of joint values (..., n): angles the short way round, lengths over the reach."""
     difference = a - b
     prismatic = description.numbers.prismatic
-    short = difference - np.where(prismatic, 0.0, math.tau * np.rint(difference / math.tau))
-    size = np.abs(short) / np.where(prismatic, Axes.of(description).scale, 1.0)
+    whole_turns = np.where(prismatic, 0.0, math.tau * np.rint(difference / math.tau))
+    units = np.where(prismatic, Axes.of(description).scale, 1.0)
+    size = np.abs(difference - whole_turns) / units
     largest: Array = size.max(axis=-1)
     return largest

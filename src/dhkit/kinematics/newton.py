@@ -65,9 +65,12 @@ class Newton:
 
     def inside(self, q: Array) -> Array:
         """Return joint values q (..., n), rad and m, moved into the limits by whole turns or to the nearest limit."""
+        # q - 2 pi round((q - middle) / 2 pi) is the representative of an angle that is nearest to the middle.
+        whole_turns = math.tau * np.rint((q - self.middle) / math.tau)
+        nearest = q - np.where(self.description.numbers.prismatic, 0.0, whole_turns)
+
         outside = (q < self.lower) | (q > self.upper)
-        turns = np.where(self.description.numbers.prismatic, 0.0, math.tau * np.rint((q - self.middle) / math.tau))
-        return np.clip(np.where(outside, q - turns, q), self.lower, self.upper)
+        return np.clip(np.where(outside, nearest, q), self.lower, self.upper)
 
     def error(self, q: Array, goals: Array) -> Array:
         """Return the errors from poses of the tool to goals.
@@ -104,9 +107,10 @@ class Newton:
         """
         n = self.description.n
         J = jacobian(self.description, q).reshape(-1, 6 * n)
+        parameters = np.concatenate([[self.length], self.units, self.endless, self.lower, self.upper])
+
         new = np.empty_like(q)
         run = step_kernel(n, self.size)
-        parameters = np.concatenate([[self.length], self.units, self.endless, self.lower, self.upper])
         run(parameters, [q, error, J, damping[:, None]], [new])
         return new
 

@@ -18,51 +18,73 @@ _TINY = 1e-300
 
 
 def error_program(size: int) -> Graph:
-    """Return the program of :meth:`dhkit.kinematics.newton.Newton.error`."""
+    """Return the program of :meth:`dhkit.kinematics.newton.Newton.error`.
+
+    With the pose (R, p) of the tool, the goal (R_g, p_g) and the length L,
+
+        error = ((p_g - p) / L,  phi),    where phi is the rotation vector of R_g R^T.
+    """
     length = ca.SX.sym("length")
     T = ca.SX.sym("T", 4, 4)
     goal = ca.SX.sym("goal", 4, 4)
-    way = (goal[:3, 3] - T[:3, 3]) / length
-    turn = _rotation_vector(goal[:3, :3] @ T[:3, :3].T)
-    error = ca.vertcat(way, turn)[:size]
+
+    displacement = (goal[:3, 3] - T[:3, 3]) / length
+    phi = _rotation_vector(goal[:3, :3] @ T[:3, :3].T)
+    error = ca.vertcat(displacement, phi)[:size]
     return Graph.of("pose_error", {"length": length, "T": T, "goal": goal}, {"error": error})
 
 
 def step_program(n: int, size: int) -> Graph:
     """Return the program of :meth:`dhkit.kinematics.newton.Newton.step` for n joints.
 
-    It solves (J^T J + damping) dq = J^T error (Levenberg 1944), or with as many joints as coordinates the equal
-    dq = J^T (J J^T + damping)^-1 error. A joint at a limit that the error pushes outward stays (Bertsekas 1982,
+    Levenberg's step (Levenberg 1944) for the scaled Jacobian A, the scaled step dx and the damping lambda:
+
+        (A^T A + lambda 1) dx = A^T error,    or, the same,    dx = A^T (A A^T + lambda 1)^-1 error,
+
+    of which the smaller system is solved. A joint at a limit that the error pushes outward stays (Bertsekas 1982,
     Projected Newton methods for optimization problems with simple constraints); the others end at theirs.
     """
     length = ca.SX.sym("length")
     q = ca.SX.sym("q", n)
     error = ca.SX.sym("error", size)
     J = ca.SX.sym("J", 6, n)
-    units, turns, lower, upper = (ca.SX.sym(name, n) for name in ("units", "turns", "lower", "upper"))
+    units = ca.SX.sym("units", n)
+    turns = ca.SX.sym("turns", n)
+    lower = ca.SX.sym("lower", n)
+    upper = ca.SX.sym("upper", n)
     damping = ca.SX.sym("damping")
-    endless = turns != 0
+
+    # Without units: positions over the length L, joints over their units U, so that dq = U dx and A = diag(1/L, 1) J U.
     A = ca.vertcat(J[:3, :] / length, J[3:, :])[:size, :] @ ca.diag(units)
-    push = A.T @ error
-    stays = [_stays(q[i], push[i], lower[i], upper[i], endless[i]) for i in range(n)]
+
+    # A^T error is the steepest descent of |error|^2 / 2. A joint that stays gets a column of zeros: dx_i = 0.
+    descent = A.T @ error
+    endless = turns != 0
+    stays = [_stays(q[i], descent[i], lower[i], upper[i], endless[i]) for i in range(n)]
     A = A @ ca.diag(ca.vertcat(*(ca.if_else(stuck, 0.0, 1.0) for stuck in stays)))
+
     if n < size:
-        dq = _solve(A.T @ A + damping * ca.SX.eye(n), A.T @ error)
+        dx = _solve(A.T @ A + damping * ca.SX.eye(n), A.T @ error)
     else:
-        dq = A.T @ _solve(A @ A.T + damping * ca.SX.eye(size), error)
-    new = q + dq * units * ca.fmin(1.0, _MAX_STEP / (ca.norm_inf(dq) + _TINY))
-    ends = [_ends(new[i], lower[i], upper[i], endless[i]) for i in range(n)]
+        dx = A.T @ _solve(A @ A.T + damping * ca.SX.eye(size), error)
+
+    # The whole step is shortened, which keeps its direction, until no joint moves by more than _MAX_STEP.
+    share = ca.fmin(1.0, _MAX_STEP / (ca.norm_inf(dx) + _TINY))
+    new = q + dx * units * share
+    ends = [_moved_inside(new[i], lower[i], upper[i], endless[i]) for i in range(n)]
+
     parameters = ca.vertcat(length, units, turns, lower, upper)
     inputs = {"parameters": parameters, "q": q, "error": error, "J": J, "damping": damping}
     return Graph.of("newton_step", inputs, {"q": ca.vertcat(*ends)})
 
 
-def _stays(x: _SX, push: _SX, lower: _SX, upper: _SX, endless: _SX) -> _SX:
-    outward = ca.logic_or(ca.logic_and(x >= upper, push > 0), ca.logic_and(x <= lower, push < 0))
+def _stays(q: _SX, descent: _SX, lower: _SX, upper: _SX, endless: _SX) -> _SX:
+    """Return whether a joint is at a limit and descent pushes it outward; an endless joint never stays."""
+    outward = ca.logic_or(ca.logic_and(q >= upper, descent > 0), ca.logic_and(q <= lower, descent < 0))
     return ca.logic_and(outward, ca.logic_not(endless))
 
 
-def _ends(x: _SX, lower: _SX, upper: _SX, endless: _SX) -> _SX:
+def _moved_inside(x: _SX, lower: _SX, upper: _SX, endless: _SX) -> _SX:
     """Return a joint position inside its limits, by a whole turn back where the range allows one."""
     x = ca.if_else(ca.logic_and(x > upper, endless), x - math.tau, x)
     x = ca.if_else(ca.logic_and(x < lower, endless), x + math.tau, x)
@@ -78,22 +100,33 @@ def _solve(A: _SX, b: _SX) -> _SX:
 def _rotation_vector(R: _SX) -> _SX:
     """Return the rotation vector of a matrix, of length up to pi, accurate near 0 and near pi.
 
-    It is computed from the quaternion, whose entries are taken from the products with its largest entry (Shepperd 1978,
-    Quaternion from rotation matrix).
+    It is computed from the unit quaternion (w, v) = (cos(phi / 2), sin(phi / 2) axis), whose entries are taken from
+    their products with the largest of them (Shepperd 1978, Quaternion from rotation matrix).
     """
+    # Four times the products of the quaternion's entries w, x, y, z; ww stands for 4 w w.
     trace = R[0, 0] + R[1, 1] + R[2, 2]
-    odd = (R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])
-    xy, xz, yz = R[0, 1] + R[1, 0], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1]
-    x2, y2, z2 = (1 + 2 * R[k, k] - trace for k in range(3))
-    products = ((1 + trace, *odd), (odd[0], x2, xy, xz), (odd[1], xy, y2, yz), (odd[2], xz, yz, z2))
+    ww = 1 + trace
+    xx = 1 + 2 * R[0, 0] - trace
+    yy = 1 + 2 * R[1, 1] - trace
+    zz = 1 + 2 * R[2, 2] - trace
+    wx = R[2, 1] - R[1, 2]
+    wy = R[0, 2] - R[2, 0]
+    wz = R[1, 0] - R[0, 1]
+    xy = R[0, 1] + R[1, 0]
+    xz = R[0, 2] + R[2, 0]
+    yz = R[1, 2] + R[2, 1]
+    products = ((ww, wx, wy, wz), (wx, xx, xy, xz), (wy, xy, yy, yz), (wz, xz, yz, zz))
+
+    # Each row is a multiple of the quaternion; the one with the largest square has the fewest rounding errors.
     largest = products[0][0]
     best = ca.vertcat(*products[0])
     for k in range(1, 4):
         larger = products[k][k] > largest
         best = ca.if_else(larger, ca.vertcat(*products[k]), best)
         largest = ca.if_else(larger, products[k][k], largest)
-    w = best[0]
-    v = best[1:]
-    w, v = ca.fabs(w), ca.if_else(w < 0, -v, v)
-    size = ca.norm_2(v)
-    return v * (2 * ca.atan2(size, w) / (size + _TINY))
+
+    # (w, v) and (-w, -v) are the same rotation; w >= 0 gives phi = 2 atan2(|v|, w) in [0, pi], for any multiple.
+    w = ca.fabs(best[0])
+    v = ca.if_else(best[0] < 0, -best[1:], best[1:])
+    sine = ca.norm_2(v)
+    return v * (2 * ca.atan2(sine, w) / (sine + _TINY))

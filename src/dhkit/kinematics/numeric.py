@@ -24,16 +24,23 @@ Progress: TypeAlias = Callable[[int, int], None]
 CHUNK = 8_192
 """Number of searches that run together; their arrays take about 5 MB."""
 _MIN_POSES_PER_THREAD = 64
+"""Smallest number of poses that a thread gets at a time: fewer take less time than handing them over."""
 _MIN_CANDIDATES = 512
 """Smallest number of random joint positions from which starts are chosen."""
 _ALWAYS_STEP = 1e-2
 """Squared error, (rad, share of the reach)^2, below which every step is taken, because along a curved valley the error
 of Newton's method grows before it falls."""
-_STALL_RATIO, _STALL_STEPS = 0.7, 10
-"""A search is stalled, and given up, when its squared error has not fallen below _STALL_RATIO times its value
+_STALL_RATIO = 0.7
+"""A search is stalled, and given up, when its squared error has not fallen below this ratio times its value
 _STALL_STEPS steps earlier."""
-_MIN_DAMPING, _DAMPING_DECREASE, _DAMPING_INCREASE = 1e-4, 0.25, 4.0
-"""Damping over the squared error: its smallest value, and its factors after a step that helps and one that does not."""
+_STALL_STEPS = 10
+"""Number of steps in which the squared error of a search must fall below _STALL_RATIO times its value."""
+_MIN_DAMPING = 1e-4
+"""Smallest ratio of the damping to the squared error."""
+_DAMPING_DECREASE = 0.25
+"""Factor of the damping after a step that reduces the error."""
+_DAMPING_INCREASE = 4.0
+"""Factor of the damping after a step that is rejected because it increases the error."""
 _BASE_DAMPING = 1e-13
 """Damping that is always added, for Jacobians without full rank."""
 _REFINED = 1e-13
@@ -140,14 +147,15 @@ def solve_numerically(
             q[rows[some]], distance[rows[some]] = search(goals[some], starts[rows[some]])
         return int(rows[some][-1]) + 1
 
-    for done in in_threads(
-        solve, _chunks(len(rows), min(CHUNK, max(_MIN_POSES_PER_THREAD, -(-len(rows) // threads)))), threads
-    ):
+    poses_per_thread = -(-len(rows) // threads)
+    chunk = min(CHUNK, max(_MIN_POSES_PER_THREAD, poses_per_thread))
+    for done in in_threads(solve, _chunks(len(rows), chunk), threads):
         if progress is not None:
             progress(done, posed.size)
+    is_unlimited = ~description.numbers.prismatic & np.isinf(newton.upper)
     return collect(
         description,
-        wrap_angles(q, ~description.numbers.prismatic & np.isinf(newton.upper)).reshape(*batch, 1, n),
+        wrap_angles(q, is_unlimited).reshape(*batch, 1, n),
         distance.reshape(batch),
         positions=poses[..., :3, 3],
         posed=posed,
@@ -181,11 +189,14 @@ class Search:
         if len(open_rows) and self.restarts:
             more = self._starts(goals[open_rows])
             for begin, end in _doubling(self.restarts):
-                for some in _chunks(len(open_rows), max(1, CHUNK // (end - begin))):
+                poses_at_once = max(1, CHUNK // (end - begin))
+                for some in _chunks(len(open_rows), poses_at_once):
                     rows = open_rows[some]
                     self._improve(q, error, rows, goals[rows], first[rows], more[some, begin:end])
+
                 left = ~closes(error[open_rows], self.tolerance)
-                open_rows, more = open_rows[left], more[left]
+                open_rows = open_rows[left]
+                more = more[left]
         self._polish(q, error, goals)
         q[~closes(error, self.tolerance)] = np.nan
         return q, self.newton.length * np.linalg.norm(error[:, :3], axis=1)
@@ -195,28 +206,39 @@ class Search:
         last = self.newton.step(q, error, np.full(len(q), _BASE_DAMPING))
         last_error = self.newton.error(last, goals)
         helps = np.sum(last_error**2, axis=1) < np.sum(error**2, axis=1)
-        q[helps], error[helps] = last[helps], last_error[helps]
+        q[helps] = last[helps]
+        error[helps] = last_error[helps]
 
     def _starts(self, goals: Array) -> Array:
         """Return random joint positions whose poses are near the goals, nearest first, shape (N, restarts, n)."""
         newton = self.newton
-        lower, upper = newton.ranges(np.where(newton.description.numbers.prismatic, newton.length, np.pi))
-        draws = np.random.default_rng(self.seed).random((max(_MIN_CANDIDATES, self.restarts), newton.description.n))
+        description = newton.description
+
+        # Candidates are the same for all poses, so that the result for a pose does not depend on the others.
+        lower, upper = newton.ranges(np.where(description.numbers.prismatic, newton.length, np.pi))
+        count = max(_MIN_CANDIDATES, self.restarts)
+        draws = np.random.default_rng(self.seed).random((count, description.n))
         q = lower + (upper - lower) * draws
-        theirs = self._coordinates(forward_kinematics(newton.description, q).reshape(-1, 16))
-        # |a - b|^2 = a a - 2 a b + b b; a a is the same for all candidates.
-        gaps = np.sum(theirs**2, axis=1) - 2 * self._coordinates(goals) @ theirs.T
+
+        # Goal a and candidate b: |a - b|^2 = a.a - 2 a.b + b.b; a.a is the same for all candidates, and left out.
+        a = self._coordinates(goals)
+        b = self._coordinates(forward_kinematics(description, q).reshape(-1, 16))
+        gaps = np.sum(b**2, axis=1) - 2 * a @ b.T
+
         nearest = np.argpartition(gaps, self.restarts - 1, axis=1)[:, : self.restarts]
         order = np.argsort(np.take_along_axis(gaps, nearest, axis=1), axis=1, kind="stable")
         return q[np.take_along_axis(nearest, order, axis=1)]
 
     def _coordinates(self, poses: Array) -> Array:
-        """Return points (N, 12) with about the distances of poses (N, 16): lengths over the reach, angles."""
+        """Return points whose distances are about those of poses (N, 16): lengths over the reach, angles in rad.
+
+        Their shape is (N, 12); (N, 3) if only positions are to be reached. Rotations R and S that are an angle t apart
+        have the distance |R - S|_F = sqrt(8) sin(t / 2) by their entries, which over sqrt(2) is t for small angles.
+        """
         rows = poses.reshape(-1, 4, 4)[:, :3]
         position = rows[:, :, 3] / self.newton.length
         if self.newton.size == 3:
             return position
-        # Rotations an angle t apart differ by sqrt(8) sin(t / 2) in the root of their entries' squared differences.
         return np.concatenate([position, rows[:, :, :3].reshape(-1, 9) / np.sqrt(2)], axis=1)
 
     def _improve(
@@ -229,13 +251,18 @@ class Search:
         found = found.reshape(count, k, n)
         misses = misses.reshape(count, k, -1)
         closed = closes(misses, self.tolerance)
-        moved = np.sum(((found - first[:, None]) / self.newton.units) ** 2, axis=-1)
-        # A result that reaches its pose is better than any that does not.
-        rank = np.where(closed, -1 / (1 + moved), np.sum(misses**2, axis=-1))
+
+        # The lowest rank is best. Results that reach the pose have negative ranks, the one nearest to the first start
+        # the lowest: -1 / (1 + distance^2). The others have their squared error.
+        square_of_distance = np.sum(((found - first[:, None]) / self.newton.units) ** 2, axis=-1)
+        rank = np.where(closed, -1 / (1 + square_of_distance), np.sum(misses**2, axis=-1))
         best = np.argmin(rank, axis=1)
-        better = closed.any(axis=1) | (rank.min(axis=1) < np.sum(error[rows] ** 2, axis=-1))
+
+        is_nearer = rank.min(axis=1) < np.sum(error[rows] ** 2, axis=-1)
+        better = closed.any(axis=1) | is_nearer
         chosen = (np.flatnonzero(better), best[better])
-        q[rows[better]], error[rows[better]] = found[chosen], misses[chosen]
+        q[rows[better]] = found[chosen]
+        error[rows[better]] = misses[chosen]
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,27 +293,39 @@ class _Descent:
 
     def selected(self, keep: NDArray[np.bool_]) -> _Descent:
         """Return the searches marked in ``keep``, shape (N,)."""
-        return self if keep.all() else _Descent(*(getattr(self, field.name)[keep] for field in fields(self)))
+        if keep.all():
+            return self
+        return _Descent(*(getattr(self, field.name)[keep] for field in fields(self)))
 
     def step(self, newton: Newton) -> _Descent:
-        """Return the searches after a step; where it does not help, the damping is raised instead."""
+        """Return the searches after a step; where it does not help, the damping is raised instead.
+
+        The damping of Newton's step is lambda = mu |e|^2 + lambda_0, with the error e and the ratio mu of ``damping``:
+        it vanishes with the error, so that the last steps are Newton's (Yamashita and Fukushima 2001; Sugihara 2011).
+        """
         q = newton.step(self.q, self.error, self.damping * self.cost + _BASE_DAMPING)
         error = newton.error(q, self.goals)
         cost = np.sum(error**2, axis=1)
+
         helps = cost < self.cost
         taken = helps | (np.maximum(cost, self.cost) < _ALWAYS_STEP)
         cost = np.where(taken, cost, self.cost)
-        gets_on = cost < _STALL_RATIO * self.reference_cost
-        eased = np.maximum(self.damping * _DAMPING_DECREASE, _MIN_DAMPING)
+
+        # mu is decreased after a step that helps, kept after one that is taken all the same, else increased.
+        decreased = np.maximum(self.damping * _DAMPING_DECREASE, _MIN_DAMPING)
+        increased = self.damping * _DAMPING_INCREASE
+        damping = np.select([helps, taken], [decreased, self.damping], increased)
+
+        progresses = cost < _STALL_RATIO * self.reference_cost
         return _Descent(
             self.row,
             self.goals,
             np.where(taken[:, None], q, self.q),
             np.where(taken[:, None], error, self.error),
             cost,
-            np.where(helps, eased, np.where(taken, self.damping, self.damping * _DAMPING_INCREASE)),
-            np.where(gets_on, cost, self.reference_cost),
-            np.where(gets_on, 0, self.steps_since + 1),
+            damping,
+            np.where(progresses, cost, self.reference_cost),
+            np.where(progresses, 0, self.steps_since + 1),
         )
 
 
@@ -297,7 +336,8 @@ def descend(newton: Newton, goals: Array, q: Array, tolerance: float) -> tuple[A
     searches = _Descent.start(newton, goals, q)
     while len(searches.row):
         over = closes(searches.error, tolerance) | (searches.steps_since >= _STALL_STEPS)
-        last_q[searches.row[over]], last_error[searches.row[over]] = searches.q[over], searches.error[over]
+        last_q[searches.row[over]] = searches.q[over]
+        last_error[searches.row[over]] = searches.error[over]
         searches = searches.selected(~over)
         if len(searches.row):
             searches = searches.step(newton)
@@ -362,5 +402,6 @@ def _doubling(count: int) -> Iterator[tuple[int, int]]:
 
 
 def _chunks(count: int, size: int) -> Iterator[slice]:
+    """Yield slices of at most ``size`` that together are the numbers below ``count``."""
     for begin in range(0, count, size):
         yield slice(begin, min(begin + size, count))

@@ -35,7 +35,7 @@ class AngleFactor:
     size: float
     """Factor of the measure, m^2 or 1."""
     descriptions: tuple[str, str]
-    """What the singularity means geometrically at angle 0 and at angle pi, for printing."""
+    """Geometric meaning of the singularity at angle 0 and at angle pi, for printing."""
 
     def measure(self, q: Array) -> Array:
         """Return abs(sin), shape (...), at joint positions (..., n), rad and m."""
@@ -57,7 +57,8 @@ class AngleFactor:
 
     def moved_onto_singularity(self, q: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
         """Return joint values q (k, n), rad and m, with this joint at a zero of the factor, inside limits if it can."""
-        low, high = lower[self.joint], upper[self.joint]
+        low = lower[self.joint]
+        high = upper[self.joint]
         values = _wind_into_limits(np.array(self.values), low, high)
         inside = values[(values >= low) & (values <= high)]
         moved = q.copy()
@@ -176,7 +177,8 @@ class ShoulderFactor:
         """The equation x = 0 with the arm's numbers, m, the first of them positive."""
         least = _MIN_TERM * self.size
         terms = [(self.a1, "")] if abs(self.a1) > least else []
-        terms += [term for link in self.links for term in link.terms(least)]
+        for link in self.links:
+            terms += link.terms(least)
         turned = np.sign(terms[0][0])
         text = "".join(f" {'+' if turned * c > 0 else '-'} {_product(abs(c), name)}" for c, name in terms)
         return text.removeprefix(" + ") + " = 0"

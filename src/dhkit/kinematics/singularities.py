@@ -27,8 +27,10 @@ from dhkit.kinematics.closed_form import classify
 from dhkit.kinematics.closed_form.family import Fit
 from dhkit.kinematics.singular_factors import AngleFactor, Factor, Kind, Link, ShoulderFactor, SlideFactor
 
-_DRAWS, _MAX_BATCHES = 256, 64
-"""Random states drawn at once, and largest number of such batches, to find states that are singular inside limits."""
+_DRAWS = 256
+"""Smallest number of random states that are drawn at once to find states that are singular inside limits."""
+_MAX_BATCHES = 64
+"""Largest number of batches of random states; the second half is drawn without limits if none was found inside."""
 _STRETCHED = ("stretched", "folded")
 _MAX_WORDS_LENGTH = 200
 """Longest description of a kind in a notebook, characters."""
@@ -234,7 +236,12 @@ def _room(description: Description) -> Array:
 # Factors from the parameters of the families in closed_form. A task is given in the axes x, u, v of the arm's plane.
 
 _Parts: TypeAlias = tuple[tuple[Factor, ...], str, Array]
-_WHOLE, _VELOCITY, _TURNING_TOO = np.eye(6), np.eye(6)[:3], np.eye(6)[[0, 1, 2, 5]]
+_WHOLE = np.eye(6)
+"""Task of all six coordinates of a twist."""
+_VELOCITY = np.eye(6)[:3]
+"""Task of the velocity alone."""
+_TURNING_TOO = np.eye(6)[[0, 1, 2, 5]]
+"""Task of the velocity and the angular velocity about v."""
 
 
 def _elbow_wrist(fit: Fit) -> _Parts:
@@ -295,7 +302,8 @@ def _parameters(fit: Fit) -> dict[str, Array]:
 
 
 def _links(p: Mapping[str, Array]) -> tuple[Link, Link]:
-    upper, bend = complex(*p["upper"]), complex(*p["bend"])
+    upper = complex(*p["upper"])
+    bend = complex(*p["bend"])
     return Link(float(p["L2"]) * upper), Link(float(p["L3"]) * upper * bend, (float(p["sense3"]),))
 
 

@@ -6,7 +6,7 @@ import contextlib
 import math
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,7 +22,7 @@ _FIRST = 5
 
 
 class IKStatus(IntEnum):
-    """What became of a pose: the numbers of ``IKSolutions.status_code``."""
+    """Outcome of a pose: the numbers of ``IKSolutions.status_code``."""
 
     ok = 0
     singular = 1
@@ -36,7 +36,7 @@ class IKStatus(IntEnum):
 
 
 class IKFlag(IntFlag):
-    """What is special about a branch; several may hold."""
+    """Special properties of a branch; several may hold."""
 
     shoulder = 1
     """The wrist centre is where joint 1 cannot move it out of the arm's plane."""
@@ -75,7 +75,7 @@ class IKSolutions:
     branches: tuple[str, ...]
     """The branches' names, in words that :meth:`branch` understands."""
     met: tuple[str, ...]
-    """Which coordinates of a pose the arm meets: all six, or fewer for arms of fewer freedoms."""
+    """Coordinates of a pose that the arm meets: all six, or fewer for arms of fewer freedoms."""
     description: Description
     """The robot."""
     complete: bool = True
@@ -244,10 +244,9 @@ class IKSolutions:
         return html_block(f"{counted(len(self), 'branch')}: {self._summary}", table)
 
     def _batch_html(self) -> str:
-        """Return how many poses ended how, and what became of the first."""
-        shape = self.distance.shape
+        """Return the number of poses with each status, and the outcome of the first poses."""
         counts = [(status.name, str(count)) for status, count in self._counts]
-        first = [tuple(int(k) for k in np.unravel_index(at, shape)) for at in range(min(_FIRST, self.distance.size))]
+        first = list(islice(np.ndindex(self.distance.shape), _FIRST))
         rows = [
             (
                 str(place[0] if len(place) == 1 else place),
@@ -267,7 +266,7 @@ class IKSolutions:
 
     @property
     def _summary(self) -> str:
-        """What became of one pose."""
+        """Outcome of one pose, in words."""
         status = IKStatus(int(self.status_code)).name
         missed = f" by {float(self.distance):.4g} m" if self.distance > 0 else ""
         return f"{status}{missed}, {self.valid.sum()} reached, {self.allowed.sum()} inside the limits{self._doubt}"
@@ -279,7 +278,7 @@ class IKSolutions:
 
     @property
     def _counts(self) -> list[tuple[IKStatus, int]]:
-        """How many poses have each status that occurs."""
+        """Number of poses with each status that occurs."""
         counts = [(status, int(np.sum(self.status_code == status))) for status in IKStatus]
         return [(status, count) for status, count in counts if count]
 
@@ -326,6 +325,6 @@ class IKSolutions:
 
 
 def _special(flags: int) -> str:
-    """Return what is special about a branch besides its limits, in words."""
+    """Return the names of the flags of a branch besides that of its limits, separated by commas."""
     special = IKFlag(int(flags)) & ~IKFlag.out_of_limits
     return ", ".join(str(flag.name) for flag in special)

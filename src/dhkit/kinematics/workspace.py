@@ -52,7 +52,7 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """How many points lie in each cell of a grid of cubes, squares or pieces of a line."""
+    """Number of points in each cell of a grid of cubes, squares or pieces of a line."""
 
     origin: Array
     """Corner of cell (0, ...), shape (3,), m, world."""
@@ -84,18 +84,18 @@ class Grid:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Workspace:
-    """What random joint values reach; equal arguments of :func:`workspace` give equal arrays."""
+    """Positions that random joint values reach; equal arguments of :func:`workspace` give equal arrays."""
 
     description: Description
     """The arm."""
     seed: int
-    """Of the random joint values."""
+    """Seed of the random joint values."""
     lower: Array
-    """What joints were sampled from, shape (n,), rad and m."""
+    """Lower ends of the ranges in which joint values were sampled, shape (n,), rad and m."""
     upper: Array
-    """What joints were sampled to, shape (n,), rad and m."""
+    """Upper ends of the ranges in which joint values were sampled, shape (n,), rad and m."""
     assumed: tuple[str, ...]
-    """What was assumed where the description says nothing."""
+    """Assumptions about ranges that the description does not give."""
     positions: Array
     """The tool's origin, shape (N, 3), m, world."""
     manipulability: Array
@@ -103,9 +103,9 @@ class Workspace:
     best: Array
     """The joint values with the largest manipulability, shape (n,), rad and m."""
     freedoms: int
-    """In how many directions the tool can move: 3, and 2, 1 or 0 where it keeps to a surface, a curve or a point."""
+    """Number of directions in which the tool can move: 3, or 2, 1, 0 if it keeps to a surface, a curve or a point."""
     grid: Grid | None
-    """Of space, or of the plane or line that the tool keeps to; None for a point."""
+    """Grid of space, or of the plane or line that the tool keeps to; None for a point."""
 
     def __repr__(self) -> str:
         estimate = "" if self.estimate is None else f", {self.estimate}"
@@ -298,13 +298,17 @@ def first_axis(description: Description) -> Array:
     numbers = description.numbers
     if description.convention is Convention.STANDARD:
         return numbers.T_world_base
-    a, c, s = numbers.a[0], numbers.cos_alpha[0], numbers.sin_alpha[0]
+    a = numbers.a[0]
+    c = numbers.cos_alpha[0]
+    s = numbers.sin_alpha[0]
+
+    # Tx(a_0) Rx(alpha_0)
     T: Array = numbers.T_world_base @ [[1, 0, 0, a], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1]]
     return T
 
 
 def _ranges(description: Description) -> tuple[Array, Array, tuple[str, ...]]:
-    """Return what joints are sampled from and to, and what was assumed."""
+    """Return the lower and upper ends of the ranges in which joints are sampled, and the assumptions in words."""
     numbers = description.numbers
     lower = numbers.lower.copy()
     upper = numbers.upper.copy()

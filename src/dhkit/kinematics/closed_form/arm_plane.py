@@ -34,6 +34,7 @@ from dhkit.kinematics.closed_form.formulas import (
 )
 
 FLIPS = ("no-flip", "flip")
+"""Names of the wrist's two solutions: joint 5 turned to its positive side, and to its negative one."""
 UPRIGHT = 1e-9
 """Entries of the vertical's direction below this count as 0, so that a base that is upright but for rounding is."""
 
@@ -46,7 +47,7 @@ class ArmPlane:
     """The frame (x, u, v) of an arm whose axis 2 is at right angles to axis 1."""
 
     R: Array
-    """Rows x, u, v in the world, shape (3, 3)."""
+    """Directions x, u and v in the world, one a row, shape (3, 3)."""
     origin: Array
     """Origin in the world, shape (3,), m."""
     up: tuple[float, float, float]
@@ -58,8 +59,11 @@ class ArmPlane:
         u, v = axes.direction(1), axes.direction(2)
         height = u @ (axes.point(2) - axes.point(1))
         R = np.stack([np.cross(u, v), u, v]) + 0.0
-        x, along, across = (0.0 if abs(entry) <= UPRIGHT else float(entry) for entry in R[:, 2])
-        return cls(R, axes.point(1) + height * u, (x, along, across))
+
+        # R maps the world's coordinates to (x, u, v), so that its last column is the world's vertical.
+        vertical = np.where(np.abs(R[:, 2]) <= UPRIGHT, 0.0, R[:, 2])
+        up_x, up_u, up_v = vertical.tolist()
+        return cls(R, axes.point(1) + height * u, (up_x, up_u, up_v))
 
     def coordinates(self, point: Array) -> Array:
         """Return the coordinates (x, u, v) of a point of the world, shape (3,), m."""
@@ -67,7 +71,7 @@ class ArmPlane:
 
     @property
     def T(self) -> Array:
-        """Pose of the world in this frame, shape (4, 4), m."""
+        """Pose of the world in this frame, shape (4, 4), m: R (point - origin) = R point - R origin."""
         T = np.eye(4)
         T[:3, :3] = self.R
         T[:3, 3] = -self.R @ self.origin
@@ -82,18 +86,32 @@ class Shoulder:
     x: SX
     """Signed distance of the point from axis 1 along the plane, m."""
     miss: SX
+    """Distance by which the point is nearer to axis 1 than the plane is, m; 0 where the plane passes through it."""
     r: SX
     """The point's distance from axis 1, m."""
     singular: SX
+    """Whether the two positions of joint 1 nearly coincide: the point is about as near to axis 1 as the plane is."""
     clamped: SX
+    """Whether the point is too near to axis 1 by rounding only."""
 
     def shortfall(self, offset: SX, x: SX, rise: SX) -> SX:
-        """Return the distance of the point from one at x along the plane and ``rise`` higher, m, over all joint 1."""
+        """Return the least distance, m, of the point from the circle on which joint 1 moves a point (x, offset).
+
+        The circle's radius is sqrt(x^2 + offset^2), its height differs by ``rise``, so that the distance is
+
+            sqrt((r - sqrt(x^2 + offset^2))^2 + rise^2).
+        """
         return hypot(self.r - hypot(x, offset), rise)
 
 
 def _shoulders(point: Vector, offset: SX, scale: SX, reach: SX, free: Pair) -> tuple[Shoulder, Shoulder]:
     """Return the two positions of joint 1 that give a point the coordinate v = ``offset``: point in front, then behind.
+
+    The point has coordinates (x, v) with joint 1 at zero and (X, offset) in the plane at q1. Joint 1 turns v towards x,
+    so that as complex numbers
+
+        x + i v = e^(-i q1) (X + i offset),    and with r = |x + i v|
+        X = +-sqrt(r^2 - offset^2),    q1 = arg(X + i offset) - arg(x + i v).
 
     Parameters
     ----------
@@ -110,14 +128,17 @@ def _shoulders(point: Vector, offset: SX, scale: SX, reach: SX, free: Pair) -> t
     r = hypot(x, v)
     short = fabs(offset) - r
     beyond = short > BOUNDARY_SHARE * scale
+
+    # r^2 - offset^2 as a product: the difference of squares would cancel where they are nearly equal.
     square = (r - fabs(offset)) * (r + fabs(offset))
     front = sqrt(if_else(square > 0, square, 0.0))
 
-    def side(along: SX) -> Shoulder:
-        # Joint 1 turns (along, offset) in the plane's frame into (x, v) in the fixed frame.
+    def side(X: SX) -> Shoulder:
+        in_plane = unit_pair(X, offset, scale)
+        at_zero = unit_pair(x, v, scale, (free[0], -free[1]))
         return Shoulder(
-            q1=add_angles(unit_pair(along, offset, scale), unit_pair(x, v, scale, (free[0], -free[1])), -1.0),
-            x=along,
+            q1=add_angles(in_plane, at_zero, -1.0),
+            x=X,
             miss=if_else(beyond, short, 0.0),
             r=r,
             singular=front < SINGULAR * reach,
@@ -133,12 +154,13 @@ def ordered_shoulders(p: Mapping[str, SX], position: Vector, pose: PoseSymbols) 
     Without lateral offset there is no left and right; the shoulder in front then comes first.
     """
     front, back = _shoulders(position, p["offset"], pose.scale, p["reach"], pose.free_1)
-    swap = sign(p["up"][1]) * p["offset"] > 0
+    back_is_left = sign(p["up"][1]) * p["offset"] > 0
 
-    def either(a: Shoulder, b: Shoulder) -> Shoulder:
-        return replace(a, q1=select_pair(swap, a.q1, b.q1), x=if_else(swap, a.x, b.x))
+    def selected(a: Shoulder, b: Shoulder) -> Shoulder:
+        """Return a where the shoulder at the back is the left one, else b; they differ in q1 and x only."""
+        return replace(a, q1=select_pair(back_is_left, a.q1, b.q1), x=if_else(back_is_left, a.x, b.x))
 
-    return either(back, front), either(front, back)
+    return selected(back, front), selected(front, back)
 
 
 def branch_names(offset: Any, *choices: Sequence[str]) -> tuple[str, ...]:
@@ -151,12 +173,19 @@ def branch_names(offset: Any, *choices: Sequence[str]) -> tuple[str, ...]:
 
 
 def to_arm_frame(vector: Vector, q1: Pair, rho: Pair = (1.0, 0.0)) -> Vector:
-    """Return a vector in the axes of the arm's plane at joint 1 = q1, then rotated by -rho about v."""
-    c, s = q1
-    x = c * vector[0] - s * vector[2]
+    """Return a vector in the axes of the arm's plane at joint 1 = q1, then rotated by -rho about v.
+
+    The plane turns about u, along axis 1, and the links about v, along axis 2. A vector (x, u, v) becomes
+
+        (c1 x - s1 v, u, s1 x + c1 v),    and then    (c x + s u, c u - s x, v),    c = cos(rho), s = sin(rho).
+    """
+    c1, s1 = q1
+    x = c1 * vector[0] - s1 * vector[2]
     u = vector[1]
-    v = c * vector[2] + s * vector[0]
-    return rho[0] * x + rho[1] * u, rho[0] * u - rho[1] * x, v
+    v = c1 * vector[2] + s1 * vector[0]
+
+    c, s = rho
+    return c * x + s * u, c * u - s * x, v
 
 
 def as_pair(x: SX, y: SX) -> tuple[float, float]:

@@ -86,7 +86,7 @@ def classify(description: Description) -> Classification:
         meets_all = fit.coordinates == ALL_COORDINATES
         return Classification(words, family, fit, found if meets_all and not is_exact else None)
     words = f"{kinds}: no closed form known"
-    near = next(filter(None, (_first(Axes.of(description, tolerance)) for tolerance in _NEAR_MISSES)), None)
+    near = _nearest_family(description)
     if near is not None:
         words += f" (nearly one of {kinds} with {near[1].geometry}, but not to {TOLERANCE:g}: are its angles rounded?"
         words += " as_designed=True (--as-designed) reads them as right angles)"
@@ -94,7 +94,17 @@ def classify(description: Description) -> Classification:
     return Classification(words, None, None, near if meets_all else None)
 
 
+def _nearest_family(description: Description) -> tuple[Family, Fit] | None:
+    """Return the family that an arm misses by the smallest tolerance, with its member's fit; None if it is not near."""
+    for tolerance in _NEAR_MISSES:
+        near = _first(Axes.of(description, tolerance))
+        if near is not None:
+            return near
+    return None
+
+
 def _first(axes: Axes) -> tuple[Family, Fit] | None:
+    """Return the first family that has these axes, and their fit; None if there is none."""
     for family in FAMILIES:
         fit = family.fit(axes)
         if fit is not None:

@@ -32,11 +32,15 @@ def limit_parameters(lower: Array, upper: Array, prismatic: Sequence[bool]) -> A
     """
     begin = np.where(np.isfinite(lower), lower - LIMIT_SLACK, -1e300)
     width = np.where(np.isfinite(upper), upper + LIMIT_SLACK - begin, 2e300)
+
+    # A revolute joint without a limit on either side may have any angle.
+    revolute = ~np.asarray(prismatic)
     unlimited = ~(np.isfinite(lower) & np.isfinite(upper))
-    turning = ~np.asarray(prismatic)
-    begin = np.where(turning & unlimited, 0.0, begin)
-    width = np.where(turning & unlimited, math.tau, width)
-    return np.where(turning, np.stack([begin, width]) / math.tau, np.stack([begin, width])).T.ravel()
+    begin = np.where(revolute & unlimited, 0.0, begin)
+    width = np.where(revolute & unlimited, math.tau, width)
+
+    ranges = np.stack([begin, width])
+    return np.where(revolute, ranges / math.tau, ranges).T.ravel()
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,11 +122,16 @@ class PoseSymbols:
     def seen(self, left: SX, right: SX) -> FramedPose:
         """Return left T right; all are 3 x 4 with an implied last row 0 0 0 1."""
         T = _product(_product(left, self.T), right)
-        columns = [tuple(T[i, k] for i in range(3)) for k in range(4)]
-        return FramedPose((columns[0], columns[1], columns[2]), columns[3])
+        x, y, z, position = ((T[0, k], T[1, k], T[2, k]) for k in range(4))
+        return FramedPose((x, y, z), position)
 
 
 def _product(A: SX, B: SX) -> SX:
+    """Return the product of two poses (R, p) without last rows: (R_A R_B, R_A p_B + p_A)."""
     import casadi as ca
 
-    return ca.horzcat(A[:, :3] @ B[:, :3], A[:, :3] @ B[:, 3] + A[:, 3])
+    R_A = A[:, :3]
+    p_A = A[:, 3]
+    R_B = B[:, :3]
+    p_B = B[:, 3]
+    return ca.horzcat(R_A @ R_B, R_A @ p_B + p_A)

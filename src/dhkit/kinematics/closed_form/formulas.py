@@ -33,9 +33,11 @@ class Branch:
     miss: SX
     """Distance of the pose from this branch's reach in the arm's plane, m; the branch is valid where it is 0."""
     shoulder: SX = 0.0
-    """Whether the branch is singular at the shoulder; likewise elbow and wrist."""
+    """Whether the branch is singular at the shoulder."""
     elbow: SX = 0.0
+    """Whether the branch is singular at the elbow."""
     wrist: SX = 0.0
+    """Whether the branch is singular at the wrist."""
     clamped: SX = 0.0
     """Whether the pose lies beyond the boundary by rounding."""
     distance: SX | None = None
@@ -92,16 +94,23 @@ def weighted_sum(weights: tuple[SX, ...], vectors: tuple[tuple[SX, SX, SX], ...]
 
 def unit_pair(x: SX, y: SX, scale: SX = 1.0, otherwise: Pair = (1.0, 0.0)) -> Pair:
     """Return (x, y) over its length; ``otherwise`` where it is shorter than MIN_DIRECTION times ``scale``."""
-    size = hypot(x, y)
-    sure = size > MIN_DIRECTION * scale
-    inverse = 1.0 / if_else(sure, size, 1.0)
-    return if_else(sure, x * inverse, otherwise[0]), if_else(sure, y * inverse, otherwise[1])
+    length = hypot(x, y)
+    is_determined = length > MIN_DIRECTION * scale
+    inverse = 1.0 / if_else(is_determined, length, 1.0)
+    cosine = if_else(is_determined, x * inverse, otherwise[0])
+    sine = if_else(is_determined, y * inverse, otherwise[1])
+    return cosine, sine
 
 
 def add_angles(a: Pair, b: Pair, sense: float | SX = 1.0) -> Pair:
-    """Return the pair of angle a + b, or a - b for ``sense`` -1; b may be a vector of any length, which a rotates."""
-    sine = sense * b[1]
-    return a[0] * b[0] - a[1] * sine, a[1] * b[0] + a[0] * sine
+    """Return the pair of angle a + b, or a - b for ``sense`` -1; b may be a vector of any length, which a rotates.
+
+    The addition theorems: cos(a + b) = cos a cos b - sin a sin b, and sin(a + b) = sin a cos b + cos a sin b.
+    """
+    cos_a, sin_a = a
+    cos_b = b[0]
+    sin_b = sense * b[1]
+    return cos_a * cos_b - sin_a * sin_b, sin_a * cos_b + cos_a * sin_b
 
 
 def angle(pair: Pair) -> SX:
@@ -144,6 +153,11 @@ class TwoLink:
 def two_link(x: SX, y: SX, L1: SX, L2: SX, scale: SX) -> TwoLink:
     """Solve L1 e^(i a) + L2 e^(i (a + b)) = x + i y for a and b.
 
+    The squared absolute value gives b by the law of cosines, and the argument then gives a:
+
+        R^2 = L1^2 + L2^2 + 2 L1 L2 cos b,    R = |x + i y|,
+        a = arg(x + i y) - arg(L1 + L2 e^(i b)).
+
     Parameters
     ----------
     x, y
@@ -158,15 +172,22 @@ def two_link(x: SX, y: SX, L1: SX, L2: SX, scale: SX) -> TwoLink:
     gap = fabs(L1 - L2)
     excess = fmax(R - reach, gap - R)
     beyond = excess > BOUNDARY_SHARE * scale
-    # 1 + cos b and 1 - cos b as products, so that nothing cancels near the stretched and the folded arm.
-    folded = (R - gap) * (R + gap) / (2 * L1 * L2)
-    stretched = (reach - R) * (reach + R) / (2 * L1 * L2)
-    near_folded = folded < 1.0
-    square = folded * stretched
-    c, s = unit_pair(if_else(near_folded, folded - 1.0, 1.0 - stretched), sqrt(positive_part(square)))
-    # The two elbows are mirror images at the line to the point: a = arg(point) -+ arg(L1 + L2 e^(i b)).
+
+    # As products, so that nothing cancels near the folded (b = pi) and the stretched arm (b = 0):
+    #   1 + cos b = (R^2 - (L1 - L2)^2) / (2 L1 L2),    1 - cos b = ((L1 + L2)^2 - R^2) / (2 L1 L2).
+    one_plus_cos = (R - gap) * (R + gap) / (2 * L1 * L2)
+    one_minus_cos = (reach - R) * (reach + R) / (2 * L1 * L2)
+    near_folded = one_plus_cos < 1.0
+    cos_b = if_else(near_folded, one_plus_cos - 1.0, 1.0 - one_minus_cos)
+
+    # sin^2 b = (1 + cos b) (1 - cos b), negative where the point is out of reach.
+    square = one_plus_cos * one_minus_cos
+    c, s = unit_pair(cos_b, sqrt(positive_part(square)))
+
+    # The two elbows are mirror images at the line to the point: b and -b, a = arg(x + i y) -+ arg(L1 + L2 e^(i b)).
     forward = unit_pair(x, y, scale)
-    inside = unit_pair(if_else(near_folded, L1 - L2 + L2 * folded, L1 + L2 * c), L2 * s, L1)
+    along = if_else(near_folded, L1 - L2 + L2 * one_plus_cos, L1 + L2 * c)
+    inside = unit_pair(along, L2 * s, L1)
     return TwoLink(
         first=(add_angles(forward, inside), add_angles(forward, inside, -1.0)),
         between=((c, -s), (c, s)),

@@ -47,25 +47,34 @@ def nearest_wrist_distance(fit: Fit, T: Array) -> Array:
     r = np.hypot(seen[:, 0], seen[:, 2])
     u = seen[:, 1]
 
-    # Nearest point of all planes, if it lies in the ring: in front of axis 1 and behind it.
+    # The nearest point without regard to the ring has u' = u and x = +-sqrt(r^2 - offset^2), or x = 0 if r < offset;
+    # it counts where its distance rho from axis 2 is in the ring.
     x = np.sqrt(np.maximum((r - offset) * (r + offset), 0.0))
     best = np.full(len(T), np.inf)
     for side in (x, -x):
         rho = np.hypot(side - a1, u)
         inside = (rho >= least) & (rho <= most)
-        best = np.where(inside, np.minimum(best, np.abs(np.hypot(side, offset) - r)), best)
-    for rho_at in (least, most):
-        if 0 < rho_at < np.inf:
-            best = np.minimum(best, _distance_of_circle(r, u, a1, offset, rho_at))
+        distance = np.abs(np.hypot(side, offset) - r)
+        best = np.where(inside, np.minimum(best, distance), best)
+
+    # Otherwise the nearest point is on one of the two circles that bound the ring.
+    for bound in (least, most):
+        if 0 < bound < np.inf:
+            best = np.minimum(best, _distance_of_circle(r, u, a1, offset, bound))
     return best
 
 
 def _distance_of_circle(r: Array, u: Array, a1: float, offset: float, rho: float) -> Array:
-    """Return the distances, shape (N,), from points (r, u) to a circle of radius rho about axis 2 in the plane."""
+    """Return the distances, shape (N,), from points (r, u) to a circle of radius rho about axis 2 in the plane.
+
+    Its point in direction phi is at the distance g = sqrt((a1 + rho cos(phi))^2 + offset^2) from axis 1 and at the
+    height rho sin(phi): the distance to it is sqrt((g - r)^2 + (rho sin(phi) - u)^2).
+    """
     step = 2 * np.pi / _DIRECTIONS
     phi: Array = step * np.arange(_DIRECTIONS, dtype=float)
     g = np.hypot(a1 + rho * np.cos(phi), offset)
     values = np.hypot(g - r[:, None], rho * np.sin(phi) - u[:, None])
+
     # A minimum lies within a step of each direction that is nearer than both its neighbours.
     is_dip = (values <= np.roll(values, 1, axis=1)) & (values <= np.roll(values, -1, axis=1))
     rows, columns = np.nonzero(is_dip)
@@ -89,7 +98,9 @@ def _minimum_near(start: Array, step: float, r: Array, u: Array, a1: float, offs
         g1 = -x * s / g
         g2 = (s**2 - x * c - g1**2) / g
         slope = (g - r) * g1 + (s - u) * c
-        bend = g1**2 + (g - r) * g2 + c**2 - (s - u) * s
-        newton = np.divide(-slope, bend, out=-np.sign(slope) * step / 4, where=bend > 0)
-        phi = np.clip(phi + newton, start - step, start + step)
+        curvature = g1**2 + (g - r) * g2 + c**2 - (s - u) * s
+
+        # Newton's step where the curvature is positive, else a fixed one downhill.
+        change = np.divide(-slope, curvature, out=-np.sign(slope) * step / 4, where=curvature > 0)
+        phi = np.clip(phi + change, start - step, start + step)
     return np.asarray(smallest)

@@ -52,6 +52,7 @@ from dhkit.kinematics.closed_form.formulas import (
 _FLAT = 1e-9
 """Share of the reach by which a pose may lie off the plane of a planar arm."""
 _IDENTITY = np.eye(4)[:3]
+"""Pose of the tool in itself, without the last row, shape (3, 4)."""
 _CHAINS = ("RR", "RRR", "RRPR", "RRRP", "PRRR", "RPRR", "RRP", "RPR", "PRR")
 """Orders of joints that form a chain: two or three revolute joints and at most one prismatic."""
 
@@ -97,18 +98,27 @@ def chain_fit(axes: Axes) -> Fit | None:
 
 
 def chain_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
-    """Return two branches: the elbow left of the line from the first axis to the last, seen from above; then right."""
+    """Return two branches: the elbow left of the line from the first axis to the last, seen from above; then right.
+
+    With the revolute joints' angles qa, qb and qc about v and their sum rho, the tool is at
+
+        L2 e^(i (qa + upper)) + L3 e^(i (qa + upper + qb + bend)) + lever e^(i rho) = x + i u
+
+    in the plane, where the last term is left out with two revolute joints. A prismatic joint moves along v.
+    """
     T = pose.seen(p["T_plane_world"], _IDENTITY)
     kinds = pose.structure
-    turning = kinds.count("R") == 3
+    x, u, v = T.position
+
+    # The tool's direction in the plane gives rho, and with it the position of the third axis.
     wanted = weighted_sum(p["axis"], T.rotation)
     rho = add_angles(unit_pair(wanted[0], wanted[1]), p["pointing"], -1.0)
-    lever = p["lever"]
-    x, u, v = T.position
-    if turning:
-        reached = add_angles(rho, lever)
-        x, u = x - reached[0], u - reached[1]
+    if kinds.count("R") == 3:
+        lever = add_angles(rho, p["lever"])
+        x = x - lever[0]
+        u = u - lever[1]
     arm = two_link(x, u, p["L2"], p["L3"], pose.scale)
+
     rise = v - p["height"]
     off = 0.0 if "P" in kinds else _off_plane(rise, pose.scale)
     branches = []
@@ -118,11 +128,12 @@ def chain_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
         other = 1 - side
         qa = add_angles(select_pair(upright, arm.first[side], arm.first[other]), p["upper"], -1.0)
         qb = add_angles(select_pair(upright, arm.between[side], arm.between[other]), p["bend"], -1.0)
-        turns = iter((qa, qb, add_angles(add_angles(rho, qa, -1.0), qb, -1.0)))
-        joints = [
-            sense * rise if kind == "P" else _sensed(next(turns), sense)
-            for kind, sense in zip(kinds, p["senses"], strict=True)
-        ]
+        qc = add_angles(add_angles(rho, qa, -1.0), qb, -1.0)
+
+        angles = iter((qa, qb, qc))
+        joints = []
+        for kind, sense in zip(kinds, p["senses"], strict=True):
+            joints.append(sense * rise if kind == "P" else _sensed(next(angles), sense))
         branches.append(Branch(tuple(joints), miss=hypot(arm.miss, off), elbow=arm.straight, clamped=arm.clamped))
     return branches
 
@@ -151,7 +162,13 @@ def polar_fit(axes: Axes) -> Fit | None:
 
 
 def polar_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
-    """Return two branches: the prismatic joint extended in its positive direction, then in its negative."""
+    """Return two branches: the prismatic joint extended in its positive direction, then in its negative.
+
+    With the prismatic joint's extension s = start + q2 from the foot of the perpendicular,
+
+        e^(i q1) e^(i boom) (s + i lift) = x + i u,    so that    s = +-sqrt(R^2 - lift^2),    R = |x + i u|,
+        q1 = arg(x + i u) - boom - arg(s + i lift).
+    """
     x, u, v = pose.seen(p["T_plane_world"], _IDENTITY).position
     R = hypot(x, u)
     lift = fabs(p["lift"])
@@ -159,31 +176,29 @@ def polar_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     square = (R - lift) * (R + lift)
     length = sqrt(positive_part(square))
     miss = hypot(if_else(beyond, lift - R, 0.0), _off_plane(v - p["height"], pose.scale))
-    return [
-        Branch(
-            (
-                angle(
-                    add_angles(
-                        unit_pair(x, u, pose.scale),
-                        add_angles(p["boom"], unit_pair(along, p["lift"], pose.scale)),
-                        -1.0,
-                    )
-                ),
-                along - p["start"],
-            ),
-            miss=miss,
-            elbow=length < SINGULAR * p["reach"],
-            clamped=logic_and(square < 0, logic_not(beyond)),
+
+    point = unit_pair(x, u, pose.scale)
+    branches = []
+    for s in (length, -length):
+        at_zero = add_angles(p["boom"], unit_pair(s, p["lift"], pose.scale))
+        q1 = add_angles(point, at_zero, -1.0)
+        branches.append(
+            Branch(
+                (angle(q1), s - p["start"]),
+                miss=miss,
+                elbow=length < SINGULAR * p["reach"],
+                clamped=logic_and(square < 0, logic_not(beyond)),
+            )
         )
-        for along in (length, -length)
-    ]
+    return branches
 
 
 def slider_fit(axes: Axes) -> Fit | None:
     """Recognize a slide that carries a revolute joint across it."""
     if axes.kinds != "PR" or not axes.perpendicular(1, 2):
         return None
-    v, x = axes.direction(2), axes.direction(1)
+    x = axes.direction(1)
+    v = axes.direction(2)
     R = np.stack([x, np.cross(v, x), v]) + 0.0
     origin = axes.point(2)
     tool = R @ (axes.T_world_tool[:3, 3] - origin)
@@ -205,22 +220,32 @@ def slider_fit(axes: Axes) -> Fit | None:
 
 
 def slider_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
-    """Return two branches: the tool ahead of the revolute axis along the prismatic joint, then behind it."""
+    """Return two branches: the tool ahead of the revolute axis along the prismatic joint, then behind it.
+
+    The prismatic joint moves along x, and the tool is at the distance L from the revolute axis:
+
+        q1 + L e^(i (q2 + pointing)) = x + i u,    so that    x - q1 = +-sqrt(L^2 - u^2),
+        q2 = arg(x - q1 + i u) - pointing.
+    """
     x, u, v = pose.seen(p["T_plane_world"], _IDENTITY).position
     L = p["L"]
     beyond = fabs(u) - L > BOUNDARY_SHARE * pose.scale
     square = (L - u) * (L + u)
     ahead = sqrt(positive_part(square))
     miss = hypot(if_else(beyond, fabs(u) - L, 0.0), _off_plane(v - p["height"], pose.scale))
-    return [
-        Branch(
-            (x - along, angle(add_angles(unit_pair(along, u), p["pointing"], -1.0))),
-            miss=miss,
-            elbow=ahead < SINGULAR * p["reach"],
-            clamped=logic_and(square < 0, logic_not(beyond)),
+
+    branches = []
+    for along in (ahead, -ahead):
+        q2 = add_angles(unit_pair(along, u), p["pointing"], -1.0)
+        branches.append(
+            Branch(
+                (x - along, angle(q2)),
+                miss=miss,
+                elbow=ahead < SINGULAR * p["reach"],
+                clamped=logic_and(square < 0, logic_not(beyond)),
+            )
         )
-        for along in (ahead, -ahead)
-    ]
+    return branches
 
 
 def _across(v: Array) -> Array:
@@ -237,8 +262,10 @@ def _frame(R: Array, origin: Array) -> Array:
 
 
 def _sensed(pair: Pair, sense: SX) -> SX:
+    """Return the value of a revolute joint, rad, from its angle about v; ``sense`` is -1 if its axis is opposite."""
     return angle((pair[0], sense * pair[1]))
 
 
 def _off_plane(rise: SX, scale: SX) -> SX:
+    """Return the distance of a pose from the arm's plane, m; 0 if it is rounding."""
     return if_else(fabs(rise) > _FLAT * scale, fabs(rise), 0.0)

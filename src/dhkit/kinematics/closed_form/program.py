@@ -55,25 +55,34 @@ def _graph(
     )
     branches = family.formulas(named, pose)
     if len(branches) != len(fit.branches):
-        raise ValueError(f"{family.name}: {len(branches)} branches, {len(fit.branches)} names")
+        raise ValueError(f"{family.name}: {len(branches)} branches with {len(fit.branches)} names; expected as many")
 
-    valid = [ca.logic_and(is_pose, ca.logic_and(branch.miss == 0, _is_finite(branch))) for branch in branches]
-    q = [[if_else(ok, x, np.nan) for x in branch.q] for ok, branch in zip(valid, branches, strict=True)]
-    flags = [if_else(ok, _flags(branch, limits, prismatic), 0.0) for ok, branch in zip(valid, branches, strict=True)]
+    valid = []
+    q = []
+    flags: list[Any] = []
+    singular = []
+    distances = []
+    for branch in branches:
+        is_valid = ca.logic_and(is_pose, ca.logic_and(branch.miss == 0, _is_finite(branch)))
+        valid.append(is_valid)
+        q.append(ca.horzcat(*(if_else(is_valid, x, np.nan) for x in branch.q)))
+        flags.append(if_else(is_valid, _flags(branch, limits, prismatic), 0.0))
+        singular.append(ca.logic_and(is_valid, _singular(branch)))
+        distances.append(branch.miss if branch.distance is None else branch.distance)
+
     some = reduce(ca.logic_or, valid)
-    special = reduce(ca.logic_or, (ca.logic_and(ok, _singular(b)) for ok, b in zip(valid, branches, strict=True)))
-    miss = reduce(ca.fmin, (b.miss if b.distance is None else b.distance for b in branches))
-    reached = if_else(special, float(IKStatus.singular), float(IKStatus.ok))
-    found = if_else(some, reached, float(IKStatus.out_of_reach))
+    reached = if_else(reduce(ca.logic_or, singular), float(IKStatus.singular), float(IKStatus.ok))
+    status = if_else(some, reached, float(IKStatus.out_of_reach))
+    distance = if_else(some, 0.0, reduce(ca.fmin, distances))
     return Graph.of(
         "inverse_kinematics",
         {**parameters, "T": T, "free": free},
         {
-            "q": ca.vertcat(*(ca.horzcat(*row) for row in q)),
-            "distance": if_else(is_pose, if_else(some, 0.0, miss), np.nan),
-            "valid": ca.vertcat(*(if_else(ok, 1.0, 0.0) for ok in valid)),
+            "q": ca.vertcat(*q),
+            "distance": if_else(is_pose, distance, np.nan),
+            "valid": ca.vertcat(*(if_else(is_valid, 1.0, 0.0) for is_valid in valid)),
             "flags": ca.vertcat(*flags),
-            "status": if_else(is_pose, found, float(IKStatus.not_a_pose)),
+            "status": if_else(is_pose, status, float(IKStatus.not_a_pose)),
         },
     )
 
@@ -84,25 +93,29 @@ def _is_finite(branch: Branch) -> Any:
 
 
 def _is_pose(T: ca.SX) -> Any:
+    """Return whether T is a pose: R^T R = 1 with a positive determinant, a last row 0 0 0 1, finite coordinates."""
     R = T[:3, :3]
     entries = [*_defects(T), T[3, 0], T[3, 1], T[3, 2], T[3, 3] - 1.0]
     rigid = reduce(ca.logic_and, (ca.fabs(entry) <= ORTHONORMAL for entry in entries))
+    # det R = (r_1 x r_2) . r_3 of the columns r_k.
     proper = ca.dot(ca.cross(R[:, 0], R[:, 1]), R[:, 2]) > 0
     finite = ca.norm_1(T[:3, 3]) < 1e300
     return ca.logic_and(ca.logic_and(rigid, proper), finite)
 
 
 def _defects(T: ca.SX) -> list[Any]:
-    """Return the entries of R^T R - 1."""
+    """Return the six different entries of the symmetric matrix R^T R - 1."""
     defect = T[:3, :3].T @ T[:3, :3] - ca.SX.eye(3)
-    return [defect[i, j] for i in range(3) for j in range(i + 1)]
+    return [defect[0, 0], defect[1, 0], defect[1, 1], defect[2, 0], defect[2, 1], defect[2, 2]]
 
 
 def _singular(branch: Branch) -> Any:
+    """Return whether a branch is singular anywhere."""
     return reduce(ca.logic_or, (branch.shoulder, branch.elbow, branch.wrist))
 
 
 def _flags(branch: Branch, limits: ca.SX, prismatic: Sequence[bool]) -> Any:
+    """Return the sum of the flags of a branch, as the integer that :class:`IKFlag` makes of them."""
     inside = reduce(
         ca.logic_and,
         (_inside(x, limits[2 * i], limits[2 * i + 1], prismatic[i]) for i, x in enumerate(branch.q)),
@@ -117,8 +130,12 @@ def _flags(branch: Branch, limits: ca.SX, prismatic: Sequence[bool]) -> Any:
     return sum(if_else(condition, float(flag), 0.0) for flag, condition in conditions.items())
 
 
-def _inside(x: Any, begin: Any, width: Any, slides: bool) -> Any:
-    if slides:
+def _inside(x: Any, begin: Any, width: Any, is_prismatic: bool) -> Any:
+    """Return whether a joint is inside its limits: begin <= x <= begin + width, for angles up to whole turns.
+
+    Angles x are in rad, their limits in turns (``limit_parameters``).
+    """
+    if is_prismatic:
         return ca.logic_and(x >= begin, x - begin <= width)
     turns = x * (1.0 / math.tau) - begin  # multiplied, for a division costs as much as an arc tangent
     return turns - ca.floor(turns) <= width

@@ -57,9 +57,13 @@ class _Region:
     """Rotation of link 3 about v since zero joint positions, as a pair."""
     shoulder: Shoulder
     miss: SX
+    """Distance of the wrist's centre from this solution's reach in the arm's plane, m."""
     elbow: SX
+    """Whether the elbow is singular: the arm is stretched, folded or drawn in."""
     clamped: SX
+    """Whether the centre lies beyond the boundary by rounding only."""
     distance: SX | None = None
+    """Distance of the centre from the nearest point that is reached, m; equals ``miss`` if not given."""
 
 
 def elbow_fit(axes: Axes) -> Fit | None:
@@ -130,7 +134,13 @@ def slide_fit(axes: Axes) -> Fit | None:
 
 
 def slide_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
-    """Return the eight branches: shoulder, then boom, then wrist."""
+    """Return the eight branches: shoulder, then boom, then wrist.
+
+    With the prismatic joint's extension s = start + q3, the wrist's centre is in the plane at
+
+        e^(i q2) e^(i boom) (s + i lift) = x + i u    from axis 2, so that
+        s = +-sqrt(R^2 - lift^2),    R = |x + i u|,    q2 = arg(x + i u) - boom - arg(s + i lift).
+    """
     T = pose.seen(p["T_plane_world"], p["T_tool_wrist"])
     branches = []
     for shoulder in ordered_shoulders(p, T.position, pose):
@@ -142,13 +152,12 @@ def slide_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
         beyond = short > BOUNDARY_SHARE * pose.scale
         square = (R - lift) * (R + lift)
         length = sqrt(positive_part(square))
-        for along in (length, -length):
-            # As complex numbers, the wrist is at e^(i q2) boom (along + i lift) from axis 2.
-            q2 = add_angles(
-                unit_pair(x, u, pose.scale), add_angles(p["boom"], unit_pair(along, p["lift"], pose.scale)), -1.0
-            )
+
+        for s in (length, -length):
+            at_zero = add_angles(p["boom"], unit_pair(s, p["lift"], pose.scale))
+            q2 = add_angles(unit_pair(x, u, pose.scale), at_zero, -1.0)
             region = _Region(
-                q=(angle(shoulder.q1), angle(q2), along - p["start"]),
+                q=(angle(shoulder.q1), angle(q2), s - p["start"]),
                 rho=q2,
                 shoulder=shoulder,
                 miss=hypot(shoulder.miss, if_else(beyond, short, 0.0)),
@@ -172,7 +181,8 @@ def _with_wrist(
 ) -> list[Branch]:
     """Return the two branches of the wrist: no flip (joint 5 turned to its positive side), and flip.
 
-    Where axes 4 and 6 coincide, as exactly as the pose is known, q4 is the free joint's angle.
+    The direction a of axis 6, seen from link 3, gives q4 = arg(a_1 + i a_2), or that plus pi. Where axes 4 and 6
+    coincide, as exactly as the pose is known, q4 is the free joint's angle.
     """
     q1 = region.shoulder.q1
     rho = region.rho

@@ -54,7 +54,7 @@ _ROTATION_SLACK = 1e-12
 
 
 def three_parallel_fit(axes: Axes) -> Fit | None:
-    """Recognize an arm by its axes."""
+    """Recognize an arm with parallel axes 2, 3 and 4, whose axes 5 and 6 meet."""
     if axes.kinds != "RRRRRR" or not (axes.perpendicular(1, 2) and axes.parallel(2, 3) and axes.parallel(2, 4)):
         return None
     if not (axes.perpendicular(4, 5) and axes.perpendicular(5, 6)):
@@ -94,16 +94,23 @@ def three_parallel_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Bran
 def _wrists(
     p: Mapping[str, SX], T: FramedPose, shoulder: Shoulder, pose: PoseSymbols
 ) -> tuple[tuple[Branch, Branch], tuple[Branch, Branch]]:
-    """Return upper and lower elbow of the wrist without flip (joint 5 turned to its positive side), and with it."""
+    """Return upper and lower elbow of the wrist without flip (joint 5 turned to its positive side), and with it.
+
+    Links 2 to 4 rotate together by rho = q2 + q3 + q4 about v. The direction a of axis 6 gives it, up to the flip:
+
+        rho = arg(a_1 + i a_2), or that plus pi.
+    """
     wrist = wrist_axes(p, (to_arm_frame(axis, shoulder.q1) for axis in T.rotation))
     position = to_arm_frame(T.position, shoulder.q1)
-    # rho is the total rotation of links 2 to 4. Where axis 6 is parallel to axes 2 to 4, only the sum of rho and q6 is
-    # determined: q6 is then free, and rho follows from axis 5 with q6 taken off.
+
+    # Where axis 6 is parallel to axes 2 to 4, the swing is 0, and only the sum of rho and q6 is determined: q6 is then
+    # free, and rho follows from axis 5 with q6 taken off.
     c6, s6 = pose.free
     swing = hypot(wrist.a[0], wrist.a[1])
     free = unit_pair(c6 * wrist.n[1] - s6 * wrist.m[1], s6 * wrist.m[0] - c6 * wrist.n[0])
     rho = unit_pair(wrist.a[0], wrist.a[1], ill_determined(pose), free)
     rho = _within_reach(p, position, rho, swing, pose)
+
     unflipped, flipped = joints_5_and_6(p, wrist, rho)
     singular = swing < SINGULAR
     return (
@@ -131,27 +138,34 @@ def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX, p
         distance = hypot(x - sense * reached[0], u - sense * reached[1])
         return distance, if_else(distance > reach, reach, fmax(distance, gap))
 
-    unflipped = end(1.0)
-    flipped = end(-1.0)
-    excess = fabs(unflipped[0] - unflipped[1])
-    excess_of_flip = fabs(flipped[0] - flipped[1])
+    distance, nearest = end(1.0)
+    distance_of_flip, nearest_of_flip = end(-1.0)
+    excess = fabs(distance - nearest)
+    excess_of_flip = fabs(distance_of_flip - nearest_of_flip)
+
+    # Whether rho is changed for the flip: it alone is out of reach, and rho is determined, or it misses by less.
     is_determined = swing > MIN_DIRECTION * ill_determined(pose)
     alone = logic_and(excess <= 0, is_determined)
     of_flip = logic_and(excess_of_flip > 0, logic_or(alone, excess_of_flip < excess))
     sense = if_else(of_flip, -1.0, 1.0)
-    wanted = if_else(of_flip, flipped[1], unflipped[1])
+    wanted = if_else(of_flip, nearest_of_flip, nearest)
 
-    # The triangle of axis 2, axis 4 and the meeting point: its angle at the latter by the law of cosines.
-    far = hypot(x, u)
-    arm = hypot(lever[0], lever[1])
-    area = 2.0 * far * arm
-    cosine = (far * far + arm * arm - wanted * wanted) / if_else(area > 0, area, 1.0)
-    to_end = unit_pair(x, u)
+    # The triangle of axis 2, axis 4 and the meeting point M has the sides b = |M|, c = |lever| and, opposite to M, the
+    # wanted distance w of axis 4. Its angle at M by the law of cosines: w^2 = b^2 + c^2 - 2 b c cos(corner).
+    b = hypot(x, u)
+    c = hypot(lever[0], lever[1])
+    product = 2.0 * b * c
+    cosine = (b * b + c * c - wanted * wanted) / if_else(product > 0, product, 1.0)
+    to_meeting = unit_pair(x, u)
     to_lever = unit_pair(lever[0], lever[1])
-    side = sign(sense * add_angles(add_angles(rho, to_lever), to_end, -1.0)[1])
+
+    # Axis 4 stays on its side of the line to M: rho + arg(lever) = arg(M) +- corner.
+    side = sign(sense * add_angles(add_angles(rho, to_lever), to_meeting, -1.0)[1])
     corner = unit_pair(cosine, side * sqrt(positive_part(1.0 - cosine * cosine)))
-    turned = add_angles(add_angles(to_end, corner), to_lever, -1.0)
+    turned = add_angles(add_angles(to_meeting, corner), to_lever, -1.0)
     turned = (sense * turned[0], sense * turned[1])
+
+    # A change of rho rotates the tool by ``swing`` times as much.
     cost = swing * hypot(turned[0] - rho[0], turned[1] - rho[1])
     is_beyond = logic_or(of_flip, excess > 0)
     is_harmless = cost < _ROTATION_SLACK + ERROR_OVER_DEFECT * pose.noise
@@ -167,9 +181,13 @@ def _elbows(
     singular: SX,
     scale: SX,
 ) -> tuple[Branch, Branch]:
-    reached = add_angles(rho, p["lever"])
-    x = position[0] - p["a1"] - reached[0]
-    u = position[1] - reached[1]
+    """Return the branches of upper and lower elbow for a rotation rho of links 2 to 4.
+
+    Axis 4 is at the meeting point minus e^(i rho) lever; two links reach it from axis 2, and q4 is the rest of rho.
+    """
+    lever = add_angles(rho, p["lever"])
+    x = position[0] - p["a1"] - lever[0]
+    u = position[1] - lever[1]
 
     def branch(elbow: Elbow) -> Branch:
         rest = add_angles(rho, elbow.rotation, -1.0)

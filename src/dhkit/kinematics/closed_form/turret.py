@@ -31,6 +31,7 @@ from dhkit.kinematics.closed_form.formulas import (
 from dhkit.kinematics.closed_form.links import ELBOWS, elbows, link_parameters
 
 _IDENTITY = np.eye(4)[:3]
+"""Pose of the tool in itself, without the last row, shape (3, 4)."""
 
 
 def pan_tilt_fit(axes: Axes) -> Fit | None:
@@ -52,7 +53,10 @@ def pan_tilt_fit(axes: Axes) -> Fit | None:
 
 
 def pan_tilt_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
-    """Return the branches that aim: the tool lies in the direction of the pose's origin, at whatever distance."""
+    """Return the branches that aim: the tool lies in the direction of the pose's origin, at whatever distance.
+
+    In the arm's plane, from axis 2: q2 = arg(x + i u) - arg(lever).
+    """
     position = pose.seen(p["T_plane_world"], _IDENTITY).position
     branches = []
     for shoulder in ordered_shoulders(p, position, pose):
@@ -124,15 +128,21 @@ def yaw_three_fit(axes: Axes) -> Fit | None:
 
 
 def yaw_three_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
-    """Return the four branches that put the tool's origin in place and point it: shoulder, then elbow."""
+    """Return the four branches that put the tool's origin in place and point it: shoulder, then elbow.
+
+    The direction w of the tool's axis in the arm's plane gives the rotation of links 2 to 4, and with it the position
+    of axis 4, which two links reach from axis 2:
+
+        rho = q2 + q3 + q4 = arg(w) - pointing,    axis 4 at (x + i u) - e^(i rho) lever.
+    """
     T = pose.seen(p["T_plane_world"], _IDENTITY)
     branches = []
     for shoulder in ordered_shoulders(p, T.position, pose):
         wanted = to_arm_frame(weighted_sum(p["axis"], T.rotation), shoulder.q1)
         rho = add_angles(unit_pair(wanted[0], wanted[1]), p["pointing"], -1.0)
-        reached = add_angles(rho, p["lever"])
-        x = shoulder.x - p["a1"] - reached[0]
-        u = T.position[1] - reached[1]
+        lever = add_angles(rho, p["lever"])
+        x = shoulder.x - p["a1"] - lever[0]
+        u = T.position[1] - lever[1]
         sideways = hypot(wanted[0], wanted[1]) < SINGULAR
         branches += _branches(p, shoulder, x, u, pose.scale, rho, sideways)
     return branches
@@ -141,6 +151,7 @@ def yaw_three_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
 def _branches(
     p: Mapping[str, SX], shoulder: Shoulder, x: SX, u: SX, scale: SX, rho: Pair | None, sideways: SX
 ) -> list[Branch]:
+    """Return upper and lower elbow for a point at (x, u) from axis 2, m; with ``rho`` joint 4 is the rest of it."""
     branches = []
     for elbow in elbows(p, x, u, shoulder.q1, scale):
         joints = [angle(shoulder.q1), *elbow.joints]
@@ -161,4 +172,5 @@ def _branches(
 
 
 def _common(axes: Axes, plane: ArmPlane) -> dict[str, Parameter]:
+    """Return the parameters that all arms of this file have."""
     return {"T_plane_world": plane.T[:3], "up": plane.up, "reach": axes.scale}

@@ -34,10 +34,13 @@ def wrist_parameters(axes: Axes, plane: ArmPlane, first: Array, centre: Array) -
     centre
         Point where axes 5 and 6 meet, shape (3,), m, world.
     """
-    z5, z6 = axes.direction(5), axes.direction(6)
+    z5 = axes.direction(5)
+    z6 = axes.direction(6)
     T_world_wrist = np.eye(4)
     T_world_wrist[:3, :3] = np.stack([z6, z5, np.cross(z6, z5)], axis=1)
     T_world_wrist[:3, 3] = centre
+
+    # Angle from the first axis to axis 6 about axis 5, at zero.
     wrist = as_pair(first @ z6, z5 @ np.cross(first, z6))
     return {
         "T_plane_world": plane.T[:3],
@@ -57,11 +60,17 @@ while the others may be small by chance."""
 
 @dataclass(frozen=True)
 class Wrist:
-    """Axis 6, axis 5 at zero and their cross product, after the wrist's rotation, in its axes at zero positions."""
+    """Directions of the tool after the wrist's rotation, in the wrist's axes at zero joint positions.
+
+    Those axes are z5 x first, z5 and ``first``, where ``first`` is the axis that the roll is about.
+    """
 
     a: Vector
+    """Axis 6."""
     n: Vector
+    """The tool's direction that is along axis 5 at zero joint positions."""
     m: Vector
+    """Their cross product a x n."""
 
 
 def wrist_axes(p: Mapping[str, SX], axes: Iterable[Vector]) -> Wrist:
@@ -79,11 +88,18 @@ def joints_5_and_6(p: Mapping[str, SX], wrist: Wrist, roll: Pair) -> tuple[tuple
     """Return q5 and q6 without flip (joint 5 positive), then with flip, where ``roll`` is larger by pi.
 
     Both follow from the rotation that remains after the roll about the first axis, so that any roll closes the pose.
+    With c and s the cosine and sine of the roll, and the angle ``wrist`` from the first axis to axis 6 at zero,
+
+        q5 + wrist = atan2(c a_1 + s a_2, a_3),    q6 = atan2(s m_1 - c m_2, c n_2 - s n_1).
     """
     a = wrist.a
     n = wrist.n
     m = wrist.m
-    bend = unit_pair(roll[0] * a[0] + roll[1] * a[1], a[2])
-    q5 = angle(add_angles((bend[1], bend[0]), p["wrist"], -1.0))
-    q6 = angle(unit_pair(roll[0] * n[1] - roll[1] * n[0], roll[1] * m[0] - roll[0] * m[1]))
+    c, s = roll
+
+    sine, cosine = unit_pair(c * a[0] + s * a[1], a[2])
+    q5 = angle(add_angles((cosine, sine), p["wrist"], -1.0))
+    q6 = angle(unit_pair(c * n[1] - s * n[0], s * m[0] - c * m[1]))
+
+    # With the roll larger by pi, c and s change their signs: q5 + wrist becomes its opposite, and q6 turns by pi.
     return (q5, q6), (wrap_angle(-q5 - p["straight"]), turn_by_pi(q6))

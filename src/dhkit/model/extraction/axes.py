@@ -24,11 +24,16 @@ from dhkit.description import Array
 
 _ENTRY_COST = 1000.0
 """Cost of an entry that is not zero: more than all other preferences of a table together."""
-_OBLIQUE_COST, _STRAIGHT_COST, _NEGATIVE_COST = 20.0, 2.0, 1.0
-"""Extra costs of an angle that is not a multiple of 90 degrees, of one of 180 degrees, and of a negative number."""
-_LONG, _TOO_LONG_COST = 2.0, 1e5
-"""Length, in units of the longest step, from which an entry is too long, and the cost of each unit beyond it: no entry
-that is saved is worth a long one."""
+_OBLIQUE_COST = 20.0
+"""Extra cost of an angle that is not a multiple of 90 degrees."""
+_STRAIGHT_COST = 2.0
+"""Extra cost of an angle of 180 degrees."""
+_NEGATIVE_COST = 1.0
+"""Extra cost of a negative length or angle."""
+_LONG = 2.0
+"""Length, in units of the longest step, from which an entry is too long."""
+_TOO_LONG_COST = 1e5
+"""Cost of each unit of length beyond _LONG, so high that no saved entry is worth a long one."""
 _EARLY_COST = 0.1
 """Extra cost of an offset d for each row after it, so that the last of parallel axes has the whole offset."""
 _ON_AXIS_DISTANCE = 1e-9
@@ -88,10 +93,13 @@ class Axes:
         z = self.directions[i]
         feet = self.feet
         if len(feet):
-            feet = feet[np.linalg.norm(np.cross(feet - on_axis, z), axis=1) < _ON_AXIS_DISTANCE]
-        return np.vstack(
-            [on_axis[None], self.points[max(i - 1, 0) : i + 3], np.zeros((1, 3)), self.T_base_tip[None, :3, 3], feet]
-        )
+            # The distance of a point p from the line through o with unit vector z is |(p - o) x z|.
+            distances = np.linalg.norm(np.cross(feet - on_axis, z), axis=1)
+            feet = feet[distances < _ON_AXIS_DISTANCE]
+        nearby = self.points[max(i - 1, 0) : i + 3]
+        base = np.zeros((1, 3))
+        tip = self.T_base_tip[None, :3, 3]
+        return np.vstack([on_axis[None], nearby, base, tip, feet])
 
     def axis_points(self, i: int, on_previous_axis: Array | None) -> Array:
         """Return points through which the axis of a prismatic joint i (from 0) may go, shape (k, 3).
@@ -111,10 +119,14 @@ class Axes:
         nearby = self.frames[i : i + 3].reshape(-1, 3)
         known = [np.eye(3), self.T_base_tip[:3, :3].T, nearby, self.normals]
         directions = np.vstack(known if previous is None else [previous[None], *known])
-        flat = directions - (directions @ self.directions[i])[:, None] * self.directions[i]
-        lengths = np.linalg.norm(flat, axis=1)
-        parts: Array = flat[lengths > _MIN_SINE] / lengths[lengths > _MIN_SINE, None]
-        return parts
+
+        # The part of a unit vector v perpendicular to z is v - (v . z) z; its length is the sine of their angle.
+        z = self.directions[i]
+        parts = directions - (directions @ z)[:, None] * z
+        sines = np.linalg.norm(parts, axis=1)
+        is_determined = sines > _MIN_SINE
+        units: Array = parts[is_determined] / sines[is_determined, None]
+        return units
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +189,9 @@ def angle_costs(angles: Array) -> Array:
 def angle_about(axis: Array, start: Array, end: Array) -> Array:
     """Return the angles from start to end about an axis perpendicular to both, rad, in (-pi, pi], shape (...).
 
-    All are vectors of shape (..., 3) that broadcast, of any length.
+    All are vectors of shape (..., 3) that broadcast; start s and end e have any length, the axis z is a unit vector:
+
+        angle = atan2((s x e) . z, s . e).
     """
     cosines = np.sum(start * end, axis=-1)
     sines = np.sum(np.cross(start, end) * axis, axis=-1)
@@ -199,15 +213,23 @@ def tidiest_normals(axes: Axes, begin: Callable[[Normal], Choice], finish: Calla
     """
     # A prismatic first axis may be any line parallel to itself.
     lines = axes.axis_points(0, None) if axes.prismatic[0] else axes.points[:1]
-    paths = []
-    for normal in (normal for point in lines for normal in _normals_after(axes, 0, point, None)):
-        cost, start = begin(normal)
-        row = length_costs(np.array([normal.length]))[0] + angle_costs(np.array([_alpha(axes, 0, normal)]))[0]
-        paths.append(Path((normal,), cost + float(row), start))
+    paths: list[Path] = []
+    for point in lines:
+        for normal in _normals_after(axes, 0, point, None):
+            cost, start = begin(normal)
+            a = np.array([normal.length])
+            alpha = np.array([_alpha(axes, 0, normal)])
+            row = length_costs(a)[0] + angle_costs(alpha)[0]
+            paths.append(Path((normal,), cost + float(row), start))
+
+    # A beam search: at each axis only the cheapest partial tables are continued.
     count = max(6, _MAX_PARTIAL_TABLES // axes.n)
     paths = _cheapest(paths, count)
     for i in range(1, axes.n - 1):
-        paths = _cheapest([longer for path in paths for longer in _extended(axes, i, path)], count)
+        longer: list[Path] = []
+        for path in paths:
+            longer += _extended(axes, i, path)
+        paths = _cheapest(longer, count)
 
     def completed(path: Path) -> Path:
         cost, end = finish(path.normals[-1])
@@ -222,15 +244,21 @@ def tidiest_normals(axes: Axes, begin: Callable[[Normal], Choice], finish: Calla
 
 
 def _extended(axes: Axes, i: int, path: Path) -> list[Path]:
-    """Return a path with each possible normal from axis i to axis i + 1 (from 0)."""
+    """Return a path with each possible normal from axis i to axis i + 1 (from 0).
+
+    A normal from ``start`` along x adds d and theta between the previous normal and itself, and its own a and alpha.
+    """
     previous = path.normals[-1]
     z = axes.directions[i]
     normals = _normals_after(axes, i, previous.end, previous.x)
     x = np.array([normal.x for normal in normals])
     start = np.array([normal.start for normal in normals])
+
     d = (start - previous.end) @ z
     theta = angle_about(z, previous.x, x)
-    a, alpha = np.array([[normal.length, _alpha(axes, i, normal)] for normal in normals]).T
+    a = np.array([normal.length for normal in normals])
+    alpha = np.array([_alpha(axes, i, normal) for normal in normals])
+
     early = np.where(np.abs(d) > ZERO, _EARLY_COST * (axes.n - i), 0.0)
     costs = length_costs(d) + early + angle_costs(theta) + length_costs(a) + angle_costs(alpha)
     return [
@@ -270,31 +298,44 @@ def _normals_after(axes: Axes, i: int, on_axis: Array, previous: Array | None) -
     lines = axes.axis_points(i + 1, on_axis) if axes.prismatic[i + 1] else axes.points[i + 1][None]
     cross = np.cross(z, z_next)
     sine = float(np.linalg.norm(cross))
+    normals: list[Normal] = []
     if sine <= axes.parallel_below:
-        return [normal for line in lines for normal in _parallel_normals(axes, i, on_axis, line, previous)]
+        for line in lines:
+            normals += _parallel_normals(axes, i, on_axis, line, previous)
+        return normals
+
     # The normals of nearly parallel axes may be hundreds of metres away: a point that far would cost digits.
     point = on_axis if axes.prismatic[i] else axes.points[i]
-    feet = [nearest_points(point, z, line, z_next) for line in lines]
-    return [Normal(sign * (cross / sine), *ends) for ends in feet for sign in (1.0, -1.0)]
+    x = cross / sine
+    for line in lines:
+        start, end = nearest_points(point, z, line, z_next)
+        normals += [Normal(x, start, end), Normal(-x, start, end)]
+    return normals
 
 
 def nearest_points(point: Array, z: Array, other: Array, z_other: Array) -> tuple[Array, Array]:
     """Return the points where two lines that are not parallel are nearest to each other, m, shape (3,) each.
 
-    A line has a point, shape (3,), m, and a unit vector. Cross products keep the digits that a difference of scalar
-    products loses for nearly parallel lines.
+    A line has a point, shape (3,), m, and a unit vector. With lines p + s z and p' + s' z', and the gap g = p' - p,
+    the vector between the points, g + s' z' - s z, is parallel to c = z x z'; its product with z' x c and z x c is 0:
+
+        s = (g x z') . c / c.c,    s' = (g x z) . c / c.c.
+
+    Cross products keep the digits that a difference of scalar products loses for nearly parallel lines.
     """
-    gap = other - point
-    cross = np.cross(z, z_other)
-    square = float(cross @ cross)
-    along = float(np.cross(gap, z_other) @ cross) / square
-    along_other = float(np.cross(gap, z) @ cross) / square
-    return point + along * z, other + along_other * z_other
+    g = other - point
+    c = np.cross(z, z_other)
+    square = float(c @ c)
+    s = float(np.cross(g, z_other) @ c) / square
+    s_other = float(np.cross(g, z) @ c) / square
+    return point + s * z, other + s_other * z_other
 
 
 def _parallel_normals(axes: Axes, i: int, on_axis: Array, line: Array, previous: Array | None) -> list[Normal]:
     """Return normals between parallel axes, at known points' heights; of coincident ones in known directions."""
     z = axes.directions[i]
+
+    # The part of the vector to the other axis that is perpendicular to both: v - (v . z) z.
     gap = line - on_axis
     gap = gap - (gap @ z) * z
     distance = float(np.linalg.norm(gap))
@@ -304,11 +345,15 @@ def _parallel_normals(axes: Axes, i: int, on_axis: Array, line: Array, previous:
         gap = np.zeros(3)
         parts = axes.perpendicular(i, previous)
         directions = _distinct(np.vstack([parts, -parts]))
+
     heights = (axes.start_points(i, on_axis) - on_axis) @ z
     heights[0] = 0.0  # on_axis itself, without rounding
     _, places = np.unique(np.round(heights, 10), return_index=True)
-    starts = [on_axis + heights[place] * z for place in np.sort(places)]
-    return [Normal(x, start, start + gap) for start in starts for x in directions]
+    normals: list[Normal] = []
+    for place in np.sort(places):
+        start = on_axis + heights[place] * z
+        normals += [Normal(x, start, start + gap) for x in directions]
+    return normals
 
 
 def _distinct(rows: Array) -> Array:

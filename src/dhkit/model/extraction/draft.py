@@ -157,7 +157,14 @@ class Draft:
         )
 
     def _body(self, i: int, T_base_frame: Array, rounding: Rounding) -> Body:
-        """Return the links that move with joint i (0: the base) as one body in a frame."""
+        """Return the links that move with joint i (0: the base) as one body in a frame.
+
+        With masses m, centres c and inertias I_c of the links (R, p their poses in the frame), the body has
+
+            m = sum m_k,    c = sum m_k c_k / m,    I = sum (R I_c R^T + m (r.r 1 - r r^T))_k,    r_k = c_k - c,
+
+        by the parallel-axis theorem.
+        """
         chain = self.chain
         to_frame = np.linalg.inv(T_base_frame)
         mass = 0.0
@@ -173,10 +180,11 @@ class Draft:
             parts.append((inertial.mass, com, T[:3, :3] @ inertial.inertia @ T[:3, :3].T))
             mass = mass + inertial.mass
             moment = moment + inertial.mass * com
+
         center = moment / mass if mass else np.zeros(3)
-        for weight, com, inertia in parts:
-            arm = com - center
-            second += inertia + weight * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+        for m, com, inertia in parts:
+            r = com - center
+            second += inertia + m * (r @ r * np.eye(3) - np.outer(r, r))
         return rounding.body(mass, center, second)
 
     def _placed_shapes(self, i: int, T_base_frame: Array) -> tuple[Shape, ...]:

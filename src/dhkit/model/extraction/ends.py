@@ -42,7 +42,7 @@ def frame(x: Array, z: Array, origin: Array) -> Array:
 
 
 def screw(axis: int, angle: float, length: float) -> Array:
-    """Return a rotation about, rad, and a translation along, m, the x (0) or z (2) axis, shape (4, 4)."""
+    """Return a rotation by an angle, rad, about the x (0) or z (2) axis and a translation along it, m, shape (4, 4)."""
     T = np.eye(4)
     T[:3, :3] = _rotations(axis, np.array([angle]))[0]
     T[axis, 3] = length
@@ -51,12 +51,18 @@ def screw(axis: int, angle: float, length: float) -> Array:
 
 def _rotations(axis: int, angles: Array) -> Array:
     """Return rotations about the x (0) or z (2) axis by angles, shape (k,), rad; shape (k, 3, 3)."""
+    # Rotation takes axis i to axis j, and j to -i, where i, j follow the axis in the cycle x, y, z.
+    i = (axis + 1) % 3
+    j = (axis + 2) % 3
+    cosines = np.cos(angles)
+    sines = np.sin(angles)
+
     R = np.zeros((len(angles), 3, 3))
-    i, j = (axis + 1) % 3, (axis + 2) % 3
     R[:, axis, axis] = 1.0
-    R[:, i, i] = R[:, j, j] = np.cos(angles)
-    R[:, j, i] = np.sin(angles)
-    R[:, i, j] = -R[:, j, i]
+    R[:, i, i] = cosines
+    R[:, j, j] = cosines
+    R[:, j, i] = sines
+    R[:, i, j] = -sines
     return R
 
 
@@ -75,16 +81,25 @@ def first_row(convention: Convention, normal: Normal, z: Array) -> Choice:
     if convention is Convention.STANDARD:
         angles = np.array(thetas)
         shifts = np.array([0.0, *_zeroing_shifts(t, z)])
-        turns = angle_costs(angles) + _outside_costs(angle_costs(_roll_pitch_yaw(R @ _rotations(2, -angles))))
-        lengths = length_costs(shifts) + _outside_costs(length_costs(t - shifts[:, None] * z))
-        k, j = int(np.argmin(turns)), int(np.argmin(lengths))
-        return float(turns[k] + lengths[j]), EndRow(float(angles[k]), float(shifts[j]))
+
+        # The base's rotation is R Rz(-theta), its origin t - d z: theta and d are chosen independently.
+        base_turns = angle_costs(_roll_pitch_yaw(R @ _rotations(2, -angles)))
+        base_lengths = length_costs(t - shifts[:, None] * z)
+        turns = angle_costs(angles) + _outside_costs(base_turns)
+        lengths = length_costs(shifts) + _outside_costs(base_lengths)
+        k = int(np.argmin(turns))
+        j = int(np.argmin(lengths))
+        return float(turns[k] + lengths[j]), EndRow(theta=float(angles[k]), d=float(shifts[j]))
     across = R.T @ t
     thetas += _and_opposite(-np.arctan2(across[1], across[0]))  # the base's x axis points at the first axis
     return min(_modified_starts(R, t, z, thetas), key=itemgetter(0))
 
 
 def _modified_starts(R: Array, t: Array, z: Array, thetas: list[float]) -> Iterator[Choice]:
+    """Yield first rows of a modified table for the frame (R, t) of its first normal.
+
+    The base's rotation is R Rz(-theta), whose part about x may be alpha_0 of the table; its origin is t - a x - d z.
+    """
     for theta in thetas:
         R_base = R @ _rotations(2, np.array([-theta]))[0]
         roll, pitch, yaw = _roll_pitch_yaw(R_base[None])[0]
@@ -111,9 +126,15 @@ def last_row(convention: Convention, normal: Normal, z: Array, T_base_tip: Array
 
 
 def _modified_ends(R: Array, t: Array, with_theta: bool) -> Iterator[Choice]:
-    thetas = np.array([0.0])
+    """Yield last rows of a modified table for the tip's pose (R, t) after the last normal.
+
+    theta and d leave the tool Rz(-theta) R at Rz(-theta) t - (0, 0, d).
+    """
+    candidates = [0.0]
     if with_theta:
-        thetas = np.array([0.0, *_and_opposite(np.arctan2(R[1, 0], R[0, 0])), *_quarters(np.arctan2(t[1], t[0]))])
+        candidates += _and_opposite(np.arctan2(R[1, 0], R[0, 0]))  # the tool's yaw is 0
+        candidates += _quarters(np.arctan2(t[1], t[0]))  # its x or y is 0
+    thetas = np.array(candidates)
     back = _rotations(2, -thetas)
     turns = _in_last_row(angle_costs(thetas)) + angle_costs(_roll_pitch_yaw(back @ R)).sum(axis=-1)
     for d in (0.0, float(t[2])) if with_theta else (0.0,):
@@ -124,15 +145,25 @@ def _modified_ends(R: Array, t: Array, with_theta: bool) -> Iterator[Choice]:
 
 
 def _standard_ends(R: Array, t: Array, with_theta: bool) -> Iterator[Choice]:
+    """Yield last rows of a standard table for the tip's pose (R, t) after the last normal.
+
+    The tool is Rx(-alpha) P at Rx(-alpha) (p - (a, 0, d)), with P = Rz(-theta) R and p = Rz(-theta) t. The entry
+    a = p_x leaves it x = 0; with c, s the cosine and sine of alpha,
+
+        y = c p_y + s (p_z - d),    z = -s p_y + c (p_z - d),
+
+    so that d = p_z + (c / s) p_y makes y zero, and d = p_z - (s / c) p_y makes z zero.
+    """
     thetas = [0.0]
     if with_theta:
-        thetas += _and_opposite(np.arctan2(R[1, 0], R[0, 0]))
-        thetas += _quarters(np.arctan2(t[1], t[0]))
+        thetas += _and_opposite(np.arctan2(R[1, 0], R[0, 0]))  # the tool's yaw is 0 if alpha is
+        thetas += _quarters(np.arctan2(t[1], t[0]))  # p_y is 0, or p_x, which is the entry a
         thetas += _and_opposite(np.arctan2(R[0, 2], -R[1, 2]))  # the tool rotates about x and then z
         thetas += _and_opposite(np.arctan2(-R[0, 1], R[1, 1]))  # the tool rotates about x and then y
     for theta in thetas:
         back = _rotations(2, np.array([-theta]))[0]
-        P, p = back @ R, back @ t
+        P = back @ R
+        p = back @ t
         angles = [0.0]
         angles += _and_opposite(np.arctan2(-P[1, 0], P[2, 0]))  # the tool's yaw is 0
         angles += _and_opposite(np.arctan2(P[2, 0], P[1, 0]))  # its pitch
@@ -140,8 +171,8 @@ def _standard_ends(R: Array, t: Array, with_theta: bool) -> Iterator[Choice]:
         alphas = np.array([*angles, *_quarters(np.arctan2(p[2], p[1]))])
         tool_turns = _roll_pitch_yaw(_rotations(0, -alphas) @ P)
         turns = float(angle_costs(np.array([theta]))[0]) + angle_costs(alphas) + _outside_costs(angle_costs(tool_turns))
-        # x is the entry a; d and the tool share y and z.
         costs = turns + float(length_costs(p[:1])[0])
+
         c = np.cos(alphas)
         s = np.sin(alphas)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -166,6 +197,7 @@ def _quarters(angle: float) -> list[float]:
 
 
 def _wrapped(angle: float) -> float:
+    """Return an angle in (-pi, pi]; rounding errors about 0 and -pi become 0 and pi."""
     wrapped = float(np.arctan2(np.sin(angle), np.cos(angle)))
     if abs(wrapped) < 1e-15:
         return 0.0
@@ -173,7 +205,11 @@ def _wrapped(angle: float) -> float:
 
 
 def _roll_pitch_yaw(R: Array) -> Array:
-    """Return roll, pitch and yaw of rotations (k, 3, 3), shape (k, 3); yaw is 0 at gimbal lock."""
+    """Return roll, pitch and yaw of rotations R = Rz(yaw) Ry(pitch) Rx(roll), shape (k, 3, 3); their shape is (k, 3).
+
+    At gimbal lock, where cos(pitch) = 0, yaw is 0.
+    """
+    # The first column of R is cos(pitch) (cos(yaw), sin(yaw)), -sin(pitch).
     level = np.hypot(R[:, 0, 0], R[:, 1, 0])
     is_locked = level < 1e-12
     pitch = np.arctan2(-R[:, 2, 0], level)
@@ -188,6 +224,7 @@ def _outside_costs(costs: Array) -> Array:
 
 
 def _in_last_row(costs: Array) -> Array:
+    """Return the costs of entries theta or d of a modified table's last row, of any shape."""
     return np.asarray(costs + _IN_LAST_ROW_COST * (costs > 0))
 
 
@@ -199,7 +236,10 @@ def _zeroing_shifts(t: Array, z: Array) -> list[float]:
 def _zeroing_pairs(t: Array, x: Array, z: Array) -> list[tuple[float, float]]:
     """Return shifts along x and z that make up to two coordinates of t zero, m."""
     pairs = [(0.0, 0.0)]
-    pairs += [(0.0, d) for d in _zeroing_shifts(t, z)] + [(a, 0.0) for a in _zeroing_shifts(t, x)]
+    pairs += [(0.0, d) for d in _zeroing_shifts(t, z)]
+    pairs += [(a, 0.0) for a in _zeroing_shifts(t, x)]
+
+    # Two coordinates of t - a x - d z are zero.
     for rows in ([0, 1], [0, 2], [1, 2]):
         A = np.stack([x[rows], z[rows]], axis=1)
         if abs(np.linalg.det(A)) > _MIN_DIVISOR:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -108,8 +108,8 @@ def extract_dh(
     convention
         Which table.
     side
-        What becomes of links behind moving joints beside the chain: ``"freeze"`` carries them along with those joints
-        at zero, ``"drop"`` leaves them out.
+        Treatment of links that hang on moving joints beside the chain: ``"freeze"`` carries them along with those
+        joints at zero, ``"drop"`` leaves them out.
     as_designed
         Read rounded angles such as 1.5708 as the right angles that they stand for; the result lists the changes.
     exact
@@ -164,6 +164,7 @@ def extracted(
         raise ModelError(f"{chain.path}: {error}") from None
     if original.model is None:
         notes.append("M and g not compared with the file: Pinocchio is not installed")
+
     if changes:
         notes.append(f"read as designed: {len(changes)} numbers; the file as written differs by {residual}")
     else:
@@ -191,7 +192,7 @@ def _shapes(chain: Chain, meshes: MeshFinder, notes: list[str]) -> tuple[tuple[t
         shapes = [shape for link in group for shape in _link_shapes(chain, link, meshes, left_out, has_visuals)]
         if len(shapes) > ROBOT_BOUNDS.shapes:
             notes.append(
-                f"link {group[0]!r}: shape {ROBOT_BOUNDS.shapes + 1} of {len(shapes)} and all behind it{SHAPE_LEFT_OUT}"
+                f"link {group[0]!r}: shape {ROBOT_BOUNDS.shapes + 1} of {len(shapes)} and all after it{SHAPE_LEFT_OUT}"
             )
         groups.append(tuple(shapes[: ROBOT_BOUNDS.shapes]))
     notes += left_out[:_MAX_LISTED_MESHES]
@@ -223,6 +224,16 @@ def _link_shapes(
         yield Shape(geometry, color=shape.color), chain.zero_poses[name] @ shape.T_link_shape
 
 
+class _Candidate(NamedTuple):
+    """A table that takes some nearly parallel axes as parallel."""
+
+    error: float
+    """Largest difference of its tool from the file's, m and entries of the rotation."""
+    parallel_below: float
+    """Sine of the largest angle between neighbouring axes that it takes as parallel."""
+    table: Table
+
+
 def _best_table(
     chain: Chain, convention: Convention, draft: Draft, original: Original, notes: list[str], *, exact: bool
 ) -> tuple[Table, float]:
@@ -248,23 +259,28 @@ def _best_table(
     nearly = nearly_parallel(axes)
     if not nearly:
         return tidiest_table(axes, convention), turned
-    candidates = []
+
+    # Twice the sine of each nearly parallel pair: that pair, and all that are closer to parallel, are taken as such.
+    candidates: list[_Candidate] = []
     for parallel_below in (axes.parallel_below, *(2 * sine for _, sine in nearly)):
         table = tidiest_table(replace(axes, parallel_below=parallel_below), convention)
         error = original.residual(draft.description(table, UNROUNDED)).tool
-        candidates.append((error, parallel_below, table))
-    least = min(error for error, _, _ in candidates)
-    (error, parallel_below, table), second, *_ = sorted(
-        candidates,
-        key=lambda one: (one[0] > _SAME_ERROR * least, _longest(one[2]) if one[0] <= _SAME_ERROR * least else one[0]),
-    )
+        candidates.append(_Candidate(error, parallel_below, table))
+    same_error = _SAME_ERROR * min(candidate.error for candidate in candidates)
+
+    def preference(candidate: _Candidate) -> tuple[bool, float]:
+        """Return the key that sorts the best first: as near as the nearest, by length; then the others, by error."""
+        is_as_near = candidate.error <= same_error
+        return not is_as_near, _longest(candidate.table) if is_as_near else candidate.error
+
+    best, second, *_ = sorted(candidates, key=preference)
     for i, sine in nearly:
-        treatment = "as parallel" if sine <= parallel_below else "with their own common normal"
+        treatment = "as parallel" if sine <= best.parallel_below else "with their own common normal"
         notes.append(
-            f"axes {i} and {i + 1} are {sine:.2g} rad from parallel; taken {treatment}: tool within {error:.1e}; "
-            f"otherwise {second[0]:.1e}"
+            f"axes {i} and {i + 1} are {sine:.2g} rad from parallel; taken {treatment}: tool within {best.error:.1e}; "
+            f"otherwise {second.error:.1e}"
         )
-    return table, turned
+    return best.table, turned
 
 
 def _longest(table: Table) -> float:
@@ -295,7 +311,10 @@ def _axes(chain: Chain) -> Axes:
 
 
 def _roundings(chain: Chain) -> list[float]:
-    """Return by how much the angle between each axis of a chain and the next may be off, rad, n - 1 numbers."""
+    """Return bounds on the rounding error of the angle between each axis of a chain and the next, n - 1 numbers, rad.
+
+    It is the sum of the rounding errors of both axes and of all transforms between them.
+    """
     found: list[float] = []
     since_last_axis = 0.0
     for joint in chain.tree.joints_to(chain.tip, chain.base) or ():
@@ -317,14 +336,14 @@ def _rounded(draft: Draft, table: Table, original: Original, turned: float) -> t
     allowed = (_MAX_TABLE_ERROR + 4 * turned) * max(original.size, 1.0)
     if not original.chain.tree.changes and error.tool > allowed:
         raise ModelError(f"no table within {_MAX_TABLE_ERROR:g} of the file: the tool differs by {error.tool:.2g}")
+
     # With changes as designed or nearly parallel axes the error may exceed the bounds; rounding may then double it.
-    max_tool_error, max_error = (
-        bound + (before if before > bound else 0.0)
-        for bound, before in (
-            (_MAX_TOOL_ROUNDING_ERROR * min(original.size, 1.0), error.tool),
-            (_MAX_ROUNDING_ERROR * max(original.size, 1.0), error.largest),
-        )
-    )
+    max_tool_error = _MAX_TOOL_ROUNDING_ERROR * min(original.size, 1.0)
+    if error.tool > max_tool_error:
+        max_tool_error += error.tool
+    max_error = _MAX_ROUNDING_ERROR * max(original.size, 1.0)
+    if error.largest > max_error:
+        max_error += error.largest
     for decimals in _DECIMALS:
         description = draft.description(table, Rounding(decimals))
         residual = original.residual(description)

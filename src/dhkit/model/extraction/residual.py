@@ -16,7 +16,7 @@ from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_model, ti
 _STATES = 100
 """Number of random states of a residual."""
 _DEFAULT_STROKE = 1.0
-"""m: a prismatic joint without limits moves this far in both directions."""
+"""Largest displacement of a prismatic joint without limits in random states, m, in both directions."""
 _MAX_READING_DIFFERENCE = 1e-9
 """Largest difference of our reading of the file from Pinocchio's, as a share of the arm's size."""
 _MIN_GRAVITY_SHARE = 1e-6
@@ -32,7 +32,8 @@ class Residual:
     tool
         Largest difference of an entry of the tool's pose; m, and entries of the rotation.
     mass_matrix, gravity
-        Of M and g, relative to their largest entry in all states; None if they were not compared.
+        Largest difference of an entry of M and of g, relative to their largest entry in all states; None if they were
+        not compared.
     states
         Number of random states.
     """
@@ -44,7 +45,7 @@ class Residual:
 
     @property
     def largest(self) -> float:
-        """The largest of them."""
+        """The largest of the differences of tool, M and g."""
         return max(self.tool, self.mass_matrix or 0.0, self.gravity or 0.0)
 
     def __str__(self) -> str:
@@ -95,13 +96,16 @@ class Original:
         model = pinocchio_model(description)
         model.armature = np.zeros(model.nv)  # a URDF has none
         M, g = _dynamics(model, self.q)
+
+        # max |M - M_0| / max |M_0| over all states; likewise g, whose scale is at least a share of weight times reach.
         numbers = description.numbers
         weight = float(np.nansum(numbers.mass)) * float(np.linalg.norm(numbers.gravity))
         reach = max(description.reach, float(np.abs(self.tool[:, :3, 3]).max()))
-        scales = float(np.abs(self.M).max()), max(float(np.abs(self.g).max()), _MIN_GRAVITY_SHARE * weight * reach)
+        M_scale = float(np.abs(self.M).max())
+        g_scale = max(float(np.abs(self.g).max()), _MIN_GRAVITY_SHARE * weight * reach)
         M_error = float(np.abs(M - self.M).max())
         g_error = float(np.abs(g - self.g).max())
-        return Residual(tool, M_error / (scales[0] or 1.0), g_error / (scales[1] or 1.0), len(self.q))
+        return Residual(tool, M_error / (M_scale or 1.0), g_error / (g_scale or 1.0), len(self.q))
 
     def _tools(self) -> Iterator[Array]:
         if self.model is None:
@@ -110,7 +114,8 @@ class Original:
         import pinocchio as pin
 
         data = self.model.createData()
-        base, tip = (self.model.getFrameId(name) for name in (BASE_FRAME, TIP_FRAME))
+        base = self.model.getFrameId(BASE_FRAME)
+        tip = self.model.getFrameId(TIP_FRAME)
         for q in self.q:
             pin.framesForwardKinematics(self.model, data, q)
             yield (data.oMf[base].inverse() * data.oMf[tip]).homogeneous
@@ -119,12 +124,12 @@ class Original:
 def _random_states(chain: Chain, count: int, seed: int) -> Array:
     """Return the zero state and random ones, shape (count, n), rad and m: angles of a whole turn, strokes in limits."""
     rng = np.random.default_rng(seed)
-    ends = [
-        (joint.limits or (-_DEFAULT_STROKE, _DEFAULT_STROKE)) if joint.is_prismatic else (-np.pi, np.pi)
-        for joint in chain.joints
-    ]
-    low, high = np.array(ends).T
-    q = rng.uniform(low, high, (count, len(ends)))
+    ranges = []
+    for joint in chain.joints:
+        stroke = joint.limits or (-_DEFAULT_STROKE, _DEFAULT_STROKE)
+        ranges.append(stroke if joint.is_prismatic else (-np.pi, np.pi))
+    low, high = np.array(ranges).T
+    q = rng.uniform(low, high, (count, len(ranges)))
     q[0] = 0.0
     return q
 
@@ -138,6 +143,7 @@ def _dynamics(model: PinocchioModel, q: Array) -> tuple[Array, Array]:
     M = np.empty((len(q), n, n))
     g = np.empty((len(q), n))
     for k, state in enumerate(q):
+        # Pinocchio fills the upper triangle of the symmetric M only.
         upper = np.triu(np.reshape(np.array(pin.crba(model, data, state)), (n, n)))
         M[k] = upper + np.triu(upper, 1).T
         g[k] = np.reshape(np.array(pin.computeGeneralizedGravity(model, data, state)), n)

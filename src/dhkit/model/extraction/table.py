@@ -55,6 +55,8 @@ def chain_axes(poses: Array, directions: Array, prismatic: list[bool], T_base_ti
     origins = poses[:, :3, 3]
     feet: list[Array] = []
     normals: list[Array] = []
+
+    # The common normal of axes z_i and z_(i + 1) has the direction z_i x z_(i + 1), whose length is their angle's sine.
     for i in range(len(poses) - 1):
         cross = np.cross(directions[i], directions[i + 1])
         sine = float(np.linalg.norm(cross))
@@ -96,7 +98,7 @@ def with_parallel_axes(axes: Axes, roundings: Sequence[float]) -> tuple[Axes, tu
     axes
         The axes of n joints.
     roundings
-        By how much the angle between each axis and the next may be off, n - 1 numbers, rad.
+        Bounds on the rounding error of the angle between each axis and the next, n - 1 numbers, rad.
     """
     directions = axes.directions.copy()
     made: list[MadeParallel] = []
@@ -127,13 +129,18 @@ def _longest_step(axes: Axes) -> float:
 
 
 def _with_lengths_times(factor: float, T: Array) -> Array:
+    """Return a pose, shape (4, 4), with its translation times a factor."""
     scaled = T.copy()
     scaled[:3, 3] *= factor
     return scaled
 
 
 def _unit_table(axes: Axes, convention: Convention) -> Table:
-    """Return the table of an arm whose size is about 1."""
+    """Return the table of an arm whose size is about 1.
+
+    The frame T of the first normal in the base gives that of the table's frame 0: the entries of the first row are
+    taken off, T (Rz(theta_1) Tz(d_1))^-1, and in modified tables (Rx(alpha_0) Tx(a_0))^-1 too.
+    """
     z = axes.directions
     if axes.n == 1:
         path = min(_single_joint_paths(axes, convention), key=attrgetter("cost"))
@@ -152,16 +159,23 @@ def _unit_table(axes: Axes, convention: Convention) -> Table:
 
 
 def _rows(axes: Axes, convention: Convention, path: Path) -> Array:
-    """Return theta, d, a, alpha of each row of the convention, shape (n, 4)."""
+    """Return theta, d, a, alpha of each row of the convention, shape (n, 4).
+
+    Normal i has the length a_i and rotates by alpha_i: standard tables write both into row i, modified ones into row
+    i + 1. Between normals i - 1 and i are theta_i and d_i along axis i.
+    """
     z = axes.directions
     n = axes.n
     start = path.start
     end = path.end or path.start
+
+    # theta and d of axes 1 to n; a and alpha of normals 0 to n.
     along = np.zeros((n, 2))
     across = np.zeros((n + 1, 2))
     along[-1] = end.theta, end.d
     along[0] = start.theta, start.d
-    across[0], across[n] = (start.a, start.alpha), (end.a, end.alpha)
+    across[0] = start.a, start.alpha
+    across[n] = end.a, end.alpha
     for i, normal in enumerate(path.normals if n > 1 else (), start=1):
         across[i] = normal.length, float(angle_about(normal.x, z[i - 1], z[i]))
         if float(np.linalg.norm(np.cross(z[i - 1], z[i]))) <= axes.parallel_below:
@@ -176,10 +190,12 @@ def _rows(axes: Axes, convention: Convention, path: Path) -> Array:
 def _single_joint_paths(axes: Axes, convention: Convention) -> Iterator[Path]:
     """Yield tables of one joint: a normal of length zero at a known point's height, in a known direction."""
     z = axes.directions[0]
+    on_axis = axes.points[0]
     parts = axes.perpendicular(0, None)
     for x in (*parts, *-parts):
-        for point in axes.start_points(0, axes.points[0]):
-            origin = point if axes.prismatic[0] else axes.points[0] + ((point - axes.points[0]) @ z) * z
+        for point in axes.start_points(0, on_axis):
+            # A prismatic axis may go through the point; else the normal is at the point's height on the axis.
+            origin = point if axes.prismatic[0] else on_axis + ((point - on_axis) @ z) * z
             normal = Normal(x, origin, origin)
             start_cost, start = first_row(convention, normal, z)
             end_cost, end = last_row(convention, normal, z, axes.T_base_tip, with_theta=False)

@@ -76,7 +76,9 @@ _FOLDING: Mapping[str, Callable[..., float]] = {
 _SIGNED = {"add", "subtract", "multiply", "divide", "negate"}
 """Operations from which a negative sign can be taken out."""
 _LOGICAL = {"select", "logical_and", "logical_or", "logical_not"}
+"""Operations whose result a constant condition may decide."""
 _COMMUTATIVE = {"add", "multiply", "minimum", "maximum", "equal", "unequal", "logical_and", "logical_or"}
+"""Operations with f(x, y) = f(y, x), which are merged in either order of their arguments."""
 
 
 @cache
@@ -185,8 +187,9 @@ class Graph:
         pairs: dict[int, tuple[int, int]] = {}
         for k, node in enumerate(self.nodes):
             if node.operation in ("sin", "cos"):
-                sine, cosine = pairs.get(node.arguments[0], (-1, -1))
-                pairs[node.arguments[0]] = (k, cosine) if node.operation == "sin" else (sine, k)
+                angle = node.arguments[0]
+                sine, cosine = pairs.get(angle, (-1, -1))
+                pairs[angle] = (k, cosine) if node.operation == "sin" else (sine, k)
         return pairs
 
     def renamed(self, name: str) -> Graph:
@@ -194,7 +197,8 @@ class Graph:
         return replace(self, name=name)
 
     def __repr__(self) -> str:
-        inputs, outputs = (", ".join(variable.name for variable in x) for x in (self.inputs, self.outputs))
+        inputs = ", ".join(variable.name for variable in self.inputs)
+        outputs = ", ".join(variable.name for variable in self.outputs)
         return repr_line(f"Graph {self.name}", summary=f"{counted(len(self.nodes), 'node')}, ({inputs}) -> ({outputs})")
 
 
@@ -229,6 +233,7 @@ class _Builder:
         return outputs
 
     def apply(self, operation: str, arguments: Sequence[int]) -> int:
+        """Return the node of an operation on earlier nodes, simplified; see ``_operations`` for names with a colon."""
         first = arguments[0]
         if operation == ":same":
             return first
@@ -242,6 +247,8 @@ class _Builder:
             return self.apply("select", (*arguments, self.constant(0.0)))
         if operation == ":sign":
             return self._sign(first)
+
+        # Simplifications, of which the first that applies is taken.
         if operation in _SIGNED and (signed := self._signed(operation, arguments)) is not None:
             return signed
         operands = [self.nodes[k] for k in arguments]
@@ -256,43 +263,67 @@ class _Builder:
         return self.add(Node(operation, tuple(arguments)))
 
     def _sign(self, x: int) -> int:
-        """Return 1, -1, or x itself where it is 0 or NaN."""
+        """Return the sign of x: 1 if 0 < x, else -1 if x < 0, else x itself, which is 0 or NaN."""
         zero = self.constant(0.0)
-        below = self.apply("select", (self.apply("less", (x, zero)), self.constant(-1.0), x))
-        return self.apply("select", (self.apply("less", (zero, x)), self.constant(1.0), below))
+        is_negative = self.apply("less", (x, zero))
+        unless_positive = self.apply("select", (is_negative, self.constant(-1.0), x))
+        is_positive = self.apply("less", (zero, x))
+        return self.apply("select", (is_positive, self.constant(1.0), unless_positive))
 
     def _signed(self, operation: str, arguments: Sequence[int]) -> int | None:
-        """Return the node of an operation on negated values, with the sign moved to where it costs no operation."""
-        plain = [self.nodes[k].arguments[0] if self.nodes[k].operation == "negate" else k for k in arguments]
+        """Return the node of an operation on negated values, with the sign moved to where it costs no operation.
+
+            -(-x) = x,    (-x) y = -(x y),    (-x) / y = -(x / y),    (-x) (-y) = x y,
+            -x + y = y - x,    x - (-y) = x + y,    -x - y = -(x + y).
+
+        None if no argument is negated.
+        """
+        plain = [self._without_sign(k) for k in arguments]
         negated = [k != own for k, own in zip(plain, arguments, strict=True)]
         if not any(negated):
             return None
         if operation == "negate":
             return plain[0]
+
         if operation in ("multiply", "divide"):
             result = self.apply(operation, plain)
             return result if all(negated) else self.apply("negate", (result,))
+
+        # The signs of x and y in their sum; subtraction changes that of y.
         x, y = plain
-        flipped = (negated[0], negated[1] != (operation == "subtract"))  # whether x and y are subtracted in their sum
-        if flipped[0] == flipped[1]:
+        x_is_subtracted = negated[0]
+        y_is_subtracted = negated[1] != (operation == "subtract")
+        if x_is_subtracted and y_is_subtracted:
             total = self.apply("add", (x, y))
-            return self.apply("negate", (total,)) if flipped[0] else total
-        return self.apply("subtract", (y, x) if flipped[0] else (x, y))
+            return self.apply("negate", (total,))
+        if x_is_subtracted:
+            return self.apply("subtract", (y, x))
+        return self.apply("subtract" if y_is_subtracted else "add", (x, y))
+
+    def _without_sign(self, k: int) -> int:
+        """Return the node that node k negates, or k itself."""
+        node = self.nodes[k]
+        return node.arguments[0] if node.operation == "negate" else k
 
     def _decided(self, operation: str, arguments: Sequence[int]) -> int | None:
-        """Return the result of a selection or logical operation that a constant condition decides."""
+        """Return the result of a selection or logical operation that a constant condition decides, else None."""
         first, *others = arguments
         if self.nodes[first].operation != "constant":
+            # "and" and "or" are decided by a constant second argument too.
             if operation == "select" or not others or self.nodes[others[0]].operation != "constant":
                 return None
             first, others = others[0], [first]
-        true = self.nodes[first].value != 0.0
+        is_true = self.nodes[first].value != 0.0
+
         if operation == "select":
-            return others[0] if true else others[1]
+            return others[0] if is_true else others[1]
         if operation == "logical_not":
-            return self.constant(0.0 if true else 1.0)
-        neutral = operation == "logical_and"
-        return others[0] if true == neutral else self.constant(0.0 if neutral else 1.0)
+            return self.constant(0.0 if is_true else 1.0)
+
+        # 1 and x = x, 0 and x = 0; 0 or x = x, 1 or x = 1.
+        if is_true == (operation == "logical_and"):
+            return others[0]
+        return self.constant(1.0 if is_true else 0.0)
 
     def _selected(self, arguments: Sequence[int]) -> int | None:
         """Return the selection that CasADi writes as (a if c else 0) + (b if not c else 0)."""
@@ -309,9 +340,11 @@ class _Builder:
         return None
 
     def constant(self, value: float) -> int:
+        """Return the node of a constant; -0.0 becomes 0.0."""
         return self.add(Node("constant", (), float(value) + 0.0))
 
     def add(self, node: Node) -> int:
+        """Return the number of a node, which is appended unless an equal one is there."""
         key = (node.operation, node.arguments, repr(node.value))  # NaN differs from itself; as text all NaN are equal
         if key not in self._places:
             self._places[key] = len(self.nodes)
@@ -323,20 +356,26 @@ def _pruned(
     nodes: Sequence[Node], results: tuple[tuple[int, ...], ...]
 ) -> tuple[tuple[Node, ...], tuple[tuple[int, ...], ...]]:
     """Return nodes and results without the nodes that no result needs."""
-    needed = {k for entries in results for k in entries}
+    # Nodes follow their arguments, so that one pass from the last node to the first finds all that are needed.
+    needed: set[int] = set()
+    for entries in results:
+        needed.update(entries)
     for k in range(len(nodes) - 1, -1, -1):
         if k in needed and nodes[k].operation != "input":
             needed.update(nodes[k].arguments)
-    place = {k: i for i, k in enumerate(sorted(needed))}
+
+    order = sorted(needed)
+    place = {k: i for i, k in enumerate(order)}
 
     def moved(node: Node) -> Node:
         if node.operation == "input":
             return node
         return Node(node.operation, tuple(place[k] for k in node.arguments), node.value)
 
-    return tuple(moved(nodes[k]) for k in sorted(needed)), tuple(
-        tuple(place[k] for k in entries) for entries in results
-    )
+    def moved_entries(entries: tuple[int, ...]) -> tuple[int, ...]:
+        return tuple(place[k] for k in entries)
+
+    return tuple(moved(nodes[k]) for k in order), tuple(map(moved_entries, results))
 
 
 def operation_count(graph: Graph) -> dict[str, int]:
