@@ -102,6 +102,7 @@ def test_a_run_that_fails_is_status_1_and_keeps_what_there_was(dhkit, tmp_path, 
     assert len(SimulationResult.load(path).t) == 19
 
 
+@pytest.mark.slow
 def test_motions_come_from_files_of_dhkit_and_from_elsewhere(dhkit, tmp_path):
     motion = ARM.quintic([0.1, 0.2], [0.5, -0.3], 1.0)
     times = np.linspace(0, 1, 101)

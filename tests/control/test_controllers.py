@@ -32,6 +32,7 @@ def test_continuous_controllers_follow_to_rounding(law):
         law.holds("energy without account", run.audit.error, 1e-9)
 
 
+@pytest.mark.slow
 def test_a_sampled_controller_tends_to_the_continuous_one(law):
     law.samples(1)
     step = Step(np.zeros(6), np.full(6, 0.05), 0.0105)

@@ -66,6 +66,7 @@ def test_torques_stay_bounded_at_a_singularity(law):
     assert wild > 1e3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("offset", [0.0, 0.05])
 def test_it_comes_to_rest_at_a_singularity(offset, law):
     law.samples(1)

@@ -98,6 +98,7 @@ def test_a_continuous_run_does_not_step_over_a_pulse(length):
     assert moved[0] == pytest.approx(moved[1], rel=0.05) and moved[0] > 1e-4
 
 
+@pytest.mark.slow
 def test_a_joint_does_not_break_away_between_two_rows_unseen():
     numbers = ARM.description.numbers
 

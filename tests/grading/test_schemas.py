@@ -321,6 +321,7 @@ def delete(table, key):
     del table[key]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [misspell, delete])
 @pytest.mark.parametrize("kind", WHOLE)
 def test_a_key_that_is_misspelt_or_missing_is_wrong_for_both_or_for_neither(kind, change, is_read):

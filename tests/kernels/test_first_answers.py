@@ -91,6 +91,7 @@ def measured(code, folder):
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_the_first_answer_of_each_kind(law, tmp_path):
     law.samples(1)
     required = {"fk": 0.5, "verify": 0.6, "all": 3.0}

@@ -117,6 +117,7 @@ def test_its_controller_is_in_the_list_and_drives_the_arm(beside):
     assert lab.view._ghosts == ()
 
 
+@pytest.mark.slow
 def test_the_simulated_time_is_that_of_the_frames(open_lab, monkeypatch):
     lab, steps = open_lab("planar2r"), []
     simulate = lab._control._simulate_frame

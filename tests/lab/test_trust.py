@@ -87,6 +87,7 @@ def stands(live):
     return live._count == count
 
 
+@pytest.mark.slow
 def test_a_load_that_comes_during_a_run_leaves_its_energies_right(puma):
     puma.answer("control.start", {"reference": "sine"})
     wait_for(lambda: samples(puma) and np.any(samples(puma)[0].rows[:, 0] > 0.5))

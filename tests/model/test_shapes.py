@@ -133,6 +133,7 @@ def test_drawn_links_of_the_library_hold_together(arm):
     check_touching(arm, 0.3)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(arms(), st.sampled_from([0.0, 0.5, 1.0]))
 def test_any_table_is_drawn_and_holds_together(arm, share):

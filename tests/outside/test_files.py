@@ -147,6 +147,7 @@ def test_payloads_of_no_mass_and_away_from_the_tool():
     assert loaded == pytest.approx(torque + J[:3].T @ [0, 0, 5 * 9.81], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_plan_between_nearly_equal_joint_values():
     arm = Arm.load("puma560")
     goal = [0, -0.464, -0.576, 0, -1.7, 0]

@@ -87,6 +87,7 @@ def test_poses_on_the_way(planner):
     assert nearest < 1e-9
 
 
+@pytest.mark.slow
 def test_seven_joints_reach_a_pose():
     arm = library_robot("panda")
     start = np.array([0, -0.4, 0, -1.8, 0, 1.4, 0.5])

@@ -97,6 +97,7 @@ def test_links_of_a_locked_arm_are_where_they_were(name, locked):
     assert not arm.description.drawn
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", different_robots_first([name for name in robots() if library_robot(name).n > 2]))
 def test_distances_of_a_locked_arm_from_obstacles_are_those_of_the_whole_arm(tmp_path, name):
     """Random joints are held at random values; the robot file of the locked arm says the same."""

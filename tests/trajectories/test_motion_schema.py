@@ -174,6 +174,7 @@ def places(document, above=()):
             yield from places(value, (*above, key))
 
 
+@pytest.mark.slow
 def test_the_schema_raises_no_false_alarm(is_read):
     """A value of another type, at whichever place, or none: what does not fit is not read either."""
     document = yaml.safe_load(WHOLE)

@@ -59,6 +59,7 @@ def nearest(off, first):
     return np.linalg.norm(found.fun)
 
 
+@pytest.mark.slow
 def test_no_state_is_nearer_and_one_is_as_near(arm, law):
     rng = np.random.default_rng(0)
     sampled = any_joints(arm, rng, STATES)

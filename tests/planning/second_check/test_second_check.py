@@ -29,6 +29,7 @@ def test_no_certificate_is_refuted(law, tmp_path):
     assert certified >= 0.9 * count
 
 
+@pytest.mark.slow
 def test_no_planned_motion_is_refuted(law, tmp_path):
     """Of arms between random configurations, among random solids."""
     found = 0

@@ -73,6 +73,7 @@ def test_a_wrong_definition_is_found():
     assert not type(base)(definitions, base.lagrangian, base.full).prove()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["planar2r", "stanford", "puma560"])
 def test_torques_are_linear_in_the_parameters(name):
     for lag in (lagrangian(library_robot(name), "inertial"), base_parameters(library_robot(name)).lagrangian):
