@@ -755,10 +755,10 @@ class Arm:
         >>> motion.report.certificate.ok, motion.duration < arm.quintic([0, 0], [1.0, 0.5]).duration
         (True, True)
         """
-        from dhkit.planning import PlanOptions
-
-        chosen = PlanOptions.of(options or PlanOptions(compare=True), keywords)
-        return self._planner(objective, constraints, intervals, friction).solve(start, goal, options=chosen)
+        if options is None:
+            keywords.setdefault("compare", True)
+        planner = self._planner(objective, constraints, intervals, friction)
+        return planner.solve(start, goal, options=options, **keywords)
 
     def _planner(
         self,

@@ -36,6 +36,8 @@ class Options:
             return cls(**keywords)
         if not isinstance(options, cls):
             raise TypeError(f"options is {type(options).__name__}; expected {cls.__name__}")
+        if type(options) is cls and not keywords:
+            return options  # it was checked when it was made
         if further := [name for name in options.changed if name not in known]:
             raise TypeError(f"options has {', '.join(further)}; expected {cls.__name__}, with {', '.join(known)}")
         return cls(**{**{name: getattr(options, name) for name in known}, **keywords})

@@ -13,6 +13,7 @@ from dhkit.options import Options
 from dhkit.planning.certificate import CollisionAvoidance
 from dhkit.planning.obstacles import Scene
 from dhkit.planning.program import MAX_ITERATIONS, ProgressCall, Work
+from dhkit.planning.request.request import require_limits
 from dhkit.trajectories import Limits, Trajectory
 from dhkit.trajectories.timing import check_duration
 
@@ -55,8 +56,7 @@ class PathOptions(Options):
             raise TypeError(f"payload is {self.payload!r}; expected Payload(mass, com, inertia)")
         if self.progress is not None and not callable(self.progress):
             raise TypeError(f"progress is {self.progress!r}; expected a function")
-        if self.limits is not None and not isinstance(self.limits, Limits):
-            raise TypeError(f"limits is {self.limits!r}; expected Limits.of(description, velocity=...) and the like")
+        require_limits(self.limits)
         check_duration(self.duration)
         self.avoidance()
         self.work()

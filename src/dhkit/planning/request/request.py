@@ -35,6 +35,18 @@ class PlanRequest:
         return not {"start": self.start_velocity, "goal": self.goal_velocity}.get(name, np.ones(1)).any()
 
 
+def require_limits(limits: object) -> None:
+    """Require limits of joints, or None.
+
+    Raises
+    ------
+    TypeError
+        Something else.
+    """
+    if limits is not None and not isinstance(limits, Limits):
+        raise TypeError(f"limits is {limits!r}; expected Limits.of(description, velocity=...) and the like")
+
+
 def checked_limits(description: Description, limits: Limits | None) -> Limits:
     """Return the given limits, or the robot's own if none are given.
 
@@ -45,10 +57,9 @@ def checked_limits(description: Description, limits: Limits | None) -> Limits:
     TypeError
         Something else.
     """
+    require_limits(limits)
     if limits is None:
         return Limits.of(description)
-    if not isinstance(limits, Limits):
-        raise TypeError(f"limits is {limits!r}; expected Limits.of(description, velocity=...) and the like")
     if len(limits.lower) != description.n:
         raise ValueError(f"limits are of {len(limits.lower)} joints; {description.name} has {description.n}")
     return limits
