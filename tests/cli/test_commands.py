@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import typer
 
+from acceptance import slow_if
 from dhkit import Arm
 from dhkit.cli import main
 from dhkit.cli.app import COMMANDS, app, load_command
@@ -76,7 +77,12 @@ def test_a_benchmark_is_written_as_markdown_and_json_whatever_the_suffix(tmp_pat
 
 
 @pytest.mark.parametrize(
-    "words", [["build", "r.toml", "-o", "r.urdf"], ["verify", "r.toml"], ["demo", "--quick", "--robot", "r.toml"]]
+    "words",
+    [
+        ["build", "r.toml", "-o", "r.urdf"],
+        ["verify", "r.toml"],
+        slow_if(True, ["demo", "--quick", "--robot", "r.toml"]),
+    ],
 )
 def test_commands_print_the_warnings_of_a_robot_file(words, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

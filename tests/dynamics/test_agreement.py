@@ -35,7 +35,7 @@ def kernels(arm, q, qd, x):
 
 
 @pytest.mark.usefixtures("compiled")
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", different_robots_first(robots()))
 def test_compiled_dynamics_agree_with_pinocchio(name, law):
     arm = library_robot(name)
     states = motions(arm, law.samples(1000))

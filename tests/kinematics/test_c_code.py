@@ -6,6 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 
+from acceptance import slow_if
 from conftest import require
 from dhkit import Arm
 from random_arms import states
@@ -28,7 +29,10 @@ def call(function, *arrays):
     function(*(array.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for array in arrays))
 
 
-@pytest.mark.parametrize("name", ["puma560", "ur5", "stanford", "cobra600", "panda", "al5d"])
+ARMS = ["puma560", "cobra600", "panda", "ur5", "stanford", "al5d"]
+
+
+@pytest.mark.parametrize("name", [slow_if(k > 2, name) for k, name in enumerate(ARMS)])
 def test_c_computes_the_same(name, tmp_path):
     arm = Arm.load(name)
     library = compiled(arm, tmp_path)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from acceptance import slow_if
 from dhkit import Arm
 from dhkit.errors import AnswerError
 from dhkit.programs import CheckRubric, Limits, Program, ProgramError, check
@@ -24,7 +25,8 @@ def score(arm, path, text, **options):
 
 
 @pytest.mark.parametrize(
-    ("name", "torques"), [("puma560_cao", [0, 49.00754232, 0, 0, 0, 0]), ("cobra600", [0, 0, -19.62, 0])]
+    ("name", "torques"),
+    [slow_if(True, "puma560_cao", [0, 49.00754232, 0, 0, 0, 0]), ("cobra600", [0, 0, -19.62, 0])],
 )
 def test_a_constant_torque_follows_nothing(tmp_path, name, torques):
     share, _ = score(Arm.load(name), tmp_path / "c.py", f"def controller(t, q, qd, s): return {torques}\n")

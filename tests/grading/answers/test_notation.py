@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from acceptance import ACCEPTING
 from dhkit.description import from_dh, library_robot
 from dhkit.errors import AnswerError
 from dhkit.grading.answers import Vocabulary, read_answer, read_matrix
@@ -221,7 +222,7 @@ def fuzz(vocabulary, text):
             read(text, vocabulary)
 
 
-@settings(max_examples=400)
+@settings(max_examples=400 if ACCEPTING else 150)
 @given(PIECES)
 def test_nothing_but_refusals_comes_of_any_text(text):
     fuzz(Vocabulary(library_robot("planar2r")), text)

@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from acceptance import slow_if
 from conftest import require
 from dhkit.description import library_robot
 from dhkit.expressions import parse
@@ -147,7 +148,7 @@ def mathml_tokens(text):
         ("polar_rp", "file", "M h g"),
         ("al5d", "none", "M g"),
         ("jaco", "none", "g"),
-        ("puma560", "inertial", "M g"),
+        slow_if(True, "puma560", "inertial", "M g"),
     ],
 )
 def test_mathml_has_every_symbol_and_number(name, symbols, what):

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import dhkit
-from acceptance import ACCEPTING
+from acceptance import slow_if
 from conftest import require
 from dhkit.cli import main
 from dhkit.description import library_robot
@@ -83,24 +83,23 @@ def test_names_without_a_value_are_symbols(judged):
     assert verdicts(judged(f"from numpy import cos, array\nM = array({M})")) == {"M": Verdict.CORRECT}
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        f"import numpy as np\nfrom numpy import cos\ndef M(q):\n    q1, q2 = q\n    return np.array({M})",
-        f"from math import cos\ndef mass_matrix(q, p):\n    m1, m2, l1, l2 = p.m1, p.m2, p.l1, p['l2']\n    q2 = q[1]\n"
-        f"    return {M}",
-        "import numpy as np\ndef M(q1, q2, m1, m2, l1, l2):\n    M = np.zeros((2, 2))\n    c = np.cos(q2)\n"
-        "    M[0, 0] = m1*l1**2/3 + m2*(l1**2 + l2**2/3 + l1*l2*c)\n    M[0, 1] = M[1, 0] = m2*l2**2/3 + m2*l1*l2*c/2\n"
-        "    M[1, 1] = m2*l2**2/3\n    return M",
-        f"import casadi as ca\nfrom casadi import cos\nm1, m2, l1, l2 = map(ca.SX.sym, ('m1', 'm2', 'l1', 'l2'))\n"
-        f"q = ca.SX.sym('q', 2)\nq2 = q[1]\nrows = {M}\nM = ca.vertcat(*[ca.horzcat(*row) for row in rows])",
-        f"import casadi as ca\nfrom casadi import cos\nnames = 'q1 q2 m1 m2 l1 l2'.split()\n"
-        f"q1, q2, m1, m2, l1, l2 = map(ca.MX.sym, names)\nM = ca.vertcat(*[ca.horzcat(*row) for row in {M}])",
-        f"import casadi as ca\nfrom casadi import cos\ndef M(q, m1, m2, l1, l2):\n    q1, q2 = q[0], q[1]\n"
-        f"    return ca.vertcat(*[ca.horzcat(*row) for row in {M}])",
-        f"from numpy import cos\ndef model():\n    return {{'M': {M}}}\nM = model()['M']",
-    ],
-)
+RIGHT_PROGRAMS = [
+    f"import numpy as np\nfrom numpy import cos\ndef M(q):\n    q1, q2 = q\n    return np.array({M})",
+    f"from math import cos\ndef mass_matrix(q, p):\n    m1, m2, l1, l2 = p.m1, p.m2, p.l1, p['l2']\n    q2 = q[1]\n"
+    f"    return {M}",
+    "import numpy as np\ndef M(q1, q2, m1, m2, l1, l2):\n    M = np.zeros((2, 2))\n    c = np.cos(q2)\n"
+    "    M[0, 0] = m1*l1**2/3 + m2*(l1**2 + l2**2/3 + l1*l2*c)\n    M[0, 1] = M[1, 0] = m2*l2**2/3 + m2*l1*l2*c/2\n"
+    "    M[1, 1] = m2*l2**2/3\n    return M",
+    f"import casadi as ca\nfrom casadi import cos\nm1, m2, l1, l2 = map(ca.SX.sym, ('m1', 'm2', 'l1', 'l2'))\n"
+    f"q = ca.SX.sym('q', 2)\nq2 = q[1]\nrows = {M}\nM = ca.vertcat(*[ca.horzcat(*row) for row in rows])",
+    f"import casadi as ca\nfrom casadi import cos\nnames = 'q1 q2 m1 m2 l1 l2'.split()\n"
+    f"q1, q2, m1, m2, l1, l2 = map(ca.MX.sym, names)\nM = ca.vertcat(*[ca.horzcat(*row) for row in {M}])",
+    f"import casadi as ca\nfrom casadi import cos\ndef M(q, m1, m2, l1, l2):\n    q1, q2 = q[0], q[1]\n"
+    f"    return ca.vertcat(*[ca.horzcat(*row) for row in {M}])",
+]
+
+
+@pytest.mark.parametrize("text", [slow_if(k % 2 == 1, text) for k, text in enumerate(RIGHT_PROGRAMS)])
 def test_programs_that_are_right_are_proved(judged, text):
     report = judged(text)
     assert verdicts(report) == {"M": Verdict.CORRECT}, report
@@ -156,13 +155,13 @@ def test_sampled_parameters_vary(judged):
     [
         (f"q2 = 0.3\nm1 = m2 = l1 = l2 = 1\nfrom math import cos\nM = {M}", "one state alone"),
         (f"m1 = 77\nfrom sympy import cos\nM = {M}", "the robot's file has"),
-        ("M = 'text'", "assigns no quantity|found str"),
+        slow_if(True, "M = 'text'", "assigns no quantity|found str"),
         ("import sys\nsys.exit(3)", "SystemExit"),
         ("raise ValueError('no')", "ValueError: no"),
         ("def V(a, b):\n    return a", "argument a of V is not known"),
-        ("x = (", "SyntaxError"),
-        ("V = float('nan')", "nan is not a number|assigns no quantity"),
-        ("while True:\n    pass", "no answer within"),
+        slow_if(True, "x = (", "SyntaxError"),
+        slow_if(True, "V = float('nan')", "nan is not a number|assigns no quantity"),
+        slow_if(True, "while True:\n    pass", "no answer within"),
     ],
 )
 def test_what_is_no_answer_is_refused(judged, text, reason, monkeypatch):
@@ -186,7 +185,7 @@ ATTACKS = [
 ]
 
 
-@pytest.mark.parametrize("attack", ATTACKS if ACCEPTING else ATTACKS[::2])
+@pytest.mark.parametrize("attack", [slow_if(k % 2 == 1, attack) for k, attack in enumerate(ATTACKS)])
 def test_what_a_program_patches_is_only_its_answer(judged, attack):
     """None of these makes a wrong answer right."""
     try:
@@ -269,7 +268,7 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize("text", WRONG if ACCEPTING else WRONG[::2])
+@pytest.mark.parametrize("text", [slow_if(k % 3 > 0, text) for k, text in enumerate(WRONG)])
 def test_no_wrong_program_is_right(judged, text):
     """Conflicts, complex numbers, times, changed results, symbols that read as formulas, one state: none passes."""
     try:
