@@ -12,7 +12,7 @@ import time
 import psutil
 import pytest
 
-from acceptance import ACCEPTING
+from acceptance import ACCEPTING, slow_if
 from dhkit.cli import _reliable_interrupts
 from dhkit.planning.program import delayed_interrupts
 from dhkit.programs import find_isolation
@@ -102,7 +102,9 @@ def test_a_check_that_is_ended_leaves_nothing(name, tmp_path):
     assert not list(tmp_path.glob("dhkit-program-*")) or not find_isolation()
 
 
-@pytest.mark.parametrize("seconds", [0.0, 0.01, 0.05, 0.3, 0.6, 0.9] if ACCEPTING else [0.0, 0.05, 0.3])
+@pytest.mark.parametrize(
+    "seconds", [slow_if(seconds not in {0.0, 0.05}, seconds) for seconds in (0.0, 0.01, 0.05, 0.3, 0.6, 0.9)]
+)
 def test_planning_is_interrupted_while_programs_are_made_and_solved(seconds):
     done = subprocess.run(
         [sys.executable, "-c", PLANNING, str(seconds)], capture_output=True, text=True, timeout=60, check=False

@@ -2,6 +2,7 @@
 
 import pytest
 
+from acceptance import slow_if
 from dhkit import Arm, Trajectory
 from dhkit.cli import main
 from dhkit.description import from_dh, read_robot, write_robot
@@ -19,7 +20,7 @@ def robot(tmp_path):
 @pytest.mark.parametrize(
     "command",
     [
-        "plan {} --from 0 0 --to 1 1 --intervals 24 -o {}.npz",
+        slow_if(True, "plan {} --from 0 0 --to 1 1 --intervals 24 -o {}.npz"),
         "simulate {} --duration 0.5",
         "compare {} --controllers pid --duration 0.5",
         "equations {}",

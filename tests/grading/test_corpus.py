@@ -28,11 +28,13 @@ CORPUS = {
 SLOW = {
     "puma560/kin_alpha4_sign.toml",
     "planar2r/half_angles.toml",
+    "planar2r/half_angle_slip.toml",
+    "planar2r/root_of_square.toml",
     "planar2r/tan_half_angle.toml",
     "planar3r/com3_at_tip.toml",
     "cobra600/kin_column_not_d.toml",
 }
-"""Sheets that take a second or more."""
+"""Sheets that take about a second or more."""
 
 
 def named(report):

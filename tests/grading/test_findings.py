@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from acceptance import only_accepting
+from acceptance import only_accepting, slow_if
 from dhkit import Arm
 from dhkit.description import library_robot, read_robot
 from dhkit.errors import AnswerError
@@ -369,7 +369,7 @@ def test_numbers_for_parameters_stand_in_every_form(g, tmp_path):
     ("factor", "where"),
     [
         ("tan(q1)*cos(q1)/sin(q1)", ("c1 = 0", "s1 = 0")),
-        ("q1/q1", None),
+        slow_if(True, "q1/q1", None),
         ("l1/l1", ("l1 = 0",)),
         ("(1 + c2)/(1 + c2)", ("1 + c2 = 0",)),
         ("cot(q2)*tan(q2)", ("s2 = 0", "c2 = 0")),
@@ -740,7 +740,10 @@ def test_what_functions_absorb_is_not_lost(hidden):
     assert verdict(V=f"{IN_HALF_ANGLES} + m1*{hidden}") is Verdict.WRONG
 
 
-@pytest.mark.parametrize("edge", ["asin({})", "sqrt({} - 1)", "1/({} - 1)", "sign({} - 1)", "atan2({0} - 1, {0} - 1)"])
+EDGES = ["asin({})", "1/({} - 1)", "sqrt({} - 1)", "sign({} - 1)", "atan2({0} - 1, {0} - 1)"]
+
+
+@pytest.mark.parametrize("edge", [slow_if(k > 1, edge) for k, edge in enumerate(EDGES)])
 def test_what_lies_on_the_edge_of_a_function_is_not_decided(edge):
     one = edge.format("(sin(q1/2)^2 + cos(q1/2)^2)")
     assert verdict(V=f"{V} + 0*{one}") in (Verdict.UNREADABLE, Verdict.CORRECT, Verdict.UNDECIDED)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import dhkit
-from acceptance import different_robots_first
+from acceptance import different_robots_first, slow_if
 from dhkit.description import library_robot, robots, world_to_tool
 from dhkit.errors import DhkitError
 from dhkit.kernels import Kernel, kernel, machine_code
@@ -194,7 +194,7 @@ UNUSUAL = (np.nan, np.inf, -np.inf, 1e6, np.nextafter(1e6, np.inf), -2e6, 1e300,
 """Values of a joint, some beyond the range of sine and cosine."""
 
 
-@pytest.mark.parametrize("name", ["puma560", "panda", "stanford", "al5d", "cart_pendulum"])
+@pytest.mark.parametrize("name", ["puma560", slow_if(True, "panda"), "stanford", "al5d", "cart_pendulum"])
 def test_tiers_agree_and_give_nan_for_the_same_states(name, monkeypatch):
     arm = dhkit.Arm.load(name)
     q = states(arm.description, 300)

@@ -208,8 +208,10 @@ def test_the_default_limit_does_not_read_the_clock(monkeypatch):
     arm = library_robot("planar2r")
     ball = [Obstacle.sphere(0.05, (0.9, 0.0, 0.0))]
 
+    planner = Planner(arm, intervals=12)
+
     def solve():
-        return Planner(arm, intervals=12).solve([-0.8, 0.3], [0.8, 0.3], obstacles=ball)
+        return planner.solve([-0.8, 0.3], [0.8, 0.3], obstacles=ball)
 
     calm = solve()
     hours = itertools.count(step=3600.0)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from acceptance import slow_if
 from dhkit import Arm
 from dhkit.cli import main
 from dhkit.execution.isolation import Isolation, Kind
@@ -80,7 +81,7 @@ def test_a_wrong_row_is_found(name, puma, tmp_path):
 
 @pytest.mark.parametrize(
     "name",
-    ["planar2r", "cobra600", "panda", *(pytest.param(each, marks=pytest.mark.slow) for each in ("stanford", "ur5"))],
+    [slow_if(name != "cobra600", name) for name in ("cobra600", "planar2r", "panda", "stanford", "ur5")],
 )
 def test_our_own_kinematics_get_full_marks(name, tmp_path):
     text = (

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import acceptance
+from acceptance import slow_if
 from dhkit.description import from_dh, library_robot, pose, with_base, with_tool, world_to_tool
 from dhkit.errors import AnswerError
 from dhkit.expressions import read
@@ -142,8 +143,8 @@ def test_positions_alone_are_asked_of_an_arm_of_two_joints():
         ("planar2r", 0, "atan2(py, px)", "triangle_angle_forgotten"),
         ("planar3r", 0, "atan2(py - l3*r21, px - l3*r11)", "triangle_angle_forgotten"),
         ("cobra600", 0, "atan2(py, px)", "triangle_angle_forgotten"),
-        ("planar3r", 2, "acos(r11) - q1 - q2", "sign_lost"),
-        ("planar3r", 2, "asin(r21) - q1 - q2", "quadrant"),
+        slow_if(True, "planar3r", 2, "acos(r11) - q1 - q2", "sign_lost"),
+        slow_if(True, "planar3r", 2, "asin(r21) - q1 - q2", "quadrant"),
         ("cobra600", 3, "q1 + q2 - acos(r11)", "sign_lost"),
         ("polar_rp", 0, "{} - pi/2", "missing_offset"),
         ("polar_rp", 1, "-{}", "elbow_sign"),

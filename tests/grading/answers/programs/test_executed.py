@@ -73,6 +73,7 @@ def test_a_derivation_with_loops_is_proved(judged):
     assert any("executed, not isolated" in str(note) for note in report.notes)
 
 
+@pytest.mark.slow
 def test_a_mistake_is_found_and_named(judged):
     report = judged(LAGRANGE.replace("/12*diff", "/3*diff"))
     assert verdicts(report)["K"] is Verdict.WRONG and verdicts(report)["V"] is Verdict.CORRECT
@@ -341,7 +342,7 @@ V_OF_OCTAVE = "m1*g*l1/2*sin(q1) + m2*g*(l1*sin(q1) + l2/2*sin(q1 + q2))"
 @pytest.mark.parametrize(
     "text",
     [
-        f"function V = V(q1, q2, m1, m2, l1, l2, g)\n  V = {V_OF_OCTAVE};\nend\n",
+        slow_if(True, f"function V = V(q1, q2, m1, m2, l1, l2, g)\n  V = {V_OF_OCTAVE};\nend\n"),
         f"function r = V(q, p)\n  q1 = q(1); q2 = q(2); m1 = p.m1; m2 = p.m2; l1 = p.l1; l2 = p.l2; g = p.g;\n"
         f"  r = {V_OF_OCTAVE};\nend\n",
         f"x = 3;\ndisp(twice(x))\nfunction y = twice(x)\n  y = 2*x;\nend\nfunction [a, V] = energies(q1, q2)\n"

@@ -684,6 +684,7 @@ def test_the_file_s_own_numbers_are_noted(read):
     assert dict(sheet.names.parameters) == {}
 
 
+@pytest.mark.slow
 def test_many_names_are_all_kept(read):
     names = [f"x{k} = x{k - 1} + m1" for k in range(1, 500)]
     sheet = read("\n".join(["x0 = m1", *names, "V = x499"]))
