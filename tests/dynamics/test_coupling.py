@@ -53,7 +53,7 @@ def test_the_equations_are_those_of_the_published_subroutine(law):
 
 
 def test_it_is_the_energy_of_a_rotor_that_two_joints_turn():
-    """A rotor J on link 1 behind a gear G, its axis parallel to both joints: J (G qd2 + qd1)^2 / 2."""
+    """A rotor J on link 1 with a gear of ratio G, its axis parallel to both joints: J (G qd2 + qd1)^2 / 2."""
     text = to_toml(library_robot("planar2r"))
     arm = from_toml(text.replace("[parameters]", "[parameters]\nJ = 0.002\nG = 50", 1))
     with_rotor = from_toml(

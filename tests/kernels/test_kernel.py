@@ -73,7 +73,7 @@ def test_a_kernel_computes_its_graph_for_any_number_of_items(count, mode, monkey
 
 @pytest.mark.parametrize("mode", ["on", "off"])
 def test_nothing_is_written_beside_the_results(mode, monkeypatch):
-    """Machine code trusts its pointers: what lies before and behind a result keeps its value, of no items too."""
+    """Machine code trusts its pointers: what lies before and after a result keeps its value, of no items too."""
     set_mode(monkeypatch, mode)
     run = product_kernel()
     for count in (*range(140), 1000):

@@ -159,7 +159,7 @@ def test_what_is_no_file_is_not_read(path, tmp_path):
 
 
 def changed(tmp_path, old, new, *, joint=None):
-    """Return how the Stanford arm differs from its URDF with one text replaced, behind a joint's name if given."""
+    """Return how the Stanford arm differs from its URDF with one text replaced, after a joint's name if given."""
     text = asset("urdf/stanford.urdf").read_text()
     start = text.index(f'<joint name="{joint}"') if joint else 0
     assert old in text[start:]

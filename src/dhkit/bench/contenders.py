@@ -29,7 +29,7 @@ class UnavailableError(Exception):
 
 
 class Mode(Enum):
-    """How a contender is called."""
+    """Way in which a contender is called."""
 
     SINGLE = "single"
     """One call for each item, from a Python loop."""

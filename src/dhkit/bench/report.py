@@ -90,7 +90,7 @@ class Missing:
 
 
 class Ending(Enum):
-    """How the comparison of a quantity ended; the value is the text in reports."""
+    """Result of the comparison of a quantity; the value is the text in reports."""
 
     COMPLETE = "every contender that took part agrees"
     PEERS_FAILED = "peers failed"
@@ -102,14 +102,14 @@ class Ending(Enum):
 
 @dataclass(frozen=True)
 class Outcome:
-    """How the comparison of a quantity ended, and why.
+    """Result of the comparison of a quantity, with its causes.
 
     Attributes
     ----------
     quantity
         The quantity.
     ending
-        How the comparison ended.
+        Result of the comparison.
     causes
         The contenders that caused it, each with its reason; none if all contenders agree.
     """
@@ -198,22 +198,22 @@ class Requirement:
 
 
 class Report:
-    """What all reports of benchmarks share: a title, tables, and the same facts as text, Markdown, HTML and JSON.
+    """Base of the reports of benchmarks: a title and tables, printed as text, Markdown, HTML and JSON.
 
-    A report is a dataclass with the machine, and perhaps with requirements; it says its title, its tables and what
-    their columns mean.
+    A report is a dataclass with the machine, and perhaps with requirements; it gives its title, its tables and the
+    meaning of their columns.
     """
 
     machine: Machine
 
     @property
     def title(self) -> str:
-        """What was measured, in a line."""
+        """The measured subject, in a line."""
         raise NotImplementedError
 
     @property
     def meaning(self) -> str:
-        """What the columns mean."""
+        """Meaning of the columns."""
         raise NotImplementedError
 
     @property
@@ -305,7 +305,7 @@ class BenchReport(Report):
 
     @property
     def meaning(self) -> str:
-        """What the columns mean."""
+        """Meaning of the columns."""
         return _RATIO_MEANING
 
     def json(self) -> dict[str, object]:
@@ -343,7 +343,7 @@ class BenchReport(Report):
 
     @property
     def title(self) -> str:
-        """What was measured, in a line."""
+        """The measured subject, in a line."""
         threads = "1 thread" if self.threads == 1 else f"{self.threads} threads"
         ending = " (interrupted)" if self.interrupted else ""
         return f"{self.robot}: dhkit beside its peers, batches of {self.batch}, {threads}{ending}"

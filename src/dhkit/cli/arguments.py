@@ -31,7 +31,7 @@ PLUS = re.compile(r"(?<![\d.][eE])\+")
 
 
 class OutsideLimits(Enum):
-    """What happens to joint values outside the limits."""
+    """Treatment of joint values outside the limits."""
 
     WARN = auto()
     """A warning on stderr names the joint."""
@@ -282,9 +282,9 @@ def obstacles(boxes: Sequence[str], spheres: Sequence[str], floor: str | None) -
 
 
 def split_at(text: str) -> tuple[str, str | None]:
-    """Return the parts of a text before and behind its ``@``; None for the second if it has none."""
-    before, sign, behind = text.partition("@")
-    return before, behind if sign else None
+    """Return the parts of a text before and after its ``@``; None for the second if it has none."""
+    before, sign, after = text.partition("@")
+    return before, after if sign else None
 
 
 def _size_and_centre(text: str, what: str, count: int, expected: str) -> tuple[Array, Array]:

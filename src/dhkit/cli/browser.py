@@ -53,7 +53,7 @@ def lab(
     if mine is not None and run is not None:
         raise DescriptionError("--mine and --run; expected one of them")
     if arguments and run is None:
-        raise DescriptionError(f"{arguments[0]!r} behind the robot; expected --run PROGRAM for arguments")
+        raise DescriptionError(f"{arguments[0]!r} after the robot; expected --run PROGRAM for arguments")
     own = mine if run is None else [run, *(arguments or [])]
     assignment = Assignment.read(robot) if is_assignment(robot) else None
     arm = load_arm(robot) if assignment is None else assignment.arm

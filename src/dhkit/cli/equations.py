@@ -41,7 +41,7 @@ from dhkit.symbolic.equations import (
 
 MAX_TITLE_LENGTH = 200
 Source: TypeAlias = Lagrangian | SymbolicKinematics
-"""Where quantities come from."""
+"""Object that has the exact quantities."""
 
 INVERSE = "ik"
 """The quantity that stands for the derivation of inverse kinematics."""

@@ -42,7 +42,7 @@ def extract(
         bool, typer.Option("--exact", help="Keep axes that rounded angles leave a little from parallel as they are.")
     ] = False,
     drop: Annotated[
-        bool, typer.Option("--drop-side", help="Leave out links behind joints beside the chain; else they are frozen.")
+        bool, typer.Option("--drop-side", help="Leave out links after joints beside the chain; else they are frozen.")
     ] = False,
     package_dir: Annotated[
         list[Path] | None, typer.Option(help="Folder with packages that package:// names; may be given again.")

@@ -57,7 +57,7 @@ class Graded:
 
 @dataclass(frozen=True)
 class Delivery:
-    """In which form reports are handed over, and where."""
+    """Form and place in which reports are handed over."""
 
     form: str = "text"
     """text, json, gradescope, junit or html."""

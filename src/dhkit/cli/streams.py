@@ -1,4 +1,4 @@
-r"""What reaches stdout and stderr: no control characters of others, and no letters that the encoding lacks.
+r"""Filter of stdout and stderr: no control characters from others, and no letters that the encoding lacks.
 
 Names of files, of robots and of students come from others. Sequences in them that clear a screen, set a title or turn
 the direction of text are written as ``\x1b``. Our own styles go past that: :func:`styled`.

@@ -127,7 +127,7 @@ class BatchOptions(Options):
     plant_rate: float | None = None
     """Steps of the integration, Hz, a multiple of ``rate``; ``rate`` unless given."""
     keep: str = "errors"
-    """What is stored. ``"final"``: the last states; ``"errors"``: norms of the errors as well; ``"all"``: all states
+    """Stored results. ``"final"``: the last states; ``"errors"``: norms of the errors as well; ``"all"``: all states
     as well, at most 4 GB."""
     sensors: Sensors | None = None
     """The sensors whose values the controller gets; the true state unless given."""

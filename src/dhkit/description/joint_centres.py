@@ -1,8 +1,8 @@
-"""Where an arm is whose table has lengths that are not sizes of it: points on its joint axes that lie close together.
+"""Joint centres of an arm whose table has lengths far beyond its size: points on its axes that lie close together.
 
 The common normal of two nearly parallel axes may be kilometres away, and a and d with it. The arm itself is where its
-joints are: of the points on its axes those are taken whose distances along the chain, from frame 0 to the tool, have
-the smallest sum of squares.
+joints are: on each axis the point p_i is taken such that the sum of |p_(i+1) - p_i|^2 along the chain, from frame 0 to
+the tool, is smallest.
 """
 
 from __future__ import annotations

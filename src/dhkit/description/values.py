@@ -17,7 +17,7 @@ STANDARD_GRAVITY: Vector = (ZERO, ZERO, exact(-9.81))
 
 
 class Convention(Enum):
-    """Which of the two Denavit-Hartenberg tables."""
+    """Convention of the Denavit-Hartenberg table."""
 
     STANDARD = "standard"
     """Distal: A_i = Rz(theta_i) Tz(d_i) Tx(a_i) Rx(alpha_i); joint i moves about or along z_(i-1)."""
@@ -26,7 +26,7 @@ class Convention(Enum):
 
 
 class JointType(Enum):
-    """Which entry of the table's row the joint variable is added to."""
+    """Kind of a joint: the entry of the table's row that the joint variable is added to."""
 
     REVOLUTE = "revolute"
     """The angle theta, rad."""

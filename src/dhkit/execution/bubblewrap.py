@@ -17,7 +17,7 @@ RUNNERS = Path("/runners")
 """Folder of dhkit's files that are executed in the program's process."""
 _SYSTEM_FOLDERS = ("/usr", "/lib", "/lib32", "/lib64", "/bin", "/sbin")
 _SYSTEM_FILES = ("/etc/ld.so.cache", "/etc/alternatives", "/etc/octave", "/etc/fonts", "/etc/localtime")
-"""What programs of the system read: Octave finds its linear algebra by /etc/alternatives."""
+"""Files that programs of the system read: Octave finds its linear algebra by /etc/alternatives."""
 _FOLDER_BYTES = 64 << 20
 """Size of each folder that a program may write to, bytes."""
 

@@ -88,7 +88,7 @@ class Child:
             running = self._running_process()
             number = running.next_number()
             limit = self.limits.seconds if seconds is None else seconds
-            # Octave reads one character beyond a line, here of the empty line behind it.
+            # Octave reads one character beyond a line, here of the empty line after it.
             line = json.dumps({"id": number, **request}).encode() + b"\n\n"
             try:
                 running.write(line, CallTime(running, limit))

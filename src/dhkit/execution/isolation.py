@@ -1,4 +1,4 @@
-"""What a program of another person can see, reach and use up.
+"""Isolation of other people's programs: the files, the network and the resources that they can use.
 
 Isolated by bubblewrap, a program has a root of its own: the system's libraries, Python's own library and a folder with
 the allowed packages alone for reading, and a folder of bounded size for writing, which vanishes with it. It has no
@@ -34,7 +34,7 @@ _PROBE_TIME = 20.0
 
 
 class Kind(Enum):
-    """How a program is kept from everything but its own folder."""
+    """Means that keeps a program from everything but its own folder."""
 
     BUBBLEWRAP = "isolated by bubblewrap"
     USER = "isolated as another user, with the network"
@@ -43,14 +43,14 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Isolation:
-    """How programs are run.
+    """Isolation in which programs are run.
 
     Attributes
     ----------
     kind
-        How they are kept from everything but their folder.
+        Means that keeps them from everything but their folder.
     reason
-        Why they are not.
+        Reason why programs are not isolated; empty if they are.
     packages
         Packages that they may import.
     """

@@ -45,7 +45,7 @@ _BLOCK_BYTES = 512
 
 
 class Failure(StrEnum):
-    """How a call of a program failed."""
+    """Kind of failure of a call of a program."""
 
     RAISED = "raised"
     """The function raised an exception, or returned something else than it must."""

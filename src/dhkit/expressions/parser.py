@@ -1,4 +1,4 @@
-"""From text to an exact value: the syntax tree evaluated with the names that the caller allows."""
+"""Exact value of a text: the syntax tree evaluated with the names that the caller allows."""
 
 from __future__ import annotations
 

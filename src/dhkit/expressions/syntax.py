@@ -1,4 +1,4 @@
-"""From text to a syntax tree: a recursive-descent parser with a whitelist, bounded in length, depth and numbers.
+"""Syntax tree of a text: a recursive-descent parser with a whitelist, bounded in length, depth and numbers.
 
 The grammar is that of school algebra, with ``^`` and ``**`` for powers (right-associative, binding tighter than a
 sign on their left: ``-2^2`` is -4)::

@@ -14,9 +14,9 @@ T = TypeVar("T")
 
 
 class Algebra(ABC, Generic[T]):
-    """What the operations of a tree do with values: numbers, intervals, elements of a ring, text.
+    """Operations on the values of a tree: numbers, intervals, elements of a ring, text.
 
-    A part that occurs more than once is worked out once: CasADi's graphs share parts.
+    A part that occurs more than once is evaluated once: CasADi's graphs share parts.
     """
 
     def __init__(self) -> None:

@@ -160,7 +160,7 @@ INVERSE = _catalogue(
         (Subject.INVERSE, "Look again at the tool's rotation: rows are the base's axes, columns the tool's."): {
             "rotation_matrix_transposed": "the rotation matrix is transposed: r_ij stands where r_ji belongs",
             "tool_axis_exchanged": "another axis of the tool is taken: column j of the rotation is its j-th axis",
-            "rotation_not_reduced": "the tool's rotation in the base stands where its rotation in the frame behind the "
+            "rotation_not_reduced": "the tool's rotation in the base stands where its rotation in the frame after the "
             "joints before belongs: R_36 = R_03^T R_06 for the wrist of six joints",
         },
     }
@@ -194,7 +194,7 @@ _EQUATION = _catalogue(
             "drives_exchanged": "two drives are exchanged: each rotor has the other's gear and inertia",
             "gear_inverted": "the rotor's inertia is divided by the gear ratio's square instead of multiplied",
         },
-        (Subject.ENERGY, "Look again at the table behind the dynamics: convention, twists and lengths."): {
+        (Subject.ENERGY, "Look again at the table of the dynamics: convention, twists and lengths."): {
             "convention_in_dynamics": "the table is read in the other convention: a and alpha belong to another link",
             "offset_in_dynamics": "the table's constant offset is missing: the joint's value counts from another zero",
             "twist_sign_in_dynamics": "a twist alpha has the wrong sign in the positions of the links",

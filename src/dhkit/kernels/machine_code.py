@@ -1,4 +1,4 @@
-"""From LLVM's text to machine code of this processor, and from machine code to a function of arrays."""
+"""Machine code of this processor from LLVM's text, and functions of arrays from machine code."""
 
 from __future__ import annotations
 

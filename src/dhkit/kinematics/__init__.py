@@ -1,4 +1,4 @@
-"""Where an arm is, how it moves and how it gets there: forward and inverse kinematics, Jacobians, workspace."""
+"""Kinematics of an arm: forward and inverse kinematics, Jacobians, singularities, manipulability, workspace."""
 
 from dhkit.kinematics.boundaries import Boundary, boundaries
 from dhkit.kinematics.closed_form import Classification, classify

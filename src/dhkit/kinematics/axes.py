@@ -1,4 +1,4 @@
-"""How the joint axes of an arm lie to each other, which decides whether its inverse kinematics have a closed form."""
+"""Arrangement of an arm's joint axes, which decides whether its inverse kinematics have a closed form."""
 
 from __future__ import annotations
 

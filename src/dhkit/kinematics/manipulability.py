@@ -1,4 +1,4 @@
-"""How well an arm can move its tool at a configuration: manipulability, isotropy and their ellipsoids."""
+"""Ability to move the tool at a configuration: manipulability, isotropy and their ellipsoids."""
 
 from __future__ import annotations
 

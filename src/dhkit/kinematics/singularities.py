@@ -38,7 +38,7 @@ _MAX_WORDS_LENGTH = 200
 
 @dataclass(frozen=True, eq=False)
 class Singularities:
-    """Where an arm is singular; as text, one line for each kind."""
+    """Singular configurations of an arm; as text, one line for each kind."""
 
     kinds: tuple[Kind, ...]
     """Names of the kinds: shoulder, elbow, wrist, as in :class:`dhkit.kinematics.IKFlag`."""

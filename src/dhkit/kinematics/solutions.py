@@ -1,4 +1,4 @@
-"""What inverse kinematics return: every branch of every pose, and why some are missing."""
+"""Result of inverse kinematics: every branch of every pose, and why some are missing."""
 
 from __future__ import annotations
 

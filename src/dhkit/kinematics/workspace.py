@@ -1,4 +1,4 @@
-"""Where an arm's tool can be: random joint values inside the limits, what they reach, and how well it moves there."""
+"""Workspace of an arm by sampling: joint values inside the limits, the points reached, and manipulability there."""
 
 from __future__ import annotations
 
@@ -65,10 +65,10 @@ class Grid:
 
     @property
     def estimate(self) -> Estimate:
-        """How much space the points take up.
+        """Measure of the set of points: length, area or volume, with its uncertainty.
 
-        Between the cells with a point and those of them that have only such neighbours, diagonal ones included:
-        a smooth border halves, on average, the cells that it goes through.
+        It lies between the cells with a point (outer) and those of them that have only such neighbours, diagonal ones
+        included (inner). A smooth border halves, on average, the cells that it goes through.
         """
         reached = self.counts > 0
         outer = np.count_nonzero(reached)

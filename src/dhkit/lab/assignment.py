@@ -28,7 +28,7 @@ GOAL_TOLERANCE = 1e-9
 
 
 class Condition:
-    """What a goal asks for; its subclasses are the kinds of conditions."""
+    """Condition that a goal asks for; its subclasses are the kinds of conditions."""
 
     __repr__ = value_line
 
@@ -135,7 +135,7 @@ class OwnScore(Condition):
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """What is to be reached.
+    """Goal of a step.
 
     Attributes
     ----------

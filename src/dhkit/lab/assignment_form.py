@@ -41,7 +41,7 @@ MAX_NUMBER = 1e4
 """Largest number, rad or m."""
 PANEL_ENTRY = re.compile(r'^ +\["(\w+)", ', re.MULTILINE)
 DIRECTION_CONTROLS = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
-"""Characters that change the direction of the text behind them, and so what a reader sees."""
+"""Characters that change the direction of the text after them, and so what a reader sees."""
 
 
 @cache
@@ -162,7 +162,7 @@ class OwnForm:
     config=ConfigDict(extra="forbid", json_schema_extra={"oneOf": [{"required": [name]} for name in CONDITIONS]}),
 )
 class GoalForm:
-    """What is to be reached: one of pose, joints, motion and own."""
+    """Goal of a step: one of pose, joints, motion and own."""
 
     text: Line
     points: Points = 1.0

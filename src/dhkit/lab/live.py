@@ -22,7 +22,7 @@ dropped, and from then on half as many are added, so that a run of any length is
 MAX_PUSHES = 32
 """Largest number of pushes that act at a time."""
 COLUMNS = ("q", "qd", "qdd", "tau", "tau_asked", "reference_q", "reference_qd")
-"""Quantities, of n numbers each, that a recorded row has behind its time."""
+"""Quantities, of n numbers each, that a recorded row holds after its time."""
 
 
 class Live:

@@ -1,4 +1,4 @@
-"""What a run of the control panel simulates, and the references that it follows."""
+"""Settings of a run of the control panel, and the references that it follows."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class FrictionKind(StrEnum):
 
 
 class ReferenceKind(StrEnum):
-    """What a run follows."""
+    """Reference that a run follows."""
 
     HOLD = "hold"
     SINE = "sine"
@@ -64,7 +64,7 @@ class ReferenceKind(StrEnum):
 
 @dataclass(frozen=True)
 class Settings:
-    """What a run simulates.
+    """Settings of a run.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Settings:
     compensate
         Whether the controller compensates friction.
     reference
-        What the run follows.
+        Reference that the run follows.
     """
 
     controller: str = "computed-torque"

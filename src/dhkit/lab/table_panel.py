@@ -29,7 +29,7 @@ class Table:
     """theta, d, a and alpha of each row."""
     description: Description
     errors: dict[tuple[int, int], str] = field(default_factory=dict)
-    """What is wrong with an entry, by row and column."""
+    """Error of an entry, by row and column."""
 
     @classmethod
     def of(cls, description: Description) -> Table:

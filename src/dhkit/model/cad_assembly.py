@@ -53,7 +53,7 @@ class CadImport:
     description: Description
     """The table as it was, with the parts as shapes and with bodies from the stated masses."""
     meshes: Mapping[int, TriangleMesh]
-    """By link, in its DH frame, m; link 0 is the base, in frame 0."""
+    """Meshes by link, in the link's DH frame, m; link 0 is the base, in frame 0."""
     notes: tuple[str, ...]
     """Findings, choices and changes, a line each."""
 

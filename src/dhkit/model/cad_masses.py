@@ -41,11 +41,11 @@ class StatedMasses:
     """
 
     density: float | None
-    """kg/m^3."""
+    """Density of all parts, kg/m^3; None if it is not stated."""
     masses: Mapping[int, float]
-    """kg, by link."""
+    """Masses by link, kg."""
     reports: Mapping[int, ReportedMass]
-    """By link, in assembly coordinates."""
+    """Mass properties by link, in assembly coordinates, SI."""
 
     @classmethod
     def of(

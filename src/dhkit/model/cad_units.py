@@ -27,7 +27,7 @@ Text files have six digits."""
 _MAX_MEAN_AXIS_DISTANCE = 0.05
 """Largest mean distance of the axes from their links' boxes in the right unit, as a share of the arm's length."""
 _MIN_DISTANCE_RATIO = 2.0
-"""In the second best unit the axes must be this many times farther from the boxes than in the best."""
+"""Least ratio of the mean distances of axes from boxes in the second best unit and in the best one."""
 _MAX_AXIS_DISTANCE = 0.1
 """Largest distance of an axis from a link's box without a warning, as a share of the arm's length."""
 _MIN_DECISIVE_AXES = 2

@@ -30,7 +30,7 @@ _DRUM_HALF_HEIGHT = 0.9
 _HUB_RADIUS, _HUB_HALF_LENGTH = 0.8, 1.2
 """Radius and half length of a hub, relative to its drum: slimmer, and visible at both faces."""
 _NESTED_RADIUS, _NESTED_HALF_HEIGHT = 0.78, 1.25
-"""Of drums about one point each is slimmer and longer than the one before by these factors, so that all are visible."""
+"""Radius and half height of a drum relative to the previous drum about the same point: all of them stay visible."""
 _MAX_FIRST_DRUM_HALF = 0.3
 """Half the height of the first drum, at most, relative to the height of the next axis: the drum stays below it."""
 _BLOCK_HALF_LENGTH = 1.3

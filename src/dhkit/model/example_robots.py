@@ -107,8 +107,8 @@ def urdf_source(name: str) -> tuple[Path, str | None, str | None]:
 def example_chains() -> Iterator[ExampleChain]:
     """Return the chains from root to leaf of every example robot: arms, legs, fingers.
 
-    Of chains with more than seven joints, the limb behind the last branching is listed too. Chains with joints that
-    follow others are left out. Of frames behind the same joint the tool's is taken, or the first.
+    For a chain with more than seven joints, the limb after the last branching is listed too. Chains with joints that
+    follow others are left out. Of several frames after one joint the tool's is taken, or the first.
     """
     for name, path in example_robots().items():
         tree = read_urdf(path)
@@ -125,7 +125,7 @@ def example_chains() -> Iterator[ExampleChain]:
 
 
 def _limb(tree: UrdfTree, tip: str) -> tuple[UrdfJoint, ...]:
-    """Return the moving joints to a tip behind the last link on which several moving joints hang."""
+    """Return the moving joints to a tip after the last link on which several moving joints hang."""
 
     def carrier(link: str) -> str:
         """Return the first of the links that a link is fixed to."""

@@ -37,7 +37,7 @@ class ReportedMass:
     part: str
     """The link's number or the part's name, as the report has it."""
     properties: MassProperties
-    """In the report's own coordinates, SI."""
+    """Mass properties in the report's own coordinates, SI."""
     notes: tuple[str, ...]
     """The block and the sign of products that were read."""
     source: str

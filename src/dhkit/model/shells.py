@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from manifold3d import Manifold
 
 _TEST_POINT_DEPTH = 1e-6
-"""Distance of a test point behind its triangle, as a share of the mesh's size."""
+"""Distance of a test point from its triangle, against the normal, as a share of the mesh's size."""
 _TEST_POINTS = 16
-"""Number of a shell's triangles behind whose middles points are tested."""
+"""Number of a shell's triangles whose middles, moved against the normal, are tested."""
 _MIN_INSIDE_WINDING = 0.5
 """Winding number above which a point is inside: it is 1 inside a shell and 0 outside."""
 _MIN_CAVITY_SHARE = 0.3

@@ -82,7 +82,7 @@ class _Centre:
 
     mass: float
     relative_half: float
-    """Of the mass, relative to it."""
+    """Half a unit of the last place of the mass, relative to the mass."""
     com: Array
     com_half: float
 

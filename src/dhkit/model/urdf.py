@@ -1,7 +1,7 @@
 """Descriptions as URDF text: the first step of the reference path.
 
-Link i of the URDF has its frame directly behind joint i, where the joint variable ends; the rest of row i, its own
-theta included, lies behind it. So every origin is a translation with rpy (alpha, 0, theta), and no angle is ever
+Link i of the URDF has its frame directly after joint i, where the joint variable ends; the rest of row i, its own
+theta included, comes after it. So every origin is a translation with rpy (alpha, 0, theta), and no angle is ever
 computed from a rotation matrix. Each DH frame is a link of its own, ``dh0`` ... ``dhn``, and so is ``tool``.
 
 A URDF cannot hold gravity and the rotors' reflected inertia: a comment states them, and
@@ -46,7 +46,7 @@ _SHAPE_DECIMALS = 12
 
 _Element = ElementTree.Element
 PathMap = Callable[[str], str]
-"""From a mesh's path in the robot file to its path in the URDF."""
+"""Function from a mesh's path in the robot file to its path in the URDF."""
 
 
 class Origin(NamedTuple):

@@ -21,7 +21,7 @@ from dhkit.model.urdf_tree import JointKind, UrdfJoint, UrdfLink, UrdfTree
 from dhkit.model.urdf_xml import Element, child_name
 
 Side: TypeAlias = Literal["freeze", "drop"]
-"""Links behind moving joints beside the chain are carried along with those joints at zero, or left out."""
+"""Links after moving joints beside the chain are carried along with those joints at zero, or left out."""
 
 JointNames: TypeAlias = tuple[str, ...]
 """Names of the moving joints of a chain, from the base to the tip."""
@@ -48,7 +48,7 @@ class Chain:
         The moving joints from the base to the tip.
     groups
         Names of the links that move together, from the base's group to that of the last joint: a joint's child, the
-        links fixed to it, and those frozen behind joints beside the chain.
+        links fixed to it, and those frozen after joints beside the chain.
     frozen
         Names of the moving joints outside the chain, which are at zero.
     dropped
@@ -114,7 +114,7 @@ def read_chain(
     tip
         Its last link. May be left out if the URDF has one chain.
     side
-        Whether links behind moving joints beside the chain are carried along, with those joints at zero, or dropped.
+        Whether links after moving joints beside the chain are carried along, with those joints at zero, or dropped.
     as_designed
         Read rounded right angles as right angles.
 
@@ -190,7 +190,7 @@ def chain_tips(tree: UrdfTree, base: str | None = None) -> dict[JointNames, list
 
 
 def tool_frame(leaves: Sequence[str]) -> str | None:
-    """Return the tool among several frames behind the same joint: the only one, or the one of a conventional name."""
+    """Return the tool among several frames after the same joint: the only one, or the one of a conventional name."""
     if len(leaves) == 1:
         return leaves[0]
     return next((name for name in _CONVENTIONAL_TIPS if name in leaves), None)
@@ -247,7 +247,7 @@ def _required_tip(tree: UrdfTree, base: str) -> str:
 
 
 def _before_mimics(tree: UrdfTree, chains: Collection[JointNames]) -> dict[str, str]:
-    """Return the links behind moving joints at which joints begin that follow others, each with that joint."""
+    """Return the links after moving joints at which joints begin that follow others, each with that joint."""
     ends: dict[str, str] = {}
     for chain in sorted(chains):
         joints = [tree.joints[name] for name in chain]
@@ -281,7 +281,7 @@ def _moving_joints(tree: UrdfTree, base: str, tip: str) -> tuple[UrdfJoint, ...]
         if not joint.has_axis:
             raise ModelError(
                 f"joint {joint.name!r} is {joint.kind}; expected revolute, continuous, prismatic or fixed"
-                f" from link {base!r} to link {tip!r} (base= may be a link behind it)"
+                f" from link {base!r} to link {tip!r} (base= may be a link after it)"
             )
         if joint.mimics is not None:
             raise ModelError(
@@ -352,7 +352,7 @@ def _notes(
         if joint.mimics in names and joint.child in links
     ]
     if dropped:
-        notes.append(f"links behind joints off the chain left out: {_shortened(sorted(dropped), 300)}")
+        notes.append(f"links after joints off the chain left out: {_shortened(sorted(dropped), 300)}")
     if base != tree.root:
         notes.append(f"the world is link {base!r}, with the joints between it and the root {tree.root!r} at zero")
     massless = [group[0] for group in groups[1:] if not any(tree.links[link].inertial is not None for link in group)]

@@ -124,7 +124,7 @@ def style_axes(axes: Axes, label: str) -> None:
 
 
 def draw_legend(figure: Figure, description: Description, others: tuple[Any, ...] = ()) -> None:
-    """Draw a legend of the joints' lines below a figure, with handles of other lines behind them."""
+    """Draw a legend of the joints' lines below a figure, with handles of other lines after them."""
     from matplotlib.lines import Line2D
 
     names = [joint.name for joint in description.joints]

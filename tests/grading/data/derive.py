@@ -38,7 +38,7 @@ def exact(value):
 
 @dataclass(frozen=True)
 class Link:
-    """A row of the table and the body behind it."""
+    """A row of the table and the body after it."""
 
     kind: str
     theta: sp.Expr

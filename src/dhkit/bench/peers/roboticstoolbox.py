@@ -118,7 +118,7 @@ def toolbox_robot(description: Description) -> Any:
     for i in range(description.n):
         shared: dict[str, Any] = {"a": float(numbers.a[i]), "alpha": float(numbers.alpha[i])}
         if np.isfinite(numbers.mass[i]):
-            # The reflected inertia counts alone: it becomes a rotor behind a gear of 1.
+            # The reflected inertia counts alone: it becomes a rotor with a gear of ratio 1.
             shared |= {"m": float(numbers.mass[i]), "r": numbers.com[i], "I": np.array(numbers.inertia[i])}
             shared |= {"Jm": float(numbers.armature[i]), "G": 1.0, "B": 0.0, "Tc": [0.0, 0.0]}
         d, theta = float(numbers.d[i]), float(numbers.theta[i])

@@ -1,4 +1,4 @@
-"""Indices behind names: q[0] is Python's first joint, q(1) MATLAB's, theta[1](t) Maple's."""
+"""Indices after names: q[0] is Python's first joint, q(1) MATLAB's, theta[1](t) Maple's."""
 
 from __future__ import annotations
 
@@ -46,12 +46,17 @@ def without_indices(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) 
         first = first_index([text], vocabulary)
 
     def read_run(k: int) -> tuple[list[Token], int] | None:
-        name, *behind = tokens[k : k + 4]
-        if name.kind != "name" or len(behind) != 3 or behind[1].kind != "number" or not behind[1].text.isdecimal():
+        name, *following = tokens[k : k + 4]
+        if (
+            name.kind != "name"
+            or len(following) != 3
+            or following[1].kind != "number"
+            or not following[1].text.isdecimal()
+        ):
             return None
         whole = ""
-        index = int(behind[1].text[:4])
-        match [token.text for token in behind if token.kind == "sign"]:
+        index = int(following[1].text[:4])
+        match [token.text for token in following if token.kind == "sign"]:
             case ["(", ")"]:
                 whole = _in_round_brackets(name, index, vocabulary, text)
             case ["[", "]"]:

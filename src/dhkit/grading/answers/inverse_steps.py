@@ -28,7 +28,7 @@ _EQUATION_NUMBER = re.compile(
     r"(?:\\(?:tag|label|eqno)\s*\{[^{}]*\}|\\(?:nonumber|notag|quad|qquad)\b|\\\\|(?<=[\w)\]}²])\s+\(\s*(?:[A-Z]\.)?\d+(?:\.\d+)*[a-z]?\s*\)"
     r"|[.,;\s])+$"
 )
-"""What may stand behind a formula: its number in the text, marks of typesetting."""
+"""Text that may follow a formula: its number in the text, marks of typesetting."""
 _OBJECT = re.compile(r"^\s*(?:\w+\.)?Eq\s*\((.*)\)$", re.DOTALL)
 """An equation of sympy's: Eq(left, right)."""
 _TURNED_BACK = re.compile(
@@ -86,8 +86,8 @@ class GivenStep:
 def given_steps(steps: Sequence[InverseStep], vocabulary: Vocabulary) -> list[GivenStep]:
     """Return the steps of a sheet; one that cannot be read says why.
 
-    An equation ``D = ...`` of a name that is not a joint's defines it, for its own step and those behind; ``r^2 = ...``
-    defines the length r. A name with two signs, ``S = ±sqrt(1 - D^2)``, holds for its own step.
+    An equation ``D = ...`` of a name that is not a joint's defines it, for its own step and the later ones;
+    ``r^2 = ...`` defines the length r. A name with two signs, ``S = ±sqrt(1 - D^2)``, holds for its own step.
     """
     given: list[GivenStep] = []
     defined: set[str] = set()
@@ -309,11 +309,11 @@ class _Reading:
         return [plus] if plus == minus else [plus, minus]
 
     def _solutions(self, text: str) -> list[Tree]:
-        """Return the formulas of a solution; definitions may stand behind it, and the joint's name in front."""
+        """Return the formulas of a solution; definitions may follow it, and the joint's name in front."""
         formula, *others = _parts(text, _ANOTHER)
         for other in others:
             if len(self._sides(other)) != 1:
-                raise AnswerError(f"{quote(other)}: no definition of a new name, behind a solution")
+                raise AnswerError(f"{quote(other)}: no definition of a new name, after a solution")
         sides = _EQUALS.split(formula)
         for head in sides[:-1]:
             if self._new_name(head) or not _is_name(self._read(head), f"q{self.joint}"):

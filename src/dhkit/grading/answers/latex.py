@@ -109,7 +109,7 @@ class _LatexReader:
         return self._over(tokens)
 
     def _goes_on_with_a_sum(self, piece: re.Match[str], before: list[Token]) -> bool:
-        """Whether a group in braces begins with a sign behind an operand: a {+ b} is set as a + b, not as a product."""
+        """Whether a group in braces begins with a sign after an operand: a {+ b} is set as a + b, not as a product."""
         if piece[4] != "{" or not before or before[-1].text in FUNCTION_NAMES:
             return False
         is_behind_operand = before[-1].kind in ("name", "number") or before[-1].text in (")", "]")
@@ -272,7 +272,7 @@ class _LatexReader:
     def _fraction(self, above: list[Token], below: list[Token], at: int) -> list[Token]:
         """Return a fraction of two bracketed parts, or the time derivative that it is.
 
-        Two numbers right behind a number are refused: they may be a mixed number.
+        Two numbers directly after a number are refused: they may be a mixed number.
         """
         bottom = "".join(token.text for token in below[1:-1] if token.text not in "()")
         if order := {"dt": 1, "dt^2": 2}.get(bottom, 0):
@@ -305,7 +305,7 @@ class _LatexReader:
         elif len(tokens) != 1 or tokens[0].kind != "name":
             tokens = []
         if not tokens or not _OPERAND_ENDS.match(self.text, self.at):
-            fail(self.text, at, "a derivative that may reach further than the name behind it; put brackets around what")
+            fail(self.text, at, "a derivative that may reach further than the name after it; put brackets around what")
         return tokens
 
     def _one_item(self) -> list[Token]:

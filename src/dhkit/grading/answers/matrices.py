@@ -210,7 +210,7 @@ def _with_diagonal(tokens: list[Token], text: str) -> list[Token]:
 
 
 def _factors(before: list[Token], after: list[Token], text: str) -> tuple[list[Token], list[Token], bool]:
-    """Return the factors before and behind a matrix, and whether it is transposed.
+    """Return the factors before and after a matrix, and whether it is transposed.
 
     Raises
     ------
@@ -233,7 +233,7 @@ def _factors(before: list[Token], after: list[Token], text: str) -> tuple[list[T
     before = before[:end]
     after = after[start:]
     if after and after[0].kind == "sign" and after[0].text not in ("*", "/", "+", "-", "(", ".*", "./", "\\,"):
-        fail(text, after[0].at, f"{after[0].text!r} behind a matrix, which is not read,")
+        fail(text, after[0].at, f"{after[0].text!r} after a matrix, which is not read,")
     if before and before[-1].text in ("^", "/", ".", "./"):
         fail(text, before[-1].at, f"{before[-1].text!r} before a matrix, which is not read,")
     for tokens in (before[1:], after):
@@ -245,7 +245,7 @@ def _factors(before: list[Token], after: list[Token], text: str) -> tuple[list[T
 
 
 def _strip(tokens: list[Token]) -> list[Token]:
-    """Take round brackets around a row away, and signs behind it."""
+    """Take round brackets around a row away, and signs after it."""
     start = 0
     end = len(tokens)
     while start < end:
@@ -313,5 +313,5 @@ def _typed(entry: Sequence[Token], places: Sequence[int], text: str) -> str:
     """Return an entry as it was typed: up to where the next token after it begins."""
     if not entry or entry[0].at == _NOWHERE:
         return "".join(token.text for token in entry)
-    behind = bisect_right(places, entry[-1].at)
-    return text[entry[0].at : places[behind] if behind < len(places) else len(text)].strip()
+    following = bisect_right(places, entry[-1].at)
+    return text[entry[0].at : places[following] if following < len(places) else len(text)].strip()

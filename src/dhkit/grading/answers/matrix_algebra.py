@@ -83,7 +83,7 @@ def _is_named_matrix(tokens: Sequence[Token], k: int, matrix_of: MatrixOf) -> bo
 
 
 def _end_of_arguments(tokens: Sequence[Token], k: int, matrix_of: MatrixOf) -> int:
-    """Return where the name at k ends with its arguments, as in M(q) and C(q, qd); the place behind it without."""
+    """Return the place after the name at k and its arguments, if it has any, as in M(q) and C(q, qd)."""
     if not begins_with(tokens, k + 1, "("):
         return k + 1
     end = closing_bracket(tokens, k + 1)
@@ -212,7 +212,7 @@ class _MatrixReader:
         return answer_tree(entry, self.vocabulary, self.text)
 
     def _with_postfix(self, value: _Value, tokens: Sequence[Token], k: int) -> tuple[_Value, int]:
-        """Return a factor with the transposes and powers behind it, and where they end."""
+        """Return a factor with the transposes and powers after it, and where they end."""
         before = tokens[k - 1]
         if begins_with(tokens, k, "'") and before.kind == "name" and self.vocabulary.is_position(f"{before.text}1"):
             name = before.text

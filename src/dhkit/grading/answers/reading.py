@@ -19,7 +19,7 @@ from dhkit.grading.answers.tokens import fail, nesting, quote, split_tokens, to_
 from dhkit.grading.answers.vocabulary import Meaning, Vocabulary
 
 _COMMENT = re.compile(r"(?<!\\)%(?!pi\b|e\b|i\b|\s*$).*|#.*")
-"""A comment behind an answer, such as its unit: % N m."""
+"""A comment after an answer, such as its unit: % N m."""
 
 _STORAGE = re.compile(r",\s*storage\s*=\s*rectangular\s*(?=\)\s*$)")
 """What sympy's maple_code adds to a matrix."""

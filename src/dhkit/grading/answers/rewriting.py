@@ -31,7 +31,7 @@ _ATTRIBUTES = frozenset((*FUNCTION_NAMES, "pi"))
 DERIVATIVES = frozenset(("diff", "Derivative"))
 
 _ORDERS = {"t": 1, "t,t": 2, "t,2": 2, "(t,2)": 2, "(t,1)": 1, "t,1": 1}
-"""Orders of derivatives, by what stands behind the expression that is differentiated."""
+"""Orders of derivatives, by the text after the expression that is differentiated."""
 
 MATLAB = re.compile(r"\.[*/^']")
 """Signs that are MATLAB's alone."""
@@ -92,9 +92,9 @@ class _Rewriting:
         return plain
 
     def _without_primes(self, tokens: Sequence[Token]) -> list[Token]:
-        """Read Lagrange's prime behind a joint's variable as a rate, and drop MATLAB's transpose.
+        """Read Lagrange's prime after a joint's variable as a rate, and drop MATLAB's transpose.
 
-        A prime behind anything but a matrix is refused where nothing else is MATLAB's: it may be a derivative.
+        A prime after anything but a matrix is refused where nothing else is MATLAB's: it may be a derivative.
         """
         plain: list[Token] = []
         for token in tokens:
@@ -184,7 +184,7 @@ class _Rewriting:
         return None
 
     def _refuse_unclear_end(self, tokens: Sequence[Token], k: int, start: int, stop: int) -> None:
-        """Refuse d/dt at k in front of an operand, from start to stop, that may go on behind it."""
+        """Refuse d/dt at k in front of an operand, from start to stop, that may go on after it."""
         is_enclosed = start < len(tokens) and (
             tokens[start].text == "(" or _BY_TIME.match(self.text, tokens[start].at) is not None
         )
@@ -192,7 +192,7 @@ class _Rewriting:
         goes_on = following.kind != "sign" or following.text in ("(", "*", "/")
         if stop == start or following.text == "^" or (goes_on and not is_enclosed):
             self._fail(
-                tokens[k], "a derivative that may reach further than the name behind it; put brackets around what"
+                tokens[k], "a derivative that may reach further than the name after it; put brackets around what"
             )
 
     # Names
@@ -225,17 +225,19 @@ class _Rewriting:
         """Refuse c (...) where c is a parameter or the cosine, c W where W is not an angle, and q1(0)."""
         name = tokens[k].text
         vocabulary = self.vocabulary
-        behind = [token.text for token in tokens[k + 1 : k + 4]]
+        following = [token.text for token in tokens[k + 1 : k + 4]]
         is_exact = vocabulary.is_exactly(name)
-        if name in FUNCTION_NAMES and is_exact and behind[:1] == ["("]:
+        if name in FUNCTION_NAMES and is_exact and following[:1] == ["("]:
             problem = f"{name} (...) may be the parameter {name} times the brackets, or a function; write {name}*(...)"
             self._fail(tokens[k], problem)
         is_shorthand = name in _SHORTHAND and not is_exact and k + 1 < len(tokens) and tokens[k + 1].kind == "name"
-        if is_shorthand and not vocabulary.is_position(behind[0]) and vocabulary.is_exactly(behind[0]):
-            self._fail(tokens[k], f"{name} before {behind[0][:40]}, which is not an angle,")
-        is_number_in_brackets = len(behind) == 3 and behind[0] == "(" and behind[2] == ")" and behind[1].isdecimal()
+        if is_shorthand and not vocabulary.is_position(following[0]) and vocabulary.is_exactly(following[0]):
+            self._fail(tokens[k], f"{name} before {following[0][:40]}, which is not an angle,")
+        is_number_in_brackets = (
+            len(following) == 3 and following[0] == "(" and following[2] == ")" and following[1].isdecimal()
+        )
         if vocabulary.is_state(name) and is_number_in_brackets:
-            self._fail(tokens[k], f"{name}({behind[1][:20]}) may be a value at a time, or a product; write which")
+            self._fail(tokens[k], f"{name}({following[1][:20]}) may be a value at a time, or a product; write which")
 
     def _refuse_ambiguous(self, tokens: Sequence[Token], k: int) -> None:
         """Refuse sin2q1, s2q1 and sin2(q1): the sine of q2 times q1, the sine of 2 q1, or a square."""
@@ -279,7 +281,7 @@ class _Rewriting:
     # Functions
 
     def _functions(self, tokens: Sequence[Token]) -> list[Token]:
-        """Give functions their brackets, sin q1 and sin 2 q1, and put powers of functions behind them, sin^2(q1)."""
+        """Give functions their brackets, sin q1 and sin 2 q1, and put powers of functions after them, sin^2(q1)."""
         return replace_runs(tokens, lambda k: self._function(tokens, k) if tokens[k].kind == "function" else None)
 
     def _function(self, tokens: Sequence[Token], k: int) -> tuple[list[Token], int]:
@@ -318,7 +320,7 @@ class _Rewriting:
     def _operand(self, tokens: Sequence[Token], k: int, is_product: bool = False) -> int:
         """Return where the operand ends that begins at k.
 
-        An operand is what stands in brackets, or a name or a number behind signs; in a product, numbers may stand
+        An operand is what stands in brackets, or a name or a number after signs; in a product, numbers may stand
         in front of the brackets or the name.
         """
         if begins_with(tokens, k, "("):

@@ -197,7 +197,7 @@ def replace_runs(tokens: Sequence[Token], read_run: Callable[[int], tuple[Sequen
     tokens
         The tokens.
     read_run
-        Function from a place to the tokens that replace the run that begins there, and to the place behind the run;
+        Function from a place to the tokens that replace the run that begins there, and to the place after the run;
         None where no such run begins.
     """
     result: list[Token] = []

@@ -242,11 +242,11 @@ class Vocabulary:
         if match is None:
             alone = len(self.kinds) == 1 and not name[-1:].isdigit() and (len(name) > 1 or name == "q")
             return self._joint_variable(name + "1") if alone else None
-        before, letter, between, number, behind = match.groups()
+        before, letter, between, number, after = match.groups()
         joints = self._numbered(number)
         if not joints:
             return None
-        marks = [mark for mark in (before, between, behind) if mark]
+        marks = [mark for mark in (before, between, after) if mark]
         if len(marks) > 1 or (letter in _SLIDES and letter not in _ANGLES and self.kinds[joints[0] - 1] == "R"):
             return None
         dots = _DOTS[marks[0]] if marks else 0

@@ -15,7 +15,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
 """First characters of a text that a spreadsheet would compute."""
 _NUMBER = re.compile(r"[+-]?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?")
 _AFTER_POINTS = ("verdict", "judged at", "missing", "left out", "mistakes", "error")
-"""Columns behind the points of the quantities."""
+"""Columns after the points of the quantities."""
 _ORIGIN = ("sheet", "robot", "digest", "version")
 """Last columns: fields of a report that say what was judged, and by what."""
 

@@ -48,14 +48,14 @@ class Fit:
     """An arm as a member of a family."""
 
     geometry: str
-    """How the axes lie, as text."""
+    """Arrangement of the axes, as text."""
     parameters: Mapping[str, Parameter]
     """The numbers that the family's formulas work with, by name; ``reach``, m, is required of every family."""
     branches: tuple[str, ...]
     coordinates: tuple[str, ...] = ALL_COORDINATES
     """Coordinates of a pose that the arm can reach: those of ``ALL_COORDINATES``, and yaw for its turn in the plane."""
     structure: str = ""
-    """What the formulas depend on besides their parameters, such as the order of the joints."""
+    """Variant of the formulas that their parameters do not tell, such as the order of the joints."""
     free: int | None = None
     """Index, from 0, of the joint that is free where two axes of the wrist coincide; None if there is none."""
     ring: tuple[float, float] | None = None

@@ -1,4 +1,4 @@
-"""From a table of doubles to a description: bodies, limits, shapes and tool, with numbers rounded to some decimals."""
+"""Description made from a table of doubles: bodies, limits, shapes and tool, with numbers rounded to some decimals."""
 
 from __future__ import annotations
 

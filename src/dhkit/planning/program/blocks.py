@@ -74,17 +74,17 @@ class RowKind(Enum):
     """Purpose of rows, which decides their bounds and units."""
 
     CONTINUITY = "continuity"
-    """Zero: a variable equals an expression."""
+    """Difference of a variable and its expression, which must be zero."""
     TIME = "time"
-    """At most zero: the time that an interval takes beyond its duration."""
+    """Time that an interval takes beyond its duration, s; at most zero."""
     DURATION = "duration"
     """The duration of the motion."""
     LIMIT = "limit"
     """A limit of the motion."""
     PLANE = "plane"
-    """At least zero: the distance beyond a plane, m."""
+    """Distance beyond a plane, m; at least zero."""
     POSITIVE_PART = "positive part"
-    """At least zero: how far a variable exceeds the quantity whose positive part it is."""
+    """Excess of a variable over the quantity whose positive part it bounds; at least zero."""
 
 
 @dataclass(frozen=True, eq=False)

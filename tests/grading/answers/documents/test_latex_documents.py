@@ -323,7 +323,7 @@ def test_a_system_gives_several_statements():
     assert [(s.line, s.targets, s.formulas) for s in found] == [(1, ("g1",), ("a",)), (2, ("g2",), ("b",))]
 
 
-# Found by adversaries: what stands behind comments, words, macros and & counts, or refuses
+# Found by adversaries: what stands after comments, words, macros and & counts, or refuses
 
 M22 = r"\tfrac13 m_2 l_2^2"
 LESS = r"\tfrac14 m_2 l_2^2"

@@ -278,7 +278,7 @@ class _DocumentAnswers:
     # Names
 
     def _names_in(self, formula: str) -> list[str]:
-        """Return the names that a formula uses, also together with a number behind them."""
+        """Return the names that a formula uses, also together with a number after them."""
         try:
             tokens = latex_tokens(
                 to_ascii(formula)[0], lambda name: plain_name(name) in self.by_name or self.names.vocabulary.knows(name)

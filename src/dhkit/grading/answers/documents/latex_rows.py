@@ -55,7 +55,7 @@ class Row:
     before
         What stands in front of its first &; empty where that is nothing.
     is_after_mark
-        Whether it begins behind an &.
+        Whether it begins after an &.
     column
         The pair of columns in which it begins, from 0.
     is_first

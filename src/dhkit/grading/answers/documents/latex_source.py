@@ -85,7 +85,7 @@ def document_statements(text: str) -> Iterator[Statement]:
     Raises
     ------
     AnswerError
-        More statements than are read, or a command that may change the meaning of anything behind it.
+        More statements than are read, or a command that may change the meaning of anything after it.
     """
     for count, statement in enumerate(_statements(text)):
         if count >= BOUNDS.statements:

@@ -41,7 +41,7 @@ _TRAILING = (
     *("\\,", "\\;", "\\:", "\\!", "\\>", "\\ ", "\\quad", "\\qquad", "\\enspace", "\\thinspace", "\\space"),
     *("\\therefore", "{}", " ", "\t", "\n", "~", ",", ";", "."),
 )
-"""What stands behind a formula and is not a part of it."""
+"""Text after a formula that is not a part of it."""
 
 STARTS = re.compile(
     rf"(?:{SPACE}|\\left\.)*(?:[-+/*)\]^_']|\\(?:cdot|times|div|right|over|rVert|pm|mp|ast)(?![A-Za-z])"
@@ -148,7 +148,7 @@ def _without_words(text: str) -> str:
 
 
 def _is_part(match: re.Match[str], text: str) -> bool:
-    """Whether words are part of a formula: a name, or a unit behind a number."""
+    """Whether words are part of a formula: a name, or a unit after a number."""
     inside = match[1].strip()
     if re.fullmatch(r"[A-Za-z]{1,3}\d*", inside, re.ASCII):
         return inside.lower() not in _PROSE_WORDS

@@ -83,7 +83,7 @@ _SYNTAX = word_set(
 """Functions that signs and brackets of formulas stand for, and those that make symbols."""
 
 _ASSUMPTIONS = frozenset(["real", "positive", "integer", "rational", "clear", "nonnegative", "matrix"])
-"""Words behind the names of ``syms``."""
+"""Words that may follow the names of ``syms``."""
 
 _PLAIN_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _SUMS, _PRODUCTS = ("+", "-", ".+", ".-"), ("*", "/", ".*", "./")
@@ -344,7 +344,7 @@ class MatlabProgram:
                     for name in scope.local:
                         scope.change(name, f"{name} may be changed by 'return' in {line}", only_matrices=False)
             elif blocks or has_returned:
-                where = repr(blocks[-1]) if blocks else "a statement behind 'return'"
+                where = repr(blocks[-1]) if blocks else "a statement after 'return'"
                 self._refuse_script(statement, word)
                 self._change(statement, scope, where, line)
             else:
@@ -468,7 +468,7 @@ class MatlabProgram:
     def _assign_several(self, statement: MatlabStatement, left: Tokens, right: Tokens, scope: Scope, line: str) -> None:
         """Read ``[M, C] = dynamics(q, qd)`` and ``[a, b] = deal(1, 2)``."""
         if not right:
-            raise self._refuse(statement, "found nothing behind '='")
+            raise self._refuse(statement, "found nothing after '='")
         targets = [entry for row in split_rows(left[1:-1]) for entry in row]
         names = [entry[0].text if len(entry) == 1 else "" for entry in targets]
         values: Sequence[Value] = ()
@@ -662,7 +662,7 @@ class _Expression:
         return self._transposed(self.primary())
 
     def _transposed(self, value: Value) -> Value:
-        """Return a value with the transposes behind it."""
+        """Return a value with the transposes after it."""
         while self._next("'", ".'"):
             value = self._operand(value)
             value = transposed(value) if isinstance(value, Matrix) else value
@@ -717,7 +717,7 @@ class _Expression:
         return [[self.scope.scalar(value)]]
 
     def _name(self, name: str) -> Value:
-        """Read a name with what stands behind it: a field, an index or arguments."""
+        """Read a name with its suffixes: fields, indices or arguments."""
         value: Value
         if self._next("."):
             if self.at >= len(self.tokens) or self.tokens[self.at].kind != "name":

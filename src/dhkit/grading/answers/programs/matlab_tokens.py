@@ -190,7 +190,7 @@ def split_rows(tokens: Tokens) -> list[list[Tokens]]:
 
 
 def _begins_entry(tokens: Tokens) -> bool:
-    """Whether the first token, behind a space, begins an entry: also a sign that stands close to what follows."""
+    """Whether the first token, after a space, begins an entry: also a sign that stands close to what follows."""
     token = tokens[0]
     after = tokens[1] if len(tokens) > 1 else None
     if token.kind != "sign" or token.text in ("(", "[", "{", "@"):

@@ -1003,7 +1003,7 @@ _UNCHANGED_METHODS = word_set(
 
 
 def constant_index(node: ast.expr) -> Index | None:
-    """Return the numbers of an index; ``[..., 0, 1]`` counts behind leading axes. None of any other index."""
+    """Return the numbers of an index; ``[..., 0, 1]`` counts after leading axes. None of any other index."""
     parts = node.elts if isinstance(node, ast.Tuple) else [node]
     if parts and isinstance(parts[0], ast.Constant) and parts[0].value is Ellipsis:
         parts = parts[1:]
