@@ -37,7 +37,7 @@ _KINETIC = frozenset(("T", "Ek", "Ec", "Ekin"))
 """Other names of the kinetic energy; T is a quantity of its own too."""
 
 _BRACKETED = re.compile(r"\s*(?:\w+\s*(?:\([^()]*\))?\s*=)?\s*(?:\[|⎡|\{\s*\{|\w*[Mm]atrix|\w+\.|\\begin|sym\()")
-"""How the one entry of a matrix begins that stands in brackets."""
+"""Beginning of a matrix in brackets, as the one entry of a quantity."""
 
 _SYSTEM = re.compile(
     r"\\begin\s*\{(?:cases|align|aligned|alignat|split|gather|gathered|eqnarray|IEEEeqnarray|multline)\*?\}"

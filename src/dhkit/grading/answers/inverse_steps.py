@@ -19,7 +19,7 @@ from dhkit.grading.answers.typeset import typeset_equations
 from dhkit.grading.answers.vocabulary import FUNCTION_NAMES, Meaning, Vocabulary, plain_name
 
 _EQUALS = re.compile(r"&?\s*(?<![<>!=:])==?(?!=)\s*&?")
-"""What stands between the two sides of an equation."""
+"""Sign between the two sides of an equation."""
 _EITHER_SIGN = re.compile(r"±|∓|\\pm\b|\\mp\b|\+/-|-/\+")
 """Plus or minus, and minus or plus: two formulas in one."""
 _UNCLEAR_SIGN = re.compile(r"\+-(?=\s*[A-Za-z\\(])")
@@ -41,7 +41,7 @@ _SQUARE_OF_NAME = re.compile(r"^\s*(\\?[A-Za-z]\w*)\s*(?:\^|\*\*)\s*(?:2|\{2\}|\
 _FUNCTION_OF_NAME = re.compile(r"^\s*\\?(cos|tan)\s*\(?\s*(\\?[A-Za-z]\w*)\s*\)?\s*$", re.ASCII)
 """A function of a name on a side of its own: cos(gamma) = ... and tan(beta) = y/x define angles."""
 _ANOTHER = re.compile(r"[,;]\s*(?:where|with)?\s*(?=[^,;=()]*=)")
-"""What stands between a formula and the definition of a quantity in it."""
+"""Text between a formula and the definition of a quantity in it."""
 _COMMA = re.compile(",")
 _JOINT_LETTERS = ("q", "th", "Th", "varth")
 """Beginnings of names that are a joint's variable and nothing else: q1, theta_1, th1."""

@@ -1,4 +1,4 @@
-r"""From LaTeX to the tokens of plain text: \frac{1}{2} m_1 \dot\theta_1^2, c_{12}, matrices between & and \\."""
+r"""LaTeX read as tokens of plain text: \frac{1}{2} m_1 \dot\theta_1^2, c_{12}, matrices between & and \\."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _OPERAND_ENDS = re.compile(
     r"(?:\s|~|\$|\\[,;:! ]|\\q?quad\b)*(?:$|[-+)\]},;&=.|]|\\\\|\\(?:right|cr|end)\b|\\[bB]igg?r?\s*[)\]]"
     r"|\{?\s*(?:\\left)?\s*\(\s*t\s*(?:\\right)?\s*\))"
 )
-r"""What ends the operand of \frac{d}{dt}: a sign of a sum, the end, or (t)."""
+r"""End of the operand of \frac{d}{dt}: a sign of a sum, the end, or (t)."""
 
 
 def is_latex(text: str) -> bool:

@@ -9,7 +9,7 @@ from dhkit.grading.answers.vocabulary import Meaning, Vocabulary
 _BY_TWO = re.compile(
     r"(?<![\w.\\])(T|R)\s*(?:\(\s*(\d)\s*,\s*(\d)\s*\)|\[\[\s*(\d)\s*,\s*(\d)\s*\]\]|\[\s*(\d)\s*(?:,|\]\s*\[)\s*(\d)\s*\])"
 )
-"""By two indices: in round brackets (MATLAB) and in double ones (Mathematica) from 1, else (Python) from 0."""
+"""Entry by two indices: in round brackets (MATLAB) and double ones (Mathematica) from 1, else (Python) from 0."""
 _BY_ONE = re.compile(r"(?<![\w.\\])([pP])\s*(?:\(\s*(\d)\s*\)|\[\s*(\d)\s*\])")
 _PAUL = {
     f"{letter}{axis}": f"r{row}{column}" for column, letter in enumerate("noa", 1) for row, axis in enumerate("xyz", 1)

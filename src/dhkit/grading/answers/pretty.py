@@ -19,7 +19,7 @@ _BAR = "─"
 _DERIVATIVES = (("d", "dt"), ("d^(2)", "dt^(2)"))
 
 _TALL_BRACKETS = {"⎛": "⎜⎝⎞⎟⎠", "⎡": "⎢⎣⎤⎥⎦"}
-"""Of each upper hook: what continues it and ends it, then the upper hook, the side and the foot that close."""
+"""Pieces of a tall bracket by its upper hook: its side and lower hook, then hook, side and foot of the closing one."""
 
 
 def is_pretty(text: str) -> bool:

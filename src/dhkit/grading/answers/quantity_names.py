@@ -1,4 +1,4 @@
-"""Which quantity, or which entry of one, a name such as M, M_12, g1 or A1_14 stands for on a given robot."""
+"""Names of quantities and of their entries, such as M, M_12, g1 or A1_14, on a given robot."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ _COMMENT = re.compile(r"(?<!\\)%(?!pi\b|e\b|i\b|\s*$).*|#.*")
 """A comment after an answer, such as its unit: % N m."""
 
 _STORAGE = re.compile(r",\s*storage\s*=\s*rectangular\s*(?=\)\s*$)")
-"""What sympy's maple_code adds to a matrix."""
+"""Option that sympy's maple_code adds to a matrix."""
 
 
 _BAR = re.compile(r"-{2,}")

@@ -14,7 +14,7 @@ class SampledAnswer(ABC):
     @property
     @abstractmethod
     def name(self) -> str:
-        """How reports call it."""
+        """Name in reports."""
 
     @property
     @abstractmethod

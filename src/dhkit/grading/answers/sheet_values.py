@@ -50,7 +50,7 @@ class Entries:
 
 @dataclass(frozen=True)
 class Names:
-    """What a student's names mean.
+    """Meanings of a student's names.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ NO_NAMES = Names()
 
 @dataclass(frozen=True)
 class Requirements:
-    """What the instructor asks for, where there is a choice: the table ``[task]``.
+    """Requirements of the instructor where there is a choice: the table ``[task]``.
 
     Attributes
     ----------
@@ -139,14 +139,14 @@ class InverseStep:
 
 @dataclass(frozen=True)
 class AnswerSheet:
-    """What was handed in, as text.
+    """Answers that were handed in, as text.
 
     Attributes
     ----------
     robot
         A library name, or a path inside the sheet's folder; empty where the caller knows the robot.
     names, task
-        What names mean, and what was asked for.
+        Meanings of names, and requirements.
     answers
         Text, or lists of text, by quantity.
     table
@@ -158,9 +158,9 @@ class AnswerSheet:
     student
         Student's name; empty if unknown.
     file
-        What messages begin with.
+        File name with which messages begin.
     notes
-        What a reader should know of how a program or a document was read, each with its line.
+        Remarks on how a program or a document was read, each with its line.
     left_out
         Statements that were not read as answers, each with its line.
     """

@@ -18,7 +18,7 @@ _LATEX_FUNCTIONS = {"asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan"}
 _LATEX_NAMES = ("sin", "cos", "tan", "exp", "min", "max")
 _LATEX_MARKS = {"qdd": r"\ddot{q}", "qd": r"\dot{q}", "q": "q"}
 _SUM, _PRODUCT, _POWER = 0, 1, 2
-"""How tightly an operation binds, which decides whether it stands in brackets inside another one."""
+"""Binding strengths of operations: a weaker one stands in brackets inside a stronger one."""
 
 
 def typeset(tree: Tree) -> tuple[str, str]:

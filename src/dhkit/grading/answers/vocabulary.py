@@ -100,7 +100,7 @@ class Vocabulary:
         self.aliases: set[str] = set()
         """Names in ``own`` that are others for what the task has."""
         self.taken_for: dict[str, str] = {}
-        """What was not exactly a known name, and what it was taken for."""
+        """Names that were not exactly known ones, and the names that they were taken for."""
         self.refused: dict[str, str] = {}
         """Names that could not be defined, and why."""
         self.first_index: int | None = None

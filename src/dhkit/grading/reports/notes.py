@@ -16,7 +16,7 @@ _AGREEMENT = {
     "T": "the product of the transforms, with the sheet's own {}",
     "J": "the Jacobian of the sheet's own {}",
 }
-"""By quantity: how it follows from other quantities of the sheet, whose names replace ``{}``."""
+"""Derivation of a quantity from other quantities of the sheet, whose names replace ``{}``."""
 
 SENTENCES: Mapping[NoteKind, str] = {
     NoteKind.AGREES: "{quantity} is {agreement}",

@@ -14,10 +14,10 @@ _PLAIN_COMMENT = re.compile(r"#.*|%(?!(?:pi|e|i|gamma|phi)(?![A-Za-z0-9_])).*")
 """Comments of Python, MATLAB and LaTeX; %pi, %e and %i are Maxima's numbers."""
 
 _CONTINUATION = re.compile(r"\s*(?:[-+*/^=)\].]|\*\*)")
-"""How a line begins that continues the one before."""
+"""Beginning of a line that continues the one before."""
 
 _UNFINISHED = re.compile(r"(?:[-+*/^=(\[,]|\.\.\.|\\)\s*$")
-"""How a line ends that the next one continues."""
+"""End of a line that the next one continues."""
 
 
 def statements_of(text: str, suffix: str = ".tex") -> list[Statement]:

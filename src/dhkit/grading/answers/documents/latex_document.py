@@ -20,7 +20,7 @@ from dhkit.grading.answers.tokens import to_ascii
 from dhkit.grading.answers.vocabulary import plain_name
 
 _VALUE_WORDS = re.compile(r"\\(?:pi|circ|[td]?frac|deg)(?![A-Za-z])|\\(?:mathrm|text|textrm|si)\s*\{[^{}]*\}")
-"""What the value of a joint variable may be made of besides numbers."""
+"""Macros that the value of a joint variable may have besides numbers."""
 
 _NUMBER_WITH_UNIT = re.compile(
     r"([-+]?\s*(?:\d+\.?\d*|\.\d+))(?:\\[,;: ]|~|\s)*"
@@ -31,7 +31,7 @@ _NUMBER_WITH_UNIT = re.compile(
 _ENERGIES = ("K", "V", "L")
 
 _ADVICE = "write it out in one formula, or on a sheet"
-"""What the author of a document may do that is not read."""
+"""Advice to the author of a document that cannot be read."""
 
 
 def latex_answers(

@@ -161,7 +161,7 @@ _SYMMETRY_MARK = re.compile(
     r"(?:\*|\\(?:ast|star|cdot|bullet)(?![A-Za-z])"
     r"|\\(?:text|textrm|mbox|mathrm|textit|rm)\s*\{\s*(?:[Ss]ymm?\.?|[Ss]ymmetric|SYM\.?)\s*\}|[Ss]ymm?\.?)"
 )
-"""What stands for an entry of a symmetric matrix that is equal to that of the other half."""
+"""Mark of an entry of a symmetric matrix that is equal to its mirror image: *, sym. and others."""
 
 
 def matrix_rows(formula: str) -> list[list[str]] | None:

@@ -35,7 +35,7 @@ _DROPPED = re.compile(
 """Macros that say nothing about a formula."""
 
 _LEADING = re.compile(rf"(?:{SPACE}|\\therefore(?![A-Za-z])|[,;]|\.(?!\d))")
-"""What stands in front of a formula and is not a part of it."""
+"""Text in front of a formula that is not a part of it."""
 
 _TRAILING = (
     *("\\,", "\\;", "\\:", "\\!", "\\>", "\\ ", "\\quad", "\\qquad", "\\enspace", "\\thinspace", "\\space"),

@@ -48,7 +48,7 @@ _SAMPLING_TIME = 60.0
 _SAME_VALUES = 1e-9
 """Relative and absolute difference up to which two functions give the same numbers."""
 _KINDS = ("numpy", "sympy", "casadi")
-"""How symbols are made, in the order in which they are tried."""
+"""Libraries that make the symbols, in the order in which they are tried."""
 _PARAMETER_SETS = frozenset(("p", "par", "params", "param", "parameters", "robot", "P", "prm", "constants"))
 """Names of an argument with the robot's parameters as fields."""
 _STATES = frozenset(("x", "y", "s", "state", "z", "X", "Y"))
@@ -419,7 +419,7 @@ class _SampledFunction(SampledAnswer):
 
     @property
     def name(self) -> str:
-        """How reports call it."""
+        """Name in reports."""
         return f"{self.function.name}(...)" + (f": {self.local}" if self.local else "")
 
     @property

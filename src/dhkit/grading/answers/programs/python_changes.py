@@ -1,4 +1,4 @@
-"""What a piece of a Python program may change, beyond the assignments that are read.
+"""Side effects of a piece of a Python program, beyond the assignments that are read.
 
 A piece that only calculates changes nothing. Which functions only calculate is a closed list, and a name counts as such
 a function only where the program has not bound it to anything else. Any other call may change whatever it is given, or
@@ -144,7 +144,7 @@ def bound_names(node: ast.AST) -> Iterator[str]:
 
 @dataclass
 class Effects:
-    """What a piece of a program may do to names beyond binding them.
+    """Side effects of a piece of a program on names, beyond binding them.
 
     Attributes
     ----------
@@ -195,7 +195,7 @@ class Changes:
         """Names of functions that ``lambdify`` has made."""
         self._visited: set[int] = set()
         self._known: dict[tuple[int, int], frozenset[str]] = {}
-        """What functions change, by function and by the number of names that the program has bound."""
+        """Names that functions change, by function and by the number of names that the program has bound."""
 
     def of(self, nodes: Iterable[ast.AST], scope: Scope, local: Iterable[str] = ()) -> Effects:
         """Return the effects of pieces of a program.

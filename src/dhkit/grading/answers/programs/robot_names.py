@@ -25,7 +25,7 @@ def is_same_number(value: float | None, number: float | None) -> bool:
 
 
 class RobotNames:
-    """What names mean on a robot before a program binds them.
+    """Meanings of names on a robot before a program binds them.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ _NOT_NAMES = word_set("t T top pi e Matrix array matrix sym simplify transpose D
 
 @dataclass(frozen=True)
 class Bound:
-    """What a name is bound to.
+    """Binding of a name.
 
     Attributes
     ----------
@@ -62,18 +62,18 @@ class Bound:
 
 @dataclass
 class Record:
-    """What is known of a whole program.
+    """Knowledge of a whole program, collected while it is read.
 
     Attributes
     ----------
     robot
         Names of the robot.
     power
-        How the language writes powers.
+        Sign of powers in the language.
     broken
-        Names that are not to be relied on, by key, and why.
+        Names whose values are unknown, by key, each with the reason.
     definitions
-        Names of the program beside the answers: their names there, texts and what they use, by key.
+        Names of the program beside the answers: their names there and their values, by key.
     notes, left_out
         As in :class:`~dhkit.grading.answers.sheet_values.AnswerSheet`.
     """

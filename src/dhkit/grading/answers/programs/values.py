@@ -23,7 +23,7 @@ class UnreadError(Exception):
 
 
 class Level(IntEnum):
-    """How tightly the outermost operation of a text binds."""
+    """Binding strength of the outermost operation of a text."""
 
     SUM = 0
     SIGNED = 1
@@ -234,7 +234,7 @@ class Function:
 
 @dataclass(frozen=True)
 class Several:
-    """What a function with several results returns, with the names of those that are local variables."""
+    """Results of a function with several of them, with the names of those that are local variables."""
 
     values: tuple[Value, ...]
     names: tuple[str, ...] = ()
