@@ -156,14 +156,10 @@ class BatchResult:
     def _repr_html_(self) -> str:
         known = {"peak error": self.peak_error, "RMS": self.rms_error, "at the end": self.final_error}
         columns = {name: np.abs(values[~self.failed]) for name, values in known.items() if values is not None}
-        rows = [
-            (
-                joint.name,
-                *(f"{np.max(values[:, i], initial=0.0):.3g}" for values in columns.values()),
-                joint_unit([not joint.is_revolute]),
-            )
-            for i, joint in enumerate(self.arms[0].joints)
-        ]
+        rows = []
+        for i, joint in enumerate(self.arms[0].joints):
+            largest = [f"{np.max(values[:, i], initial=0.0):.3g}" for values in columns.values()]
+            rows.append((joint.name, *largest, joint_unit([not joint.is_revolute])))
         headings = ("joint", *columns, "")
         align = "l" + "r" * len(columns) + "l"
         title = f"{len(self)} x {self.arms[0].name}: {', '.join([span_text(self.t), *self._remarks])}"

@@ -105,21 +105,25 @@ class Comparison:
         if style not in STYLES:
             raise ValueError(f"style is {style!r}; expected one of {', '.join(STYLES)}")
         headings, rows = self.rows()
+        lines = [headings, *rows]
         if style == "markdown":
-            lines = [headings, ("---",) * len(headings), *rows]
-            return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+            ruled = [headings, ("---",) * len(headings), *rows]
+            return "\n".join(f"| {' | '.join(line)} |" for line in ruled)
         if style == "latex":
-            body = [" & ".join(cell.replace("%", r"\%") for cell in line) + r" \\" for line in (headings, *rows)]
+            body = []
+            for line in lines:
+                cells = [cell.replace("%", r"\%") for cell in line]
+                body.append(" & ".join(cells) + r" \\")
             begin = rf"\begin{{tabular}}{{l{'r' * (len(headings) - 1)}}}"
             return "\n".join([begin, body[0], r"\hline", *body[1:], r"\end{tabular}"])
-        widths = [max(len(line[k]) for line in (headings, *rows)) for k in range(len(headings))]
+        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
 
         def aligned(line: Sequence[str]) -> str:
             cells = zip(line[1:], widths[1:], strict=True)
             return "  ".join([line[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in cells)])
 
         failed = [f"{name}: {reason}" for name, reason in self.failures.items()]
-        return "\n".join([*(aligned(line) for line in (headings, *rows)), *failed])
+        return "\n".join([*map(aligned, lines), *failed])
 
     def __str__(self) -> str:
         return self.table()
@@ -203,7 +207,8 @@ def compare(
             _require_known(given)
     wanted = reference_of(description, reference)
     middle = wanted.sampled(np.array([(wanted.duration or 0.0) / 2]))[0][0]
-    results, failures = {}, {}
+    results = {}
+    failures = {}
     for name, given in chosen.items():
         try:
             controller: Any = given

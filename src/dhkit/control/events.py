@@ -140,8 +140,10 @@ def _beyond_between(plant: Plant, state: State, later: State) -> float | None:
     h = later.t - state.t
     turns_back = (state.qd * later.qd < 0) & (np.isfinite(lower) | np.isfinite(upper))
     for i in np.flatnonzero(turns_back):
-        q0, q1 = state.q[i], later.q[i]
-        v0, v1 = h * state.qd[i], h * later.qd[i]
+        q0 = state.q[i]
+        q1 = later.q[i]
+        v0 = h * state.qd[i]
+        v1 = h * later.qd[i]
         cubic = np.array([2 * (q0 - q1) + v0 + v1, 3 * (q1 - q0) - 2 * v0 - v1, v0, q0])
 
         # The joint is farthest where its rate is 0.

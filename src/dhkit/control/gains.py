@@ -127,5 +127,6 @@ def gains_text(**gains: Array) -> str:
 def _range_text(values: Array) -> str:
     if values.ndim > 1:
         return f"of shape {values.shape}"
-    least, most = float(np.min(values)), float(np.max(values))
+    least = float(np.min(values))
+    most = float(np.max(values))
     return f"{least:.4g}" if least == most else f"{least:.4g} to {most:.4g}"

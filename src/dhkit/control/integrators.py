@@ -86,7 +86,8 @@ class RungeKutta:
         kernel = self.plant.step_kernel
         if kernel is None or phase.pushes or phase.contact.holds.any():
             return self._stages(state, phase, end)
-        q, qd = state.q, state.qd
+        q = state.q
+        qd = state.qd
         works = np.array([[state.drive_work, 0.0, state.friction_work]])
         into = (np.empty((1, len(q))), np.empty((1, len(q))), np.empty((1, 3)))
         kernel.with_length(end - state.t)((q[None], qd[None], works), self.tau[None], into)
@@ -95,23 +96,28 @@ class RungeKutta:
 
     def _stages(self, state: State, phase: Phase, end: float) -> State:
         """Return the state at ``end`` from accelerations of the plant under an unchanged contact."""
-        plant, tau = self.plant, self.tau
+        plant = self.plant
+        tau = self.tau
         h = end - state.t
 
         def acceleration(q: Array, v: Array) -> Array:
             return plant.constrained_accelerations(q, v, tau, phase.contact, phase.pushes)
 
         # Stages k = 1 ... 4 of the state (q, qd), with rates v_k and accelerations a_k.
-        q1, v1 = state.q, state.qd
+        q1 = state.q
+        v1 = state.qd
         a1 = phase.qdd
 
-        q2, v2 = q1 + h / 2 * v1, v1 + h / 2 * a1
+        q2 = q1 + h / 2 * v1
+        v2 = v1 + h / 2 * a1
         a2 = acceleration(q2, v2)
 
-        q3, v3 = q1 + h / 2 * v2, v1 + h / 2 * a2
+        q3 = q1 + h / 2 * v2
+        v3 = v1 + h / 2 * a2
         a3 = acceleration(q3, v3)
 
-        q4, v4 = q1 + h * v3, v1 + h * a3
+        q4 = q1 + h * v3
+        v4 = v1 + h * a3
         a4 = acceleration(q4, v4)
 
         q_next = q1 + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
@@ -300,7 +306,8 @@ class DormandPrince:
 
         low = 0.0
         high = LOOK_AHEAD
-        below, above = torques_at(low), torques_at(high)
+        below = torques_at(low)
+        above = torques_at(high)
         largest = max(float(np.abs(below).max()), float(np.abs(above).max()))
         first = float(np.abs(above - below).max())
         least = max(JUMP_SHARE * first, TORQUE_NOISE * largest)

@@ -18,7 +18,9 @@ from dhkit.symbolic import CasadiFunctions
 if TYPE_CHECKING:
     import casadi
 
-ERROR, RATE, ACCELERATION = 0.1, 1.0, 200.0
+ERROR = 0.1
+RATE = 1.0
+ACCELERATION = 200.0
 """Acceptable deviations for the default weights: rad, rad/s and rad/s^2, or m, m/s and m/s^2."""
 
 

@@ -187,16 +187,12 @@ class SimulationResult:
         rms = self.rms_error
         final = self.final_error
         saturated = self.saturated if len(self.saturated) else np.mean(self.tau != self.tau_asked, axis=0)
-        rows = [
-            (
-                joint.name,
-                *(f"{x[i]:.3g}" for x in (peak, rms, final)),
-                joint_unit([not joint.is_revolute]),
-                f"{np.abs(self.tau[:, i]).max():.4g} {'N m' if joint.is_revolute else 'N'}",
-                f"{100 * saturated[i]:.3g} %",
-            )
-            for i, joint in enumerate(joints)
-        ]
+        rows = []
+        for i, joint in enumerate(joints):
+            errors = [f"{error[i]:.3g}" for error in (peak, rms, final)]
+            unit = joint_unit([not joint.is_revolute])
+            largest_torque = f"{np.abs(self.tau[:, i]).max():.4g} {'N m' if joint.is_revolute else 'N'}"
+            rows.append((joint.name, *errors, unit, largest_torque, f"{100 * saturated[i]:.3g} %"))
         headings = ("joint", "largest error", "RMS", "at the end", "", "largest torque", "saturated")
         by = f" under {self.controller}" if self.controller else ""
         return html_block(

@@ -23,7 +23,8 @@ ROWS = ("q", "qd", "qdd", "tau", "tau_asked", "reference_q", "reference_qd")
 POSES = "reference_poses"
 """Name of the array of the reference's poses, stored if they are not those of the arm that moved."""
 ENERGIES = tuple(field.name for field in fields(EnergyAudit))
-AUDIT, SATURATED = "audit_", "saturated"
+AUDIT = "audit_"
+SATURATED = "saturated"
 """Prefix of the names of the energy balance's numbers, and name of the shares of saturation."""
 COMMENTS_LENGTH = 10_000
 """Number of characters of a table that are searched for comments: enough for 40 named numbers of 25 characters."""
@@ -153,15 +154,21 @@ def _shaped(name: str, array: Array, shape: tuple[int, ...]) -> Array:
 
 
 def _columns(n: int) -> tuple[str, ...]:
-    return ("t", *(f"{name}{i}" for name in ROWS for i in range(1, n + 1)))
+    columns = ["t"]
+    for name in ROWS:
+        columns += [f"{name}{i}" for i in range(1, n + 1)]
+    return tuple(columns)
 
 
 def _csv(values: Mapping[str, Array]) -> str:
     n = values["q"].shape[1]
     numbers = [SATURATED, *(f"{AUDIT}{name}" for name in ENERGIES)]
-    comments = tuple(f"{name}: " + " ".join(f"{x:.17g}" for x in np.atleast_1d(values[name])) for name in numbers)
+    comments = []
+    for name in numbers:
+        texts = [f"{x:.17g}" for x in np.atleast_1d(values[name])]
+        comments.append(f"{name}: {' '.join(texts)}")
     rows = np.concatenate([values["t"][:, None], *(values[name] for name in ROWS)], axis=1)
-    return table_text(_columns(n), rows, comments)
+    return table_text(_columns(n), rows, tuple(comments))
 
 
 def _csv_values(text: str, n: int) -> dict[str, Any]:
@@ -177,7 +184,10 @@ def _csv_values(text: str, n: int) -> dict[str, Any]:
 def _comment_values(text: str) -> dict[str, Array]:
     """Return the named numbers in the comments at the head of a table."""
     lines = takewhile(lambda line: line.startswith("#"), text[:COMMENTS_LENGTH].splitlines())
-    stated = {name: numbers for name, _, numbers in (line.removeprefix("# ").partition(":") for line in lines)}
+    stated = {}
+    for line in lines:
+        name, _, numbers = line.removeprefix("# ").partition(":")
+        stated[name] = numbers
     values = {}
     for name in (name for name in SIMULATION.arrays if name not in ("t", POSES, *ROWS)):
         if name not in stated:

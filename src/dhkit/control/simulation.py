@@ -82,7 +82,8 @@ def simulate(
     chosen = SimulationOptions.of(options, keywords)
     require_fits(controller, description)
     moved = chosen.moving(description)
-    rate, plant_rate = chosen.rate, chosen.plant_rate
+    rate = chosen.rate
+    plant_rate = chosen.plant_rate
     followed = _reference_or_hold(description, reference, q0)
     require_positive(duration=duration)
     t = row_times(followed.duration, duration, (plant_rate or ROWS_RATE) if rate is None else rate)

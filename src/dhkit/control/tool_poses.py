@@ -107,7 +107,8 @@ class ToolPoses:
     def sampled(self, t: Array) -> tuple[Array, Array, Array]:
         """Return joint values, rates and accelerations at times (N,), shape (N, n) each."""
         q = np.zeros((len(t), len(self._first))) + self._first
-        qd, qdd = np.zeros_like(q), np.zeros_like(q)
+        qd = np.zeros_like(q)
+        qdd = np.zeros_like(q)
         for k, motion in enumerate(self._motions):
             rows = np.flatnonzero(t >= self._knots[k])
             within = np.minimum(t[rows] - self._knots[k], motion.duration)

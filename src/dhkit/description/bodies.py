@@ -107,19 +107,27 @@ def joined(bodies: Sequence[Body]) -> Body:
     if len(heavy) < 2:
         located = (heavy or bodies)[0]
         return Body(located.mass, located.com, _inertia(tensor), unphysical)
+
+    # With m = sum m_k, s = sum m_k c_k and S(m, l) = m (l^2 1 - l l^T), about the common origin
+    #     J = sum (I_k + S(m_k, c_k)),
+    # and about the common centre of mass c = s / m
+    #     I = J - S(m, c) = J - S(1/m, s).
     mass = Expression.sum(body.mass for body in heavy)
-    coms = [np.array(body.com, dtype=object) for body in heavy]
-    first_moment = sum(
-        (np.array([body.mass * x for x in body.com], dtype=object) for body in heavy), np.full(3, ZERO, dtype=object)
-    )
-    about_origin = sum((_steiner_term(com, body.mass) for com, body in zip(coms, heavy, strict=True)), tensor)
-    com = settled_vector([entry / mass for entry in first_moment])
-    return Body(mass, com, _inertia(about_origin - _steiner_term(first_moment, 1 / mass)), unphysical)
+    first_moment = np.full(3, ZERO, dtype=object)
+    about_origin = tensor
+    for body in heavy:
+        com = np.array(body.com, dtype=object)
+        first_moment = first_moment + com * body.mass
+        about_origin = about_origin + _steiner_term(com, body.mass)
+    common_com = settled_vector([entry / mass for entry in first_moment])
+    inertia = _inertia(about_origin - _steiner_term(first_moment, 1 / mass))
+    return Body(mass, common_com, inertia, unphysical)
 
 
 def rod(mass: Expression, start: Vector, end: Vector) -> Body:
     """Return a thin uniform rod between two points, m: inertia m (l^2 1 - l l^T) / 12 about its middle."""
-    first, last = np.array(start, dtype=object), np.array(end, dtype=object)
+    first = np.array(start, dtype=object)
+    last = np.array(end, dtype=object)
     return Body(mass, settled_vector((first + last) / 2), _inertia(_steiner_term(last - first, mass / 12)))
 
 

@@ -88,7 +88,8 @@ def with_limits(
     ValueError
         Another shape.
     """
-    numbers, n = description.numbers, description.n
+    numbers = description.numbers
+    n = description.n
     own = {"lower": numbers.lower, "upper": numbers.upper, "velocity": numbers.velocity, "torque": numbers.effort}
     new = {"lower": lower, "upper": upper, "velocity": velocity, "torque": torque}
     arrays = {name: own[name] if value is None else one_each(value, name, n) for name, value in new.items()}

@@ -20,7 +20,8 @@ def identity() -> ExactPose:
 def _plane_rotation(first: int, second: int, angle: Expression) -> ExactPose:
     """Return the rotation from the first axis towards the second by an angle, rad."""
     T = identity()
-    c, s = decimals(cos(angle)), decimals(sin(angle))
+    c = decimals(cos(angle))
+    s = decimals(sin(angle))
     T[first, first] = c
     T[first, second] = -s
     T[second, first] = s

@@ -66,15 +66,18 @@ def link_ends(a: Array, d: Array, cos_alpha: Array, sin_alpha: Array, *, is_stan
     end_slope = np.zeros((n + 1, n, 3))
     for i in range(n):
         if is_standard:
-            begin_offset[i + 1], begin_slope[i + 1, i] = offset[i], oblique[i]
+            begin_offset[i + 1] = offset[i]
+            begin_slope[i + 1, i] = oblique[i]
             end_slope[i, i] = _Z
         else:
             begin_slope[i + 1, i] = _Z
-            end_offset[i], end_slope[i, i] = offset[i], oblique[i]
+            end_offset[i] = offset[i]
+            end_slope[i, i] = oblique[i]
 
+    # Ends are begin_offset + begin_slope s and end_offset + end_slope s: a linear least-squares problem in s.
     slopes = (end_slope - begin_slope).transpose(0, 2, 1).reshape(-1, n)
     constants = (end_offset - begin_offset).reshape(-1)
     s = np.linalg.lstsq(slopes, -constants, rcond=None)[0]
-    return LinkEnds(
-        begin_offset + np.einsum("kix,i->kx", begin_slope, s), end_offset + np.einsum("kix,i->kx", end_slope, s)
-    )
+    begin = begin_offset + np.einsum("kix,i->kx", begin_slope, s)
+    end = end_offset + np.einsum("kix,i->kx", end_slope, s)
+    return LinkEnds(begin, end)

@@ -180,7 +180,7 @@ def _with_numbers(
     while names != previous:
         previous = names
         names |= {name for name in values if needs(name, parameters) & names}
-        names |= {other for name in names for other in needs(name, parameters)}
+        names = names.union(*(needs(name, parameters) for name in names))
     known = {name: values[name] for name in names}
     remaining = Named({name: value for name, value in parameters.items() if name not in known})
     fixed = with_values(replace(description, parameters=Named(values)), known)
@@ -340,7 +340,8 @@ def _parallel_axes_row(Y: ExactPose, is_opposite: bool) -> _Row:
 
 def _skew_axes_row(Y: ExactPose, number: Callable[[Expression], float]) -> _Row:
     """Return the row of other axes: beta from the second axis' direction, the rest from its position."""
-    (x, y, z), (u, v, w) = Y[:3, 3], Y[:3, 2]
+    x, y, z = Y[:3, 3]
+    u, v, w = Y[:3, 2]
     if u.is_zero:
         beta = ZERO
         sine = -v

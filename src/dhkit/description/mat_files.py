@@ -20,9 +20,12 @@ from dhkit.description.arrays import Array
 from dhkit.description.bounds import BOUNDS
 from dhkit.errors import DescriptionError
 
-_HEADER_LENGTH, _TAG_LENGTH = 128, 8
-_MATRIX, _COMPRESSED = 14, 15
-"""Element types of a variable, and of a compressed variable."""
+_HEADER_LENGTH = 128
+_TAG_LENGTH = 8
+_MATRIX = 14
+"""Element type of a variable."""
+_COMPRESSED = 15
+"""Element type of a compressed variable."""
 _NUMBER_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 """Element types of numbers as NumPy's; MATLAB stores doubles in the shortest type that holds them exactly."""
 _TEXT_CODES = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
@@ -134,7 +137,10 @@ class _ElementReader:
             _require(len(data) - offset >= _TAG_LENGTH)
             kind, length = struct.unpack_from(f"{self.order}II", data, offset)
             if kind >> 16:  # a small element: length and type share the first word, its data is the second
-                kind, length, start, step = kind & 0xFFFF, kind >> 16, offset + _TAG_LENGTH // 2, _TAG_LENGTH
+                length = kind >> 16
+                kind &= 0xFFFF
+                start = offset + _TAG_LENGTH // 2
+                step = _TAG_LENGTH
                 _require(length <= _TAG_LENGTH // 2)
             else:
                 start = offset + _TAG_LENGTH

@@ -19,7 +19,8 @@ from dhkit.description.bounds import BOUNDS
 from dhkit.description.files import error_reason
 from dhkit.errors import DescriptionError
 
-_STL_HEADER_LENGTH, _STL_FACET_LENGTH = 84, 50
+_STL_HEADER_LENGTH = 84
+_STL_FACET_LENGTH = 50
 """Bytes of a binary STL before its facets (80 of text, 4 of a count), and of each facet."""
 _TEXT_END_LENGTH = 4_096
 """Bytes that are read at the beginning and at the end of a text file."""

@@ -127,7 +127,8 @@ class Numbers:
         theta = angles(j.theta for j in joints)
         lower = array(j.limits[0] if j.limits else -np.inf for j in joints)
         upper = array(j.limits[1] if j.limits else np.inf for j in joints)
-        a, d = array(j.a for j in joints), array(j.d for j in joints)
+        a = array(j.a for j in joints)
+        d = array(j.d for j in joints)
         gear = array(drive.gear if drive else 1.0 for drive in drives)
         prismatic = np.array([not j.is_revolute for j in joints])
         # How far each prismatic joint can move away from zero, m; one without limits adds nothing to the reach.
@@ -182,7 +183,9 @@ class Numbers:
 
 def matrix(placement: Placement, values: dict[str, Expression]) -> Array:
     """Return a placement's transform, shape (4, 4), m; cosines of right angles are exactly 0."""
-    names = {name for entry in (*placement.xyz, *placement.rpy) for name in entry.symbols}
+    names = set[str]()
+    for entry in (*placement.xyz, *placement.rpy):
+        names |= entry.symbols
     return _cached_matrix(placement, tuple((name, value) for name, value in values.items() if name in names)).copy()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dhkit.description.arrays import Array, number_array
 from dhkit.description.bodies import INERTIA_PLACES, eigenvalue_tolerance
@@ -39,21 +40,19 @@ class Payload:
     """Shape (3, 3), about the centre of mass in the tool's axes, kg m^2; None: a point."""
 
     def __post_init__(self) -> None:
-        tensor = np.zeros((3, 3)) if self.inertia is None else self.inertia
-        for name, value, shape in (("mass", self.mass, ()), ("com", self.com, (3,)), ("inertia", tensor, (3, 3))):
-            array = number_array(value, f"payload: {name}", str(shape))
-            if array.shape != shape:
-                raise DescriptionError(f"payload: {name} has shape {array.shape}; expected {shape}")
-            if not np.isfinite(array).all():
-                raise DescriptionError(f"payload: {name} is {value!r}; expected finite numbers")
-            if shape == (3, 3) and is_asymmetric(array):
-                raise DescriptionError("payload: inertia is not symmetric")
-            entries = array.tolist()
-            value = tuple(map(tuple, entries)) if array.ndim == 2 else tuple(entries) if array.ndim else entries
-            object.__setattr__(self, name, None if name == "inertia" and not array.any() else value)
+        given_inertia = np.zeros((3, 3)) if self.inertia is None else self.inertia
+        mass = _checked("mass", self.mass, ())
+        com = _checked("com", self.com, (3,))
+        tensor = _checked("inertia", given_inertia, (3, 3))
+        if is_asymmetric(tensor):
+            raise DescriptionError("payload: inertia is not symmetric")
+        object.__setattr__(self, "mass", mass.item())
+        object.__setattr__(self, "com", tuple(com.tolist()))
+        object.__setattr__(self, "inertia", tuple(map(tuple, tensor.tolist())) if tensor.any() else None)
+
         if self.mass < 0:
             raise DescriptionError(f"payload: mass is {self.mass:g} kg; expected none below 0")
-        moments = np.linalg.eigvalsh(np.array(tensor, dtype=float))
+        moments = np.linalg.eigvalsh(tensor)
         if moments[0] < -eigenvalue_tolerance(float(moments[-1])):
             raise DescriptionError(
                 f"payload: inertia has the eigenvalue {moments[0]:.6g} kg m^2; expected none below 0"
@@ -87,3 +86,13 @@ class Payload:
         return cls(float(numbers[0]), (x, y, z), tuple(map(tuple, tensor.tolist())))
 
     __repr__ = value_line
+
+
+def _checked(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Return a value as finite numbers of a shape, or refuse it in one line."""
+    array = number_array(value, f"payload: {name}", str(shape))
+    if array.shape != shape:
+        raise DescriptionError(f"payload: {name} has shape {array.shape}; expected {shape}")
+    if not np.isfinite(array).all():
+        raise DescriptionError(f"payload: {name} is {value!r}; expected finite numbers")
+    return array

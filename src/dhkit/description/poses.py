@@ -181,7 +181,8 @@ def _from_euler(angles: Array, order: str, degrees: bool) -> Array:
     rotation = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
     for k, axis in enumerate(axes):
         factor = np.zeros((*angles.shape[:-1], 3, 3))
-        i, j = (axis + 1) % 3, (axis + 2) % 3
+        i = (axis + 1) % 3
+        j = (axis + 2) % 3
         factor[..., axis, axis] = 1.0
         factor[..., i, i] = factor[..., j, j] = cosines[..., k]
         factor[..., i, j] = -sines[..., k]

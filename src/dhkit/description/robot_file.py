@@ -161,7 +161,8 @@ class _FormReader:
     def joint(self, number: int, form: JointForm) -> Joint:
         where = f"joint {number}" + (f" ({form.name[:40]})" if form.name else "")
         kind = JointType(form.type)
-        theta, d = form.theta, form.d
+        theta = form.theta
+        d = form.d
         if kind is JointType.REVOLUTE:
             theta = without_variable(theta, number)
         else:

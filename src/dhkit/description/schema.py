@@ -282,7 +282,8 @@ def robot_schema() -> JsonSchema:
     schema = RobotForm.model_json_schema()
     joint, body = (schema["$defs"][form]["properties"] for form in ("JointForm", "BodyForm"))
     schema["properties"]["name"]["pattern"] = f"^{NAME.pattern}$"
-    joint["name"]["pattern"], body["name"]["pattern"] = f"^({NAME.pattern})?$", f"^({BODY_NAME.pattern})?$"
+    joint["name"]["pattern"] = f"^({NAME.pattern})?$"
+    body["name"]["pattern"] = f"^({BODY_NAME.pattern})?$"
     schema["properties"]["configurations"]["propertyNames"] = {"pattern": f"^{NAME.pattern}$"}
     schema["properties"]["parameters"]["propertyNames"] = {"pattern": f"^{PARAMETER_NAME.pattern}$"}
     for key in ("velocity", "effort"):

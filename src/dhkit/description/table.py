@@ -64,25 +64,28 @@ class DHTable:
         units = Units() if symbolic else description.units
         shift = "₋₁" if description.convention is Convention.MODIFIED else ""
         headings = ("joint", "θ", f"d [{units.length}]", f"a{shift} [{units.length}]", f"α{shift}")
-        rows, latex_rows = [], []
+        rows = []
+        latex_rows = []
         for i, joint in enumerate(description.joints, start=1):
             texts = angle(joint.theta), length(joint.d, units), length(joint.a, units), angle(joint.alpha)
-            entries = dict(zip(COLUMNS, texts, strict=True))
-            plain, latex = (
-                [_with_variable(key, entry, joint, variable) for key, entry in entries.items()]
-                for variable in (f"q{i}", f"q_{{{i}}}")
-            )
-            rows.append((f"{i} {joint.name}", *plain))
-            latex_rows.append((str(i), *map(_latex, latex)))
+            row = [f"{i} {joint.name}"]
+            latex_row = [str(i)]
+            for column, text in zip(COLUMNS, texts, strict=True):
+                row.append(_with_variable(column, text, joint, f"q{i}"))
+                latex_row.append(_latex(_with_variable(column, text, joint, f"q_{{{i}}}")))
+            rows.append(tuple(row))
+            latex_rows.append(tuple(latex_row))
         return cls(description.convention, headings, tuple(rows), tuple(latex_rows))
 
     def __str__(self) -> str:
         table = (self.headings, *self.rows)
-        widths = [max(len(row[k]) for row in table) for k in range(len(self.headings))]
-        lines = [
-            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in table
-        ]
-        return "\n".join([f"{self.convention.value} DH", lines[0], "  ".join("-" * w for w in widths), *lines[1:]])
+        widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+        lines = []
+        for row in table:
+            cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=True)]
+            lines.append("  ".join(cells).rstrip())
+        rule = "  ".join("-" * width for width in widths)
+        return "\n".join([f"{self.convention.value} DH", lines[0], rule, *lines[1:]])
 
     def __repr__(self) -> str:
         return repr_line("DHTable", counted(len(self.rows), "joint"), f"{self.convention.value} DH")

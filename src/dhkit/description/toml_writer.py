@@ -58,19 +58,19 @@ def toml_text(description: RobotData) -> str:
             content = {"joints": _array(coupling.joints), "inertia": _entry(coupling.inertia)}
             couplings.append(_table(content))
         document["coupling"] = couplings
-    base, tool = description.base, description.tool
+    base = description.base
+    tool = description.tool
     body = {"body": _body(base.body, units)} if base.body else {}
     if base_content := _placement(base.placement, units) | _shapes(base.shapes, units) | body:
         document["base"] = _table(base_content)
     if tool_content := _placement(tool.placement, units) | _shapes(tool.shapes, units):
         document["tool"] = _table(tool_content)
     if description.configurations:
-        document["configurations"] = _table(
-            {
-                name: _array(_motion(entry, joint, units) for entry, joint in zip(q, description.joints, strict=True))
-                for name, q in description.configurations.items()
-            }
-        )
+        configurations = {}
+        for name, q in description.configurations.items():
+            entries = [_motion(entry, joint, units) for entry, joint in zip(q, description.joints, strict=True)]
+            configurations[name] = _array(entries)
+        document["configurations"] = _table(configurations)
     return tomlkit.dumps(document)
 
 

@@ -29,8 +29,10 @@ SHAPE_LEFT_OUT = "; this shape is left out"
 """End of a line of notes on a shape of the file that a description comes from, which the description does not have."""
 _COLOR = re.compile(r"#[0-9a-fA-F]{6}")
 
-_MAX_TABLE_ANGLE, _MAX_LIMIT_ANGLE = math.tau + 1e-9, 2 * math.tau + 1e-9
-"""rad: larger angles of the table, or joint limits, are probably degrees; see _MAX_DEGREES."""
+_MAX_TABLE_ANGLE = math.tau + 1e-9
+"""Largest angle of a table, rad; a larger one is probably in degrees, see _MAX_DEGREES."""
+_MAX_LIMIT_ANGLE = 2 * math.tau + 1e-9
+"""Largest joint limit, rad; a larger one is probably in degrees, see _MAX_DEGREES."""
 _MAX_DEGREES = 1080.0
 """Largest number that is probably an angle in degrees: three turns; larger ones give no warning."""
 
@@ -72,7 +74,8 @@ def check(description: RobotData) -> tuple[str, ...]:
     for key in ("source", "notes"):
         if control := _CONTROL_CHARACTER.search(getattr(description, key)):
             raise DescriptionError(f"{key}: holds the control character {control.group()!r}; expected plain text")
-    base, tool = description.base, description.tool
+    base = description.base
+    tool = description.tool
     for part, placed in (("base", base), ("tool", tool)):
         _check_placement(placed.placement, f"{part}: ", value)
         warnings += _check_shapes(placed.shapes, part, value, description)

@@ -24,7 +24,8 @@ log = logging.getLogger(__name__)
 
 _RESTARTED_JOINTS = 6
 """Number of joints of arms with finitely many solutions."""
-_STARTS, _MAX_ROUNDS = 32, 8
+_STARTS = 32
+_MAX_ROUNDS = 8
 """Number of random starts in a round of iterations, and largest number of rounds."""
 _CLOSES = 1e-11
 """Error to which a solution closes that iteration finds: share of the reach, and rad."""

@@ -301,7 +301,8 @@ class IKSolutions:
         return np.where(np.any(usable, axis=-1, keepdims=True), chosen, np.nan)
 
     def _choices(self, i: int, value: float) -> list[float]:
-        lower, upper = float(self.lower[i]), float(self.upper[i])
+        lower = float(self.lower[i])
+        upper = float(self.upper[i])
         if np.isnan(value):
             return []
         if self.prismatic[i] or not (np.isfinite(lower) and np.isfinite(upper)):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -41,7 +42,8 @@ from dhkit.model.stl import binary_stl
 from dhkit.model.triangle_mesh import TriangleMesh, joined_meshes
 from dhkit.model.urdf import urdf_text
 
-_ROBOT_FILE, _URDF_FILE = "robot.toml", "robot.urdf"
+_ROBOT_FILE = "robot.toml"
+_URDF_FILE = "robot.urdf"
 _USUAL_SIZES = (0.1, 20.0)
 """Size of an assembly as a share of the arm's length, outside of which a stated unit is probably wrong."""
 
@@ -178,12 +180,14 @@ def import_cad(
     stated = StatedMasses.of(description.n, density, mass, [Path(report) for report in reports])
     pose, pose_note = _export_pose(description, q)
     parts, parts_note = cad_parts(folder, description.n, files=files, simplify=simplify)
-    check_positions({part.name: part.mesh for several in parts.values() for part in several}, str(folder))
+    all_parts = chain.from_iterable(parts.values())
+    check_positions({part.name: part.mesh for part in all_parts}, str(folder))
     assembly, unit_note, is_usual = _in_metres(folder, description, world_to_frames(description, pose), parts, unit)
     notes = [parts_note, pose_note, unit_note if is_usual else f"warning: {unit_note}", *stated.notes]
     notes += distant_part_warnings(assembly)
 
-    meshes, bodies = {}, {}
+    meshes = {}
+    bodies = {}
     to_frames = [_rigid_inverse(T) for T in assembly.frames]
     placed_meshes = dict(assembly.meshes)
     del assembly  # frees the memory of each mesh once it is moved
@@ -232,11 +236,21 @@ def _in_metres(
     folder: Path, description: Description, frames: Array, parts: Mapping[int, Sequence[CadPart]], unit: str | None
 ) -> tuple[Assembly, str, bool]:
     """Return the assembly with meshes in m, a note how their unit was found, and whether its size is usual."""
-    without_unit = {i: [part.mesh for part in several if part.unit is None] for i, several in parts.items()}
-    without_unit = {i: meshes for i, meshes in without_unit.items() if meshes}
-    file_units = sorted({part.unit for several in parts.values() for part in several if part.unit is not None})
-    found_unit = unit or (unit_of(Assembly(description, frames, without_unit, str(folder))) if without_unit else "m")
-    meshes = {i: [part.in_metres(unit, found_unit) for part in several] for i, several in parts.items()}
+    units = {part.unit for part in chain.from_iterable(parts.values())}
+    file_units = sorted(known for known in units if known is not None)
+    without_unit = {}
+    for i, several in parts.items():
+        if meshes_without_unit := [part.mesh for part in several if part.unit is None]:
+            without_unit[i] = meshes_without_unit
+
+    # The option's unit, else the one in which the parts without a unit of their own are as large as the arm.
+    found_unit = unit or "m"
+    if unit is None and without_unit:
+        found_unit = unit_of(Assembly(description, frames, without_unit, str(folder)))
+
+    meshes = {}
+    for i, several in parts.items():
+        meshes[i] = [part.in_metres(unit, found_unit) for part in several]
     assembly = Assembly(description, frames, meshes, str(folder))
     listed = " and ".join(f"{file_unit:g} m" for file_unit in file_units)
     if unit is None and file_units:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import cast
 
@@ -135,7 +136,7 @@ def assign_parts(
     _check_stated(stated, names, links, where)
     left_out = tuple(stated.pop(LEFT_OUT, ()))
     names = [name for name in names if name not in left_out]
-    mapped = {name for several in stated.values() for name in several}
+    mapped = set(chain.from_iterable(stated.values()))
     numbers = {name: link_number(Path(name).stem if suffixes else name) for name in names if name not in mapped}
     first = names[0] if names else "forearm.stl"
     names_found = f"; found {_name_list(names)}; "

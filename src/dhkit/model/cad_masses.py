@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -63,7 +64,7 @@ class StatedMasses:
             if value is not None and not (np.isfinite(value) and value > 0):
                 raise ModelError(f"{what} is {value:g}; expected a positive number")
         reported: dict[int, ReportedMass] = {}
-        for part in (part for path in reports for part in read_mass_report(path)):
+        for part in chain.from_iterable(map(read_mass_report, reports)):
             number = link_number(part.part)
             if number is None:
                 raise ModelError(f"{part.source}: part {part.part[:60]!r} has no link number; expected such as link3")

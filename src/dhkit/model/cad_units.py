@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -66,7 +67,7 @@ class Assembly:
     @property
     def size(self) -> float:
         """The diagonal of the box around all meshes, in their unit."""
-        low, high = common_bounds(mesh for meshes in self.meshes.values() for mesh in meshes)
+        low, high = common_bounds(chain.from_iterable(self.meshes.values()))
         return float(np.linalg.norm(high - low))
 
     @property
@@ -154,7 +155,8 @@ def _check_other_units(assembly: Assembly, unit: str, sizes: str) -> None:
 
     This happens with a small arm on a large base, or with a large tool: it seems a large arm in a smaller unit.
     """
-    length, size = assembly.arm_length, assembly.size
+    length = assembly.arm_length
+    size = assembly.size
     allowed = _MAX_MEAN_AXIS_DISTANCE * length
     if assembly.description.n < _MIN_DECISIVE_AXES or assembly.mean_axis_distance(UNITS[unit]) <= allowed:
         return
@@ -176,7 +178,8 @@ def check_size(assembly: Assembly) -> None:
     ModelError
         Names the option that states the unit.
     """
-    length, size = assembly.arm_length, assembly.size
+    length = assembly.arm_length
+    size = assembly.size
     if length and not _SIZE_RANGE[0] <= size / length <= _SIZE_RANGE[1]:
         raise ModelError(
             f"{assembly.where}: by the unit that the files state the assembly is {size:.4g} m across, the arm of the "

@@ -172,7 +172,9 @@ def _consistently_oriented(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     first = order[pairs]
     second = order[pairs + 1]
     is_alike = (edges[first, 0] == edges[second, 0]).astype(np.int64)
-    f, g = first % m, second % m
+    # Triangles f and g share an edge.
+    f = first % m
+    g = second % m
     labels = component_labels(
         np.concatenate([f, f + m]), np.concatenate([g + is_alike * m, g + (1 - is_alike) * m]), 2 * m
     )

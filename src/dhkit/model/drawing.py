@@ -21,23 +21,28 @@ from dhkit.expressions import Expression, exact
 Solid: TypeAlias = tuple[Geometry, Array]
 """A geometry and its pose in its link's DH frame, shape (4, 4), m."""
 
-_FIRST_DRUM_RADIUS, _LAST_DRUM_RADIUS = 0.05, 0.028
+_FIRST_DRUM_RADIUS = 0.05
+_LAST_DRUM_RADIUS = 0.028
 """Radius of the first and of the last drum, relative to the reach: arms taper."""
 _TUBE_RADIUS = 0.62
 """Radius of a tube, relative to the smaller drum at its ends, so that drums stay visible."""
 _DRUM_HALF_HEIGHT = 0.9
 """Half the height of a drum, relative to its radius: the tube, which is narrower, ends inside the drum."""
-_HUB_RADIUS, _HUB_HALF_LENGTH = 0.8, 1.2
+_HUB_RADIUS = 0.8
+_HUB_HALF_LENGTH = 1.2
 """Radius and half length of a hub, relative to its drum: slimmer, and visible at both faces."""
-_NESTED_RADIUS, _NESTED_HALF_HEIGHT = 0.78, 1.25
+_NESTED_RADIUS = 0.78
+_NESTED_HALF_HEIGHT = 1.25
 """Radius and half height of a drum relative to the previous drum about the same point: all of them stay visible."""
 _MAX_FIRST_DRUM_HALF = 0.3
 """Half the height of the first drum, at most, relative to the height of the next axis: the drum stays below it."""
 _BLOCK_HALF_LENGTH = 1.3
 """Half the length of a slider's block, relative to its half width."""
-_BAR_HALF_WIDTH, _STOP_HALF_WIDTH = 0.55, 0.8
+_BAR_HALF_WIDTH = 0.55
+_STOP_HALF_WIDTH = 0.8
 """Half widths of a slider's bar and of the stops at a rail's ends, relative to the block's."""
-_PLATE_RADIUS, _POST_HEIGHT = 1.8, 2.0
+_PLATE_RADIUS = 1.8
+_POST_HEIGHT = 2.0
 """Radius of the foot's plate and height of the post below a drum at frame 0, relative to the drum's radius."""
 _THICKNESS = 0.25
 """Thickness of plates and stops, relative to the radius of the drum or the half width of the block."""
@@ -122,7 +127,8 @@ def _links(description: Description) -> list[_Link]:
 
 def _joints(description: Description, links: Sequence[_Link]) -> list[_Joint]:
     """Return the sizes of joints 1 to n."""
-    numbers, n = description.numbers, description.n
+    numbers = description.numbers
+    n = description.n
     scale = max(description.reach, float(np.linalg.norm(numbers.T_last_tool[:3, 3]))) or 1.0
     taper = _LAST_DRUM_RADIUS - _FIRST_DRUM_RADIUS
     joints: list[_Joint] = []
@@ -204,7 +210,8 @@ class Drawing:
         """Draw the neck between the last link and the gripper, in DH frame n."""
         if self.far_ends is not None:
             return
-        radius, T_end_gripper, root = _TUBE_RADIUS * self.joints[-1].radius, *self._gripper_place()
+        radius = _TUBE_RADIUS * self.joints[-1].radius
+        T_end_gripper, root = self._gripper_place()
         offset = self.T_last_tool[:3, 3]
         length = float(np.linalg.norm(offset))
         if length > _MIN_NECK_LENGTH * radius:
@@ -214,7 +221,9 @@ class Drawing:
 
     def gripper(self) -> Iterator[Solid]:
         """Draw a flange and two fingers at the tool's origin, in DH frame n."""
-        size, T, root = self.joints[-1].radius, *self._gripper_place()
+        size = self.joints[-1].radius
+        T, root = self._gripper_place()
+
         yield _cylinder(T, 0.9 * size, root, root + 0.3 * size)
         yield _box(T, (1.05 * size, 0.45 * size), root + 0.3 * size, root + 0.7 * size)
         for side in (-0.85, 0.85):
@@ -225,14 +234,20 @@ class Drawing:
 
         An arm may end inside its last drum: then the gripper begins outside of it.
         """
-        before, last, joint = *self.links[-2:], self.joints[-1]
+        before, last = self.links[-2:]
+        joint = self.joints[-1]
         T = self.T_last_tool
         length = abs(last.d) + abs(last.a) + float(np.linalg.norm(T[:3, 3]))
         root = max(0.0, _GRIPPER_START * joint.extent - length)
         if last.d or not np.array_equal(T, _IDENTITY):
             return T, root
+
+        # Without a tool and an offset d, the gripper points along the common normal, away from the arm.
         a = last.a or (before.a if before.is_parallel and not joint.prismatic else 0.0)
-        return (_about_z(0.0 if a > 0 else np.pi) @ _ALONG_X if a else T), root
+        if not a:
+            return T, root
+        heading = 0.0 if a > 0 else np.pi
+        return _about_z(heading) @ _ALONG_X, root
 
 
 def _own_joint_solids(link: _Link, joint: _Joint, tube: float) -> Iterator[Solid]:

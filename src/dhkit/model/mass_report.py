@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,10 @@ _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _PRODUCT_SIGN = re.compile(r"#\s*products\s*=\s*([-+])\s*integral\s*", re.IGNORECASE)
 _MASSES = {"kg": 1.0, "g": 1e-3, "lb": 0.45359237}
 """Mass units by name, kg."""
-_MOMENTS = {f"{m} {l}^2": mass * length**2 for m, mass in _MASSES.items() for l, length in UNITS.items()}  # noqa: E741
+_MOMENTS = {
+    f"{mass_unit} {length_unit}^2": mass * length**2
+    for (mass_unit, mass), (length_unit, length) in product(_MASSES.items(), UNITS.items())
+}
 """Units of moments of inertia by name, kg m^2."""
 _EXAMPLE = "link,mass [kg],com_x [mm],com_y [mm],com_z [mm],Ixx [kg mm^2],Iyy [kg mm^2],..."
 
@@ -128,7 +132,9 @@ def _column_factors(where: str, cells: Sequence[str]) -> dict[str, float]:
 
 
 def _known_units(column: str) -> Mapping[str, float]:
-    return _MASSES if column == "mass" else UNITS if column.startswith("com") else _MOMENTS
+    if column == "mass":
+        return _MASSES
+    return UNITS if column.startswith("com") else _MOMENTS
 
 
 def _table_part(where: str, cells: Sequence[str], factors: Mapping[str, float], sign: str | None) -> ReportedMass:

@@ -84,7 +84,8 @@ def _field_letter(match: re.Match[str]) -> str:
 def _mesh(
     part: str, faces_field: MatVariable, vertices_field: MatVariable, colours: MatVariable | None
 ) -> TriangleMesh:
-    faces, vertices = _matrix(faces_field), _matrix(vertices_field)
+    faces = _matrix(faces_field)
+    vertices = _matrix(vertices_field)
     if faces is None or vertices is None:
         raise ModelError(f"{part}: its {'faces' if faces is None else 'vertices'} are not a matrix of real numbers")
     if vertices.shape[1] not in (3, 4):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import io
 import re
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -155,7 +156,7 @@ def _obj_mesh(content: bytes) -> TriangleMesh:
         polygons = _obj_polygons(content, len(vertices))
     except ValueError as error:
         raise ModelError(f"{' '.join(str(error).split())[:80]}; expected a number") from None
-    corners = np.array([corner for polygon in polygons for corner in polygon], dtype=np.intp)
+    corners = np.array(list(chain.from_iterable(polygons)), dtype=np.intp)
     counts = np.array([len(polygon) for polygon in polygons], dtype=np.intp)
     return TriangleMesh(vertices, triangles_of(vertices, corners, counts))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from itertools import chain
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -115,7 +116,7 @@ def shape_inertia(
     closed_meshes, methods, repairs = zip(*map(_closed, meshes), strict=True)
     whole, turning_notes = outwards(joined_meshes(closed_meshes))
     method = next(method for method in reversed(InertiaMethod) if method in methods)
-    notes = tuple(dict.fromkeys([*(note for notes in repairs for note in notes), *turning_notes]))
+    notes = tuple(dict.fromkeys(chain(*repairs, turning_notes)))
     volume, com, covariance = _moments(whole)
     if volume <= MIN_VOLUME * whole.size**3:
         raise ModelError(f"the mesh encloses no volume ({volume:.3g} m^3); expected a solid")

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 from typing import TypeAlias
 
@@ -78,7 +79,7 @@ def link_parts(description: Description) -> tuple[Part, ...]:
     """
     described, drawn = _parts(description)
     parts = [own or others for own, others in zip(described, drawn, strict=True)]
-    return tuple(part for link in parts for part in link)
+    return tuple(chain.from_iterable(parts))
 
 
 MeshVersions: TypeAlias = tuple[Path | None, tuple[tuple[int, int, int] | None, ...]]
@@ -100,7 +101,8 @@ def mesh_versions(description: Description) -> MeshVersions:
 def _mesh_paths(description: Description) -> tuple[str, ...]:
     """Return the paths of a robot's meshes, as its shapes name them."""
     own = (description.base.shapes, *(joint.shapes for joint in description.joints), description.tool.shapes)
-    meshes = [shape.geometry for shapes in own for shape in shapes if isinstance(shape.geometry, Mesh)]
+    geometries = [shape.geometry for shape in chain.from_iterable(own)]
+    meshes = [geometry for geometry in geometries if isinstance(geometry, Mesh)]
     return tuple(dict.fromkeys(mesh.path.replace("\\", "/") for mesh in meshes))
 
 
@@ -119,18 +121,18 @@ def links_without_shapes(description: Description) -> tuple[int, ...]:
 
 
 def missing_shapes(description: Description) -> tuple[str, ...]:
-    """Return, in words, the shapes that an arm has and its parts do not: of meshes that cannot be read.
+    """Return, in words, the shapes that are missing from an arm's parts because their meshes cannot be read.
 
-    Beside those of the description these are shapes of the file that it comes from, which its notes name.
+    They are shapes of the description, and those of the file that it comes from, which its notes name.
     """
     places = ["the base", *(f"link {i + 1}" for i in range(description.n)), "the tool"]
     own = (description.base.shapes, *(joint.shapes for joint in description.joints), description.tool.shapes)
-    found = [
-        f"mesh {shape.geometry.path!r} of {place}, which cannot be read"
-        for place, shapes in zip(places, own, strict=True)
-        for shape in shapes
-        if isinstance(shape.geometry, Mesh) and _mesh_file(description, shape.geometry) is None
-    ]
+    found = []
+    for place, shapes in zip(places, own, strict=True):
+        for shape in shapes:
+            mesh = shape.geometry
+            if isinstance(mesh, Mesh) and _mesh_file(description, mesh) is None:
+                found.append(f"mesh {mesh.path!r} of {place}, which cannot be read")
     return (*found, *shapes_left_out(description.notes))
 
 

@@ -40,7 +40,8 @@ _LENGTH_UNITS = {"millimeters": 1e-3, "centimeters": 1e-2, "meters": 1.0, "inche
 _ENTRY_NAMES = [["xx", "xy", "xz"], ["yx", "yy", "yz"], ["zx", "zy", "zz"]]
 _MAX_MISFIT_RATIO = 0.2
 """The sign is decided if one tensor's misfit to another block is below this share of the other tensor's misfit."""
-_WARNED_ROUNDING, _MAX_ROUNDING = 1e-3, 0.05
+_WARNED_ROUNDING = 1e-3
+_MAX_ROUNDING = 0.05
 """Half a unit of the last decimal above which a warning is given, and above which the report is refused.
 
 Relative to the mass, the largest moment, and, for the centre of mass, the radius of gyration."""
@@ -179,7 +180,8 @@ class _ReportReader:
         if missing := [name for row in _ENTRY_NAMES for name in row if name not in entries]:
             raise self._error(f"no {letter}{missing[0]}; expected nine entries {letter}xx ... {letter}zz", block)
         numbers = np.array([[entries[name] for name in row] for row in _ENTRY_NAMES])
-        listed, half = unit * numbers[..., 0], unit * numbers[..., 1]
+        listed = unit * numbers[..., 0]
+        half = unit * numbers[..., 1]
         if np.any(np.abs(listed - listed.T) > 2 * (half + half.T)):
             raise self._error(f"{letter}xy and {letter}yx differ; expected a symmetric tensor", block)
         return (listed + listed.T) / 2, half

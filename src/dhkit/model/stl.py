@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -52,7 +53,8 @@ def ascii_corners(content: bytes) -> Array:
     try:
         numbers = coordinates(vertices)
     except ValueError as error:
-        if comma := next((text for row in vertices for text in row if _DECIMAL_COMMA.fullmatch(text)), None):
+        comma = next(filter(_DECIMAL_COMMA.fullmatch, chain.from_iterable(vertices)), None)
+        if comma:
             raise ModelError(
                 f"found {comma[:20].decode()!r}: decimal commas are not read; export 1.5 for 1,5"
             ) from None
@@ -68,7 +70,7 @@ def coordinates(rows: Sequence[tuple[bytes, bytes, bytes]]) -> Array:
     ValueError
         A text that is not a number.
     """
-    for text in (text for row in rows for text in row):
+    for text in chain.from_iterable(rows):
         if len(text) > BOUNDS.coordinate_characters or b"_" in text:
             raise ValueError(f"found {text[:20].decode('ascii', 'replace')!r}, {len(text)} characters long")
     return np.array(rows, dtype=f"S{BOUNDS.coordinate_characters}").astype(np.float64).reshape(-1, 3)

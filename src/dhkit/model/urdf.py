@@ -211,7 +211,8 @@ def _add_joint(robot: _Element, description: Description, i: int) -> None:
     _child(element, "child", link=f"link{i}")
     _child(element, "axis", xyz="0 0 1")
     free = math.tau if joint.is_revolute else max(1.0, description.reach)
-    lower, upper = numbers.lower[k], numbers.upper[k]
+    lower = numbers.lower[k]
+    upper = numbers.upper[k]
     _child(
         element,
         "limit",

@@ -26,7 +26,8 @@ Side: TypeAlias = Literal["freeze", "drop"]
 JointNames: TypeAlias = tuple[str, ...]
 """Names of the moving joints of a chain, from the base to the tip."""
 
-BASE_FRAME, TIP_FRAME = "dhkit:base", "dhkit:tip"
+BASE_FRAME = "dhkit:base"
+TIP_FRAME = "dhkit:tip"
 """Links that are added for Pinocchio: links and joints of a URDF may share a name, these names are unique."""
 _CONVENTIONAL_TIPS = ("tool", "tool0")
 """Names of tool frames: dhkit's own, and that of ROS-Industrial's robots (REP 199)."""
@@ -212,7 +213,11 @@ def only_tip(tree: UrdfTree, base: str) -> str | None:
 
 def _mimic_chains(tree: UrdfTree, base: str) -> set[JointNames]:
     """Return the chains to leaves with joints that follow others, such as fingers; :func:`chain_tips` omits them."""
-    return {_names(joints) for _, joints in _leaves(tree, base) if any(joint.mimics is not None for joint in joints)}
+    chains = set()
+    for _, joints in _leaves(tree, base):
+        if any(joint.mimics is not None for joint in joints):
+            chains.add(_names(joints))
+    return chains
 
 
 def _leaves(tree: UrdfTree, base: str | None) -> Iterator[tuple[str, tuple[UrdfJoint, ...]]]:
@@ -355,8 +360,9 @@ def _notes(
         notes.append(f"links after joints off the chain left out: {_shortened(sorted(dropped), 300)}")
     if base != tree.root:
         notes.append(f"the world is link {base!r}, with the joints between it and the root {tree.root!r} at zero")
-    massless = [group[0] for group in groups[1:] if not any(tree.links[link].inertial is not None for link in group)]
-    if massless and any(link.inertial is not None for link in tree.links.values()):
+    with_mass = {name for name, link in tree.links.items() if link.inertial is not None}
+    massless = [group[0] for group in groups[1:] if with_mass.isdisjoint(group)]
+    if massless and with_mass:
         notes.append(f"links without <inertial> are bodies of mass 0: {_shortened(massless, 300)}")
     return notes
 
@@ -433,8 +439,9 @@ def chain_text(chain: Chain) -> str:
 
 
 def _remove_all(parent: Element, *tags: str) -> None:
-    for element in [element for tag in tags for element in parent.findall(tag)]:
-        parent.remove(element)
+    for tag in tags:
+        for element in parent.findall(tag):
+            parent.remove(element)
 
 
 def _remove_prefixed(element: Element) -> None:

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import ROUND_DOWN, ROUND_HALF_EVEN, Decimal
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -85,7 +86,8 @@ class _UrdfReader:
 
     def tree(self, robot: Element) -> UrdfTree:
         """Return the checked tree."""
-        link_elements, joint_elements = _by_name(robot, "link"), _by_name(robot, "joint")
+        link_elements = _by_name(robot, "link")
+        joint_elements = _by_name(robot, "joint")
         parents = _parent_joints(link_elements, joint_elements)
         root, members = _largest_tree(link_elements, joint_elements, parents)
         left_out = tuple(name for name in link_elements if name not in members)
@@ -93,11 +95,12 @@ class _UrdfReader:
         joint_elements = {
             name: element for name, element in joint_elements.items() if child_name(element, "child") in members
         }
-        colors = {
-            name: color
-            for material in robot.findall("material")
-            if (name := material.get("name")) and (color := _color(material))
-        }
+        colors = {}
+        for material in robot.findall("material"):
+            name = material.get("name")
+            color = _color(material)
+            if name and color:
+                colors[name] = color
         joints = {name: self._joint(ElementName("joint", name), element) for name, element in joint_elements.items()}
         for joint in joints.values():
             if joint.mimics is not None and joint.mimics not in joints:
@@ -210,7 +213,8 @@ class _UrdfReader:
         if lower is None and upper is None:
             self._warn(name, ": no limits; read as unlimited")
             return None
-        low, high = lower or 0.0, upper or 0.0
+        low = lower or 0.0
+        high = upper or 0.0
         if low == high == 0:
             self._warn(name, ": limits [0, 0]; read as unlimited")
             return None
@@ -349,7 +353,7 @@ def _largest_tree(
         for link in reached:  # grows while it is traversed
             reached += children.get(link, ())
         trees[root] = set(reached)
-    in_a_tree = {link for tree in trees.values() for link in tree}
+    in_a_tree = set(chain.from_iterable(trees.values()))
     if in_a_circle := [link for link in links if link not in in_a_tree]:
         raise ModelError(f"links {', '.join(in_a_circle)[:200]} go round in a circle; expected a tree")
     root = max(trees, key=lambda link: len(trees[link]))
@@ -387,7 +391,7 @@ def _designed_angle(word: str, value: float) -> float:
     if multiple and _is_rounding_of_zero(value - multiple, rel_tol=1e-5):
         return multiple
     decimal = Decimal(word)
-    digits, exponent = decimal.as_tuple().digits, decimal.as_tuple().exponent
+    _, digits, exponent = decimal.as_tuple()
     if len(digits) < _MIN_DIGITS or not isinstance(exponent, int) or abs(multiple) > math.tau + 1e-9 or exponent > 0:
         return value
     unit = Decimal(1).scaleb(exponent)
@@ -423,7 +427,11 @@ def _is_rounding_of_zero(value: float, rel_tol: float = 1e-3) -> bool:
 @lru_cache(maxsize=1)
 def _rounding_errors() -> tuple[float, ...]:
     """Return the differences of right angles and their decimals, rounded and cut, rad."""
-    right_angles = [k * math.pi / 2 for k in range(1, 5)]
-    rounded = {abs(round(right, k) - right) for right in right_angles for k in _ROUNDED_DECIMALS}
-    cut = {abs(math.floor(right * 10**k) / 10**k - right) for right in right_angles for k in _ROUNDED_DECIMALS}
-    return tuple(error for error in rounded | cut if error < 2e-4)
+    errors = set()
+    for quarter_turns in range(1, 5):
+        right = quarter_turns * math.pi / 2
+        for decimals in _ROUNDED_DECIMALS:
+            rounded = round(right, decimals)
+            cut = math.floor(right * 10**decimals) / 10**decimals
+            errors |= {abs(rounded - right), abs(cut - right)}
+    return tuple(error for error in errors if error < 2e-4)
