@@ -52,7 +52,10 @@ def listed(values: Iterable[float]) -> str:
 def counted(count: float, noun: str) -> str:
     """Return a count with its noun, such as ``1 pose``, ``2 branches`` and ``2.5 points``."""
     number = str(int(count)) if float(count).is_integer() else f"{count:.4g}"
-    return f"{number} {noun}" if count == 1 else f"{number} {noun}{'es' if noun.endswith(('ch', 'sh')) else 's'}"
+    if count == 1:
+        return f"{number} {noun}"
+    ending = "es" if noun.endswith(("ch", "sh")) else "s"
+    return f"{number} {noun}{ending}"
 
 
 def repr_line(kind: str, name: str = "", summary: str = "") -> str:

@@ -88,7 +88,8 @@ def has_spherical_wrist(axes: JointAxes) -> bool:
 
 def _wrist_centre(axes: JointAxes) -> Array | None:
     """Return the point where the last three axes meet, shape (3,), m, world; None if they do not."""
-    directions, points = axes.directions[-3:], axes.points[-3:]
+    directions = axes.directions[-3:]
+    points = axes.points[-3:]
     # Least squares of the distances to the three lines: sum (1 - h h^T) (x - p) = 0.
     projectors = np.eye(3) - directions[:, :, None] * directions[:, None, :]
     centre = np.linalg.lstsq(projectors.sum(axis=0), np.einsum("kij,kj->i", projectors, points), rcond=None)[0]

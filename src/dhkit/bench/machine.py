@@ -71,6 +71,7 @@ class Machine:
     def here(cls) -> Machine:
         """Return the facts of this machine."""
         facts = _cpuinfo()
+        versions = {name: _version(name) for name in PACKAGES}
         present = facts.get("flags", facts.get("Features", "")).split()
         return cls(
             processor=facts.get("model name") or platform.processor() or platform.machine(),
@@ -78,7 +79,7 @@ class Machine:
             flags=tuple(flag for flag in _FLAGS if flag in present),
             system=f"{platform.system()} {platform.machine()}",
             python=f"{platform.python_implementation()} {platform.python_version()}",
-            packages={name: found for name in PACKAGES if (found := _version(name))},
+            packages={name: version for name, version in versions.items() if version},
             kernels=kernel_mode(),
         )
 

@@ -407,10 +407,12 @@ def requirements_text(requirements: Sequence[Requirement]) -> str:
 def _text_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
     """Return the lines of a table for a terminal."""
     lines = [list(columns), *map(list, cells)]
-    widths = [max(len(line[k]) for line in lines) for k in range(len(columns))]
-    return [
-        "  " + "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines
-    ]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    aligned = []
+    for line in lines:
+        padded = [cell.ljust(width) for cell, width in zip(line, widths, strict=True)]
+        aligned.append(f"  {'  '.join(padded)}".rstrip())
+    return aligned
 
 
 def _markdown_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:

@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from enum import Enum, auto
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -312,7 +313,8 @@ def with_long_options(counts: Mapping[str, int | None]) -> type[TyperCommand]:
     class LongOptionCommand(TyperCommand):
         def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
             # A short option ends the words too; other words that begin with one dash are negative numbers.
-            short = {name for option in self.params for name in option.opts if not name.startswith("--")}
+            names = chain.from_iterable(option.opts for option in self.params)
+            short = {name for name in names if not name.startswith("--")}
             return super().parse_args(ctx, _join_option_words(args, counts, short))
 
     return LongOptionCommand

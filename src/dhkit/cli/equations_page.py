@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from html import escape
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from dhkit.description import DHTable
@@ -97,4 +98,4 @@ def _unit(lag: Lagrangian | SymbolicKinematics, name: str) -> str:
 
 
 def _elements(quantities: Sequence[Quantity]) -> list[Any]:
-    return [element for quantity in quantities for element in quantity.elements.flat]
+    return list(chain.from_iterable(quantity.elements.flat for quantity in quantities))

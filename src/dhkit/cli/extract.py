@@ -119,7 +119,8 @@ def _show(extraction: Extraction) -> None:
 
 
 def _facts(extraction: Extraction) -> dict[str, Any]:
-    description, residual = extraction.description, extraction.residual
+    description = extraction.description
+    residual = extraction.residual
     numbers = description.numbers
     return {
         "name": description.name,

@@ -145,7 +145,7 @@ def _mass(link: int, text: str) -> float:
 
 def _files(mapping: Sequence[str]) -> dict[int, list[str]] | None:
     """Read --map: the files of links, and after "-=" those that are left out."""
-    left_out = [match[1] for word in mapping if (match := LEFT_OUT_PAIR.fullmatch(word))]
+    left_out = [match[1] for match in map(LEFT_OUT_PAIR.fullmatch, mapping) if match]
     pairs = _pairs([word for word in mapping if not LEFT_OUT_PAIR.fullmatch(word)], "--map", '"3=forearm.stl"')
     files = {link: _names(text) for link, text in pairs.items()}
     if left_out:

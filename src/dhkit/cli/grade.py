@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -272,7 +273,7 @@ def mark_again(files: Sequence[Path], rubric: Rubric, delivery: Delivery = PRINT
     AnswerError
         There is no such file, format or feedback, or a file has no reports.
     """
-    reports = [report for path in _records(files) for report in read_reports(path)]
+    reports = list(chain.from_iterable(map(read_reports, _records(files))))
     if not reports:
         raise AnswerError(f"{', '.join(map(str, files))}: no reports")
     several = len(reports) > 1

@@ -104,7 +104,8 @@ class Delivery:
         """Mark reports, and print or write them; reports in a folder are printed as well."""
         graded = [Graded(report, marks(report, rubric)) for report in reports]
         level = cast("Feedback", self.feedback or rubric.feedback)
-        form, output = self.form, self.output
+        form = self.form
+        output = self.output
         shown = [one.with_feedback(level) for one in graded]
         if output is not None and _is_folder(output, form, several):
             _write_folder(graded, shown, output)

@@ -142,14 +142,11 @@ def _friction(viscous: float, forwards: float, backwards: float) -> str:
 def _bodies(joint: Joint, arm: Arm) -> list[dict[str, Any]]:
     """Return the name, mass and centre of mass of each body of a link."""
     values = resolved(arm.description.parameters)
-    return [
-        {
-            "name": body.name,
-            "mass_kg": float(substitute(body.mass, values)),
-            "com_m": [float(substitute(x, values)) for x in body.com],
-        }
-        for body in joint.bodies
-    ]
+    bodies = []
+    for body in joint.bodies:
+        com = [float(substitute(x, values)) for x in body.com]
+        bodies.append({"name": body.name, "mass_kg": float(substitute(body.mass, values)), "com_m": com})
+    return bodies
 
 
 def _joint_text(value: float, joint: Joint) -> str:

@@ -229,7 +229,8 @@ def _limits(reached: ReachedPose, k: int) -> str:
 
 
 def _summary(reached: ReachedPose) -> str:
-    solutions, nearest = reached.solutions, reached.nearest
+    solutions = reached.solutions
+    nearest = reached.nearest
     count = int(np.sum(solutions.valid))
     inside = int(np.sum(solutions.allowed))
     if reached.method is Method.CLOSED_FORM:
@@ -242,7 +243,8 @@ def _summary(reached: ReachedPose) -> str:
 
 def _facts(reached: ReachedPose) -> dict[str, Any]:
     """Return the solutions as JSON has them."""
-    solutions, nearest = reached.solutions, reached.nearest
+    solutions = reached.solutions
+    nearest = reached.nearest
     xyz, angles = pose_parts(reached.T, order=reached.order, degrees=reached.degrees)
     branches = [
         {

@@ -307,7 +307,8 @@ def _print_joints(arm: Arm, motion: Trajectory, limits: Limits, degrees: bool) -
     scale = np.where(numbers.prismatic | (not degrees), 1.0, 180 / np.pi)
     rows = []
     for i, joint in enumerate(arm.description.joints):
-        unit = "m" if numbers.prismatic[i] else "°" if degrees else "rad"
+        angle_unit = "°" if degrees else "rad"
+        unit = "m" if numbers.prismatic[i] else angle_unit
         ends = [f"{round(float(scale[i] * q[i]), 4) + 0.0:.4f}" for q in (samples.q[0], samples.q[-1])]
         rows.append((joint.name, *ends, unit, *(column[i] for column in shares)))
     headings = ("joint", "from", "to", "", "largest rate [%]", "largest torque [% of limit]")

@@ -83,7 +83,8 @@ class Adaptive:
         self.description = description_of(robot)
         require_bodies(self.description)
         n = self.description.n
-        self.decay, self.kd = gain(decay, "decay", n), gain(kd, "kd", n)
+        self.decay = gain(decay, "decay", n)
+        self.kd = gain(kd, "kd", n)
         grouping = parameter_grouping(self.description)
         self._columns = list(grouping.columns)
         self.adaptation = _adaptation_gains(adaptation, len(grouping))

@@ -53,7 +53,9 @@ class PID:
         given: object = kp
         if isinstance(given, Description) or hasattr(given, "description"):
             raise TypeError("kp is a robot; expected gains, which PID.tuned(arm) computes")
-        self.kp, self.ki, self.kd = gain(kp, "kp"), gain(ki, "ki"), gain(kd, "kd")
+        self.kp = gain(kp, "kp")
+        self.ki = gain(ki, "ki")
+        self.kd = gain(kd, "kd")
         if derivative not in ("error", "measurement"):
             raise ValueError(f"derivative is {derivative!r}; expected 'error' or 'measurement'")
         self.derivative = derivative

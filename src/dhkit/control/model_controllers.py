@@ -35,7 +35,8 @@ class _Proportional:
         self.description = description_of(robot)
         require_bodies(self.description)
         n = self.description.n
-        self.kp, self.kd = gain(kp, "kp", n), gain(kd, "kd", n)
+        self.kp = gain(kp, "kp", n)
+        self.kd = gain(kd, "kd", n)
         self.batch_shape = batch_of(self.kp, self.kd)
 
     def __repr__(self) -> str:

@@ -83,7 +83,8 @@ class OperationalSpace:
         self.description = description_of(robot)
         require_inertia(self.description)
         n = self.description.n
-        self.kp, self.kd = _tool_gain(kp, "kp"), _tool_gain(kd, "kd")
+        self.kp = _tool_gain(kp, "kp")
+        self.kd = _tool_gain(kd, "kd")
         self.posture_kp = gain(self.kp.mean() if posture_kp is None else posture_kp, "posture_kp", n)
         self.posture_kd = gain(self.kd.mean() if posture_kd is None else posture_kd, "posture_kd", n)
         self.threshold = positive(threshold, "threshold")

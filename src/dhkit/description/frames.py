@@ -165,7 +165,9 @@ def link_transforms(description: Description, q: ArrayLike) -> Array:
         A[..., 1, 1] = cos_theta * cos_alpha
         A[..., 1, 2] = -sin_alpha
         A[..., 1, 3] = -sin_alpha * d
-        A[..., 2, 0], A[..., 2, 1], A[..., 2, 3] = sin_theta * sin_alpha, cos_theta * sin_alpha, cos_alpha * d
+        A[..., 2, 0] = sin_theta * sin_alpha
+        A[..., 2, 1] = cos_theta * sin_alpha
+        A[..., 2, 3] = cos_alpha * d
     A[missing] = np.nan
     return A
 

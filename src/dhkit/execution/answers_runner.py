@@ -35,7 +35,8 @@ from fractions import Fraction
 from types import CodeType, SimpleNamespace
 from typing import Any
 
-REQUESTS, ANSWERS = 3, 4
+REQUESTS = 3
+ANSWERS = 4
 MAX_NAMES = 2_000
 MAX_NODES = 20_000
 """Largest number of nodes of an expression: a PUMA's inverse dynamics in CasADi has 1,100."""

@@ -23,7 +23,8 @@ MAX_FILE_BYTES = 64 << 20
 """Largest file that the program may write, bytes."""
 MAX_OPEN_FILES = 256
 MAX_PROCESSES = 64
-REQUESTS, ANSWERS = 3, 4
+REQUESTS = 3
+ANSWERS = 4
 
 
 def main(arguments: list[str]) -> NoReturn:

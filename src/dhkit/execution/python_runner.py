@@ -17,7 +17,8 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-REQUESTS, ANSWERS = 3, 4
+REQUESTS = 3
+ANSWERS = 4
 FUNCTIONS = ("fk", "ik", "controller")
 
 

@@ -147,7 +147,10 @@ def equal_parts(trees: Sequence[Tree]) -> dict[int, frozenset[int]]:
     for tree in trees:
         for part in parts_of(tree):
             places[texts.of(part)].append(id(part))
-    return {place: frozenset(same) for same in places.values() for place in same}
+    equal_places: dict[int, frozenset[int]] = {}
+    for same in places.values():
+        equal_places |= dict.fromkeys(same, frozenset(same))
+    return equal_places
 
 
 def replaced_everywhere(tree: Tree, places: frozenset[int], new: Tree) -> Tree:

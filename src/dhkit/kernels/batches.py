@@ -109,7 +109,8 @@ def result_array(shape: tuple[int, ...], out: Array | None) -> Array:
     if not isinstance(out, np.ndarray):
         raise ValueError(f"out is {type(out).__name__}; expected an array of shape {shape}, float64")
     if out.shape != shape or out.dtype != np.float64 or not out.flags.c_contiguous or not out.flags.writeable:
-        layout = "C" if out.flags.c_contiguous else "Fortran" if out.flags.f_contiguous else "strided"
+        other_layout = "Fortran" if out.flags.f_contiguous else "strided"
+        layout = "C" if out.flags.c_contiguous else other_layout
         raise ValueError(
             f"out has shape {out.shape}, type {out.dtype} and layout {layout}; expected {shape}, float64, C-contiguous"
             " and writeable"

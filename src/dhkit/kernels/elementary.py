@@ -22,9 +22,13 @@ _ROUND_TO_INTEGER = 6755399441055744.0
 """1.5 x 2^52; adding and subtracting it rounds a double to the nearest integer."""
 _TWO_OVER_PI = 0.6366197723675814
 # pi/2 in three parts. The first two have 33 bits, so that k times them is exact for k up to 2^20.
-_HALF_PI_1, _HALF_PI_2, _HALF_PI_3 = 1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21
+_HALF_PI_1 = 1.57079632673412561417
+_HALF_PI_2 = 6.07710050630396597660e-11
+_HALF_PI_3 = 2.02226624879595063154e-21
 
-_QUARTER_PI, _HALF_PI, _PI = 0.78539816339744830962, 1.57079632679489661923, 3.14159265358979323846
+_QUARTER_PI = 0.78539816339744830962
+_HALF_PI = 1.57079632679489661923
+_PI = 3.14159265358979323846
 _TAN_EIGHTH_PI = 0.41421356237309504880
 
 
@@ -80,7 +84,8 @@ def atan2(y: Any, x: Any, select: Select = select, absolute: Absolute = absolute
 
     The values are vectors, or objects with the same operators and their own ``select`` and ``absolute``.
     """
-    width, height = absolute(x), absolute(y)
+    width = absolute(x)
+    height = absolute(y)
     steep = height > width
     longer = select(steep, height, width)
     shorter = select(steep, width, height)

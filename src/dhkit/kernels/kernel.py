@@ -240,7 +240,8 @@ def _after_fork_in_parent() -> None:
 def _after_fork_in_child() -> None:
     """Make new locks: the child's only thread does not hold the parent's."""
     global _compiling, _deriving
-    _compiling, _deriving = threading.RLock(), threading.RLock()
+    _compiling = threading.RLock()
+    _deriving = threading.RLock()
 
 
 if hasattr(os, "register_at_fork"):

@@ -8,7 +8,8 @@ from typing import TypeAlias
 
 WIDTH = 8
 """Number of doubles of a vector: one register of AVX-512, two of AVX, four of SSE and NEON."""
-VECTOR, _MASK = f"<{WIDTH} x double>", f"<{WIDTH} x i1>"
+VECTOR = f"<{WIDTH} x double>"
+_MASK = f"<{WIDTH} x i1>"
 
 FUSING, EXACT = "contract nsz", "nsz"
 """Liberties for LLVM: fuse products into sums and drop the sign of zero; or the latter alone, so that every operation

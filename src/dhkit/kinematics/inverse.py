@@ -92,7 +92,9 @@ def _with_poses_at_the_boundary(description: Description, found: IKSolutions, po
     flags = found.flags.reshape(-1, B)
     status = found.status_code.ravel()
     distance = found.distance.ravel()
-    q[rows], valid[rows], flags[rows] = refined.q[:, :B], refined.valid[:, :B], refined.flags[:, :B]
+    q[rows] = refined.q[:, :B]
+    valid[rows] = refined.valid[:, :B]
+    flags[rows] = refined.flags[:, :B]
     # What iteration finds beside the branches takes the place of the first.
     by_iteration = np.flatnonzero(refined.valid[:, B] & ~refined.valid[:, :B].any(axis=1))
     for each, others in ((q, refined.q), (valid, refined.valid), (flags, refined.flags)):

@@ -81,7 +81,8 @@ class IKPath:
 
     @property
     def _summary(self) -> str:
-        lost, near = len(self.lost), len(self.near_singular)
+        lost = len(self.lost)
+        near = len(self.near_singular)
         return f"{counted(len(self.switches), 'switch')}, {lost} lost, {near} near a singularity"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Literal
 
@@ -223,7 +224,8 @@ class Assignment:
     @property
     def points(self) -> float:
         """The points of all goals together."""
-        return sum(goal.points for step in self.steps for goal in step.goals)
+        goals = chain.from_iterable(step.goals for step in self.steps)
+        return sum(goal.points for goal in goals)
 
     @classmethod
     def read(cls, path: str | Path) -> Assignment:
@@ -272,7 +274,9 @@ class Assignment:
         return repr_line(f"Assignment {plain(self.title, 60)}", summary=content)
 
     def _repr_html_(self) -> str:
-        rows = [(step.title, f"{goal.points:g}", goal.text) for step in self.steps for goal in step.goals]
+        rows = []
+        for step in self.steps:
+            rows += [(step.title, f"{goal.points:g}", goal.text) for goal in step.goals]
         return html_block(f"{self.title}: {self.arm.name}", html_table(("step", "points", "goal"), rows, align="lrl"))
 
 

@@ -30,7 +30,9 @@ from dhkit.expressions import parse
 from dhkit.lab.tool_panel import EULER_ORDERS
 
 CONDITIONS = ("pose", "joints", "motion", "own")
-MAX_STEPS, MAX_GOALS, MAX_JOINTS = 20, 20, 32
+MAX_STEPS = 20
+MAX_GOALS = 20
+MAX_JOINTS = 32
 MAX_TEXT_LENGTH = 4_000
 """Longest text of a step, characters."""
 MAX_LINE_LENGTH = 200

@@ -258,7 +258,8 @@ class ControlPanel(Panel):
                     frame = 0
                 # A frame lasts no whole number of steps: rounding alike each time would change the speed.
                 self._simulate_frame(live, round((shown + 1) * ratio) - round(shown * ratio))
-                frame, shown = frame + 1, shown + 1
+                frame += 1
+                shown += 1
                 if frame / FRAME_RATE >= 1.0 and delay <= MAX_FRAMES_BEHIND / FRAME_RATE:
                     self._speed = min(1.0, 0.8 * self._speed + 0.2)
                 if time.monotonic() - published > PUBLISH_PERIOD:
@@ -286,7 +287,9 @@ class ControlPanel(Panel):
 
     def _columns(self) -> tuple[str, ...]:
         """Return the names of a sample's numbers: time, errors and torques of the free joints, the tool's error."""
-        return ("t", *(f"{name}{i + 1}" for name in ("e", "tau") for i in self.free), "tool")
+        errors = [f"e{i + 1}" for i in self.free]
+        torques = [f"tau{i + 1}" for i in self.free]
+        return ("t", *errors, *torques, "tool")
 
     def _report_failure(self, live: Live, stop: threading.Event, error: str) -> None:
         """Publish why a run failed, unless the run was stopped or replaced in the meantime."""

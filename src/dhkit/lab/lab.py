@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -107,7 +107,9 @@ class Lab:
             PythonPanel(desk, self._tool, self._motions, self._control),
             self._own,
         )
-        self._requests = {name: handler for panel in self._panels for name, handler in panel.handlers().items()}
+        self._requests: dict[str, Callable[[JsonObject], JsonObject]] = {}
+        for panel in self._panels:
+            self._requests |= panel.handlers()
         desk.publish()
         for panel in self._panels:
             panel.publish()

@@ -131,9 +131,10 @@ class Live:
         self._record((state.t, *state.q, *state.qd, *phase.qdd, *tau, *commanded, *setpoint.q, *setpoint.qd))
         begin = state.t
         end = state.t + 1 / self.rate
-        edges = sorted({edge for push in self._pushes for edge in (push.begin, push.end) if begin < edge < end})
+        edges = {push.begin for push in self._pushes} | {push.end for push in self._pushes}
+        inner_edges = sorted(edge for edge in edges if begin < edge < end)
         integrator = RungeKutta(plant, tau)
-        first_end, *later_ends = [*edges, end]
+        first_end, *later_ends = [*inner_edges, end]
         state = advance(plant, integrator, state, first_end, phase)
         for time in later_ends:
             state = advance(plant, integrator, state, time)

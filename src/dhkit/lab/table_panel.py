@@ -92,7 +92,8 @@ class TablePanel(Panel):
     def elementary_steps(self, fields: Fields) -> JsonObject:
         """Return the frames between a row's four elementary transforms, in the world."""
         row = fields.integer("row", 0, self.desk.arm.n - 1)
-        arm, q = self.desk.arm, self.desk.q
+        arm = self.desk.arm
+        q = self.desk.q
         T = arm.frames(q)[row]
         A = np.eye(4)
         steps = [{"title": f"frame {row}", "T": T.ravel().tolist()}]
@@ -110,7 +111,8 @@ class TablePanel(Panel):
 
     def publish(self) -> None:
         """Send the table to the pages."""
-        table, first = self._table, self._first
+        table = self._table
+        first = self._first
         description = table.description
         numbers = description.numbers
         rows = [
@@ -201,7 +203,8 @@ class TablePanel(Panel):
         table = Table.of(self.desk.arm.description)
         if table.texts != self._table.texts:
             self._first = self._table = table
-            self._undo, self._redo = [], []
+            self._undo = []
+            self._redo = []
         self.publish()
 
 
@@ -225,7 +228,8 @@ def _elementary_transforms(description: Description, q: Array, row: int) -> list
     is_prismatic = bool(numbers.prismatic[row])
     theta = float(numbers.theta[row] + (0.0 if is_prismatic else q[row]))
     d = float(numbers.d[row] + (q[row] if is_prismatic else 0.0))
-    a, alpha = float(numbers.a[row]), float(numbers.alpha[row])
+    a = float(numbers.a[row])
+    alpha = float(numbers.alpha[row])
     about_z = (f"turn about z by {np.degrees(theta):.4g}°", rotation_about(2, theta))
     along_z = (f"move along z by {d:.4g} m", translation_along(2, d))
     along_x = (f"move along x by {a:.4g} m", translation_along(0, a))

@@ -122,7 +122,8 @@ class TaskPanel(Panel):
 
     def _check_motion(self) -> None:
         """Check goals of motions."""
-        motion, excess = self.motions.motion, self.motions.excess
+        motion = self.motions.motion
+        excess = self.motions.excess
         if motion is not None and self._is_assigned_arm:
             self._check(lambda goal: isinstance(goal, MotionBetween) and goal.is_reached(motion, excess))
 

@@ -47,7 +47,9 @@ class Solid:
         vertices = np.array([(a, b, height) for height in (0.0, z) for a, b in bottom])
         sides = [(i, (i + 1) % 4, (i + 1) % 4 + 4, i + 4) for i in range(4)]
         quads = [(0, 3, 2, 1), (4, 5, 6, 7), *sides]
-        faces = [triangle for a, b, c, d in quads for triangle in ((a, b, c), (a, c, d))]
+        faces = []
+        for a, b, c, d in quads:
+            faces += [(a, b, c), (a, c, d)]
         return cls("box", vertices, np.array(faces))
 
     @classmethod

@@ -221,7 +221,8 @@ class _Rays:
 
     def windings(self, chosen: slice, points: Array) -> Array:
         """Return the winding number of some triangles' surface at each point, shape (p,)."""
-        (x0, y0), (x1, y1) = self.low[:, chosen], self.high[:, chosen]
+        x0, y0 = self.low[:, chosen]
+        x1, y1 = self.high[:, chosen]
         corners = self.corners[chosen]
         windings = np.zeros(len(points))
         for i, point in enumerate(points @ _OBLIQUE_ROTATION):

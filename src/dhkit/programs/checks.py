@@ -167,7 +167,8 @@ def _axis_hint(arm: Arm, call: Caller, rng: np.random.Generator) -> tuple[str, .
     for i, joint in enumerate(arm.description.joints):
         moved = q.copy()
         moved[i] += 0.1
-        theirs, start = _pose(call, moved), _pose(call, q)
+        theirs = _pose(call, moved)
+        start = _pose(call, q)
         if theirs is None or start is None or np.linalg.matrix_rank(start) < 4:
             return ()
         ours = arm.fk(moved) @ np.linalg.inv(arm.fk(q))

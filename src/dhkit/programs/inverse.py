@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -215,8 +216,8 @@ class _PoseJudge:
 
 def _branches_part(regular: Sequence[_SolvedPose], most: float) -> Part:
     """Return the part for the share of branches that are found, with the branches that never are."""
-    found = Counter(name for pose in regular for name in pose.branches)
-    missing = Counter(name for pose in regular for name in pose.missing)
+    found = Counter(chain.from_iterable(pose.branches for pose in regular))
+    missing = Counter(chain.from_iterable(pose.missing for pose in regular))
     total = found.total() + missing.total()
     share = found.total() / total if total else 0.0
     never_found = tuple(f"never found: {name}" for name in missing if name not in found) if found else ()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -59,12 +60,14 @@ class CheckReport:
     @property
     def points(self) -> float:
         """Points of all functions."""
-        return round(float(sum(part.points for parts in self.functions.values() for part in parts)), 6)
+        parts = chain.from_iterable(self.functions.values())
+        return round(float(sum(part.points for part in parts)), 6)
 
     @property
     def most(self) -> float:
         """Points that all functions are worth."""
-        return round(float(sum(part.most for parts in self.functions.values() for part in parts)), 6)
+        parts = chain.from_iterable(self.functions.values())
+        return round(float(sum(part.most for part in parts)), 6)
 
     @property
     def full(self) -> bool:

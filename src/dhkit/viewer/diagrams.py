@@ -88,7 +88,8 @@ def torque_diagram(description: Description, tau: Array) -> Diagram:
 
 def draw_diagram(axes: Axes, diagram: Diagram, times: Array) -> None:
     """Draw a diagram's curves over times, shape (N,), s, and the limits that are near them."""
-    low, high = float(diagram.values.min()), float(diagram.values.max())
+    low = float(diagram.values.min())
+    high = float(diagram.values.max())
     span = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-12)
     draw_curves(axes, diagram, times)
     distance = _MAX_LIMIT_DISTANCE * span

@@ -20,7 +20,8 @@ from dhkit.viewer.scene import PICTURE_TRIAD_SHARE, first_configuration, frame_l
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LINK_COLOR, PATH_COLOR = "#3a4252", "#d9480f"
+LINK_COLOR = "#3a4252"
+PATH_COLOR = "#d9480f"
 _FLATNESS = 1e-9
 """Largest extent across a plane, as a share of the arm's size, of an arm that is drawn in that plane."""
 _MIN_EDGE_SHARE = 0.5

@@ -19,7 +19,8 @@ from dhkit.viewer.scene import frame_labels
 COLUMNS = ("theta", "d", "a", "alpha")
 _SAMPLE_RATE = 30.0
 """Samples per second of a motion in a page, Hz; the page draws straight lines between them."""
-_MIN_SAMPLES, _MAX_SAMPLES = 121, 6001
+_MIN_SAMPLES = 121
+_MAX_SAMPLES = 6001
 _LIMIT_SAMPLES = 4_001
 """Samples of a trajectory at which its limits are checked."""
 _DIGITS = 6
@@ -30,7 +31,9 @@ def listed(array: Array | None) -> list[Any] | None:
     """Return an array of any shape as nested lists for JSON, in which infinity and NaN are null."""
     if array is None:
         return None
-    return [listed(row) if np.ndim(row) else (float(row) if np.isfinite(row) else None) for row in array]
+    if array.ndim > 1:
+        return [listed(row) for row in array]
+    return [float(entry) if np.isfinite(entry) else None for entry in array]
 
 
 def table_texts(description: Description) -> tuple[tuple[str, ...], ...]:

@@ -27,7 +27,8 @@ _NOTE = (
 
 def framed_page(page: str, title: str) -> str:
     """Return a page as an element of another page: a frame with scripts, without storage, address or network."""
-    source, name = html.escape(page), html.escape(title)
+    source = html.escape(page)
+    name = html.escape(title)
     frame = f'<iframe sandbox="allow-scripts" srcdoc="{source}" title="{name}" style="{_STYLE}"></iframe>'
     return f'{frame}<p style="margin: 2px 0; opacity: 0.7; font-size: 90%">{_NOTE}</p>'
 

@@ -118,7 +118,9 @@ def ball_transforms(ellipsoid: Ellipsoid, scale: float | None, longest: float) -
     if np.isinf(lengths).any():
         raise ValueError("the ellipsoid is infinite in a direction that the tool cannot move in; expected a finite one")
     known = np.isfinite(lengths).all(axis=1)
-    centers, axes, lengths = centers[known], axes[known], lengths[known]
+    centers = centers[known]
+    axes = axes[known]
+    lengths = lengths[known]
     longest_axes = lengths.max(axis=1, keepdims=True)
     drawn = np.maximum(lengths, _MIN_AXIS_SHARE * longest_axes)
     if scale is None:

@@ -40,7 +40,9 @@ _FLAT_DIRECTION = np.array([0.35, -0.5, 1.6])
 _LIGHTS = ((0.5, np.array([0.5, -0.55, 0.75])), (0.18, np.array([-0.8, 0.3, 0.35])))
 """Strengths of the lights, and directions to them, world."""
 _AMBIENT_LIGHT = 0.42
-GROUND_COLOR, _GRID_COLOR, _PATH_COLOR = (244, 245, 247), (205, 210, 219), (217, 72, 15)
+GROUND_COLOR = (244, 245, 247)
+_GRID_COLOR = (205, 210, 219)
+_PATH_COLOR = (217, 72, 15)
 _REFERENCE_COLOR = (140, 153, 173)
 _GHOST_OPACITY = 0.35
 _ROUND_SIDES = 40
@@ -290,7 +292,8 @@ def _draw_arm(
     tint: Array | None = None,
 ) -> NDArray[np.uint8]:
     """Return an image with an arm drawn over it."""
-    corners, colors = [], []
+    corners = []
+    colors = []
     for solid in solids:
         T = transforms[solid.link]
         world = solid.corners @ T[:3, :3].T + T[:3, 3]
@@ -348,11 +351,13 @@ def _draw_block(corners: Array, colors: Array, drawn: NDArray[np.uint8], nearest
     first = first[kept]
     counts = counts[kept]
     x = np.repeat(first, counts) + _ranges(counts)
-    which, y = np.repeat(which, counts), np.repeat(y, counts)
+    which = np.repeat(which, counts)
+    y = np.repeat(y, counts)
     (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (corners[:, k].T for k in range(3))
     area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
     area = np.where(np.abs(area) < 1e-12, np.inf, area)
-    px, py = x + 0.5 - ax[which], y + 0.5 - ay[which]
+    px = x + 0.5 - ax[which]
+    py = y + 0.5 - ay[which]
     beta = (px * (cy - ay)[which] - py * (cx - ax)[which]) / area[which]
     gamma = (py * (bx - ax)[which] - px * (by - ay)[which]) / area[which]
     pixel = y * width + x

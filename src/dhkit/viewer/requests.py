@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NoReturn
 
@@ -71,5 +72,9 @@ def _refuse_constant(text: str) -> NoReturn:
 
 def _is_deeper(value: object, levels: int) -> bool:
     """Return whether lists and objects are nested more than so many levels."""
-    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    inner: Iterable[object] = ()
+    if isinstance(value, dict):
+        inner = value.values()
+    elif isinstance(value, list):
+        inner = value
     return levels < 0 or any(_is_deeper(entry, levels - 1) for entry in inner)

@@ -268,7 +268,8 @@ def _bars(times: Array, levels: Array, chosen: NDArray[np.bool_]) -> tuple[Array
     begins = np.append(0, changes)
     ends = np.append(changes, len(signs))
     shown = signs[begins] != 0
-    begins, ends = begins[shown], ends[shown]
+    begins = begins[shown]
+    ends = ends[shown]
     return levels[begins], times[begins], times[np.minimum(ends, len(times) - 1)]
 
 
@@ -293,7 +294,9 @@ def _prefix(largest: float) -> tuple[float, str]:
 
 def _unit(description: Description, joints: NDArray[np.intp]) -> str:
     sliding = description.numbers.prismatic[joints]
-    return "m" if sliding.all() else "rad, m" if sliding.any() else "rad"
+    if sliding.all():
+        return "m"
+    return "rad, m" if sliding.any() else "rad"
 
 
 def _darken(color: str) -> tuple[float, ...]:

@@ -364,7 +364,12 @@ class View(Exportable):
 
     def __repr__(self) -> str:
         # Without the token: a notebook that is passed on would show it.
-        state = "closed" if self._closed else "no server yet" if self._server is None else f"port {self._server.port}"
+        if self._closed:
+            state = "closed"
+        elif self._server is None:
+            state = "no server yet"
+        else:
+            state = f"port {self._server.port}"
         return repr_line("View", self._description.name, state)
 
     def snapshot(self) -> Snapshot:

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COLORMAP = "viridis"
-_BEST_COLOR, _ELLIPSOID_COLOR, _BOUNDARY_COLOR = "#e5484d", "#d9480f", "#d9480f"
+_BEST_COLOR = "#e5484d"
+_ELLIPSOID_COLOR = "#d9480f"
+_BOUNDARY_COLOR = "#d9480f"
 _BOUNDARY_STYLES = {"outer": "--", "inner": ":", "shoulder": "-."}
 """Line styles of boundaries, by name."""
 _MAX_PIXELS = 160
@@ -187,7 +189,8 @@ def _(value: Ellipsoid) -> Figure:
 
 
 def _planes(workspace: Workspace) -> list[_Plane]:
-    description, grid = workspace.description, workspace.grid
+    description = workspace.description
+    grid = workspace.grid
     if grid is not None and len(grid.axes) == 2:
         return [_in_plane(grid.axes)]
     T = first_axis(description)

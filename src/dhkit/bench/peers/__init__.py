@@ -1,5 +1,7 @@
 """The contenders, a file a package; each package is imported when its contender is set up."""
 
+from itertools import chain
+
 from dhkit.bench.contenders import Contender
 from dhkit.bench.peers import dhkit_arm, eaik, ikpy, opw, pinocchio, roboticstoolbox, ssik
 
@@ -10,4 +12,5 @@ def all_contenders() -> tuple[Contender, ...]:
     """Return every contender, dhkit's own first."""
     peers = (eaik, opw, ssik, roboticstoolbox, ikpy)
     first = (*dhkit_arm.contenders(), *pinocchio.contenders(), *dhkit_arm.casadi_contenders())
-    return (*first, *(contender for peer in peers for contender in peer.contenders()))
+    others = chain.from_iterable(peer.contenders() for peer in peers)
+    return (*first, *others)

@@ -121,7 +121,8 @@ def toolbox_robot(description: Description) -> Any:
             # The reflected inertia counts alone: it becomes a rotor with a gear of ratio 1.
             shared |= {"m": float(numbers.mass[i]), "r": numbers.com[i], "I": np.array(numbers.inertia[i])}
             shared |= {"Jm": float(numbers.armature[i]), "G": 1.0, "B": 0.0, "Tc": [0.0, 0.0]}
-        d, theta = float(numbers.d[i]), float(numbers.theta[i])
+        d = float(numbers.d[i])
+        theta = float(numbers.theta[i])
         if numbers.prismatic[i]:
             links.append(prismatic(theta=theta, offset=d, **shared))
         else:

@@ -52,7 +52,8 @@ def _package_and_axes(workload: Workload) -> tuple[Any, JointAxes]:
 def _build_module(workload: Workload) -> Any:
     """Return the module that ssik writes for the arm, which its documentation recommends for speed."""
     with tempfile.TemporaryDirectory() as folder:
-        urdf, module = Path(folder) / "arm.urdf", Path(folder) / "arm_ik.py"
+        urdf = Path(folder) / "arm.urdf"
+        module = Path(folder) / "arm_ik.py"
         urdf.write_text(Arm(bare(workload.arm.description)).urdf(), encoding="utf-8")
         ends = ("--base", "world", "--ee", "tool")
         command = [sys.executable, "-m", "ssik.cli", "build", str(urdf), *ends, "--out", str(module), "--no-validate"]

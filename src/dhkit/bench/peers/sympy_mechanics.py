@@ -19,7 +19,8 @@ def lagranges_equations(description: Description) -> Any:
     """
     sympy = import_peer("sympy")
     mechanics = import_peer("sympy.physics.mechanics")
-    numbers, n = description.numbers, description.n
+    numbers = description.numbers
+    n = description.n
 
     def exact(number: float) -> Any:
         fraction = Fraction(repr(float(number)))

@@ -19,7 +19,8 @@ _MATHEMATICA = re.compile(
     r"|\\\[[A-Z][A-Za-z]*\]|^\s*\{[^\\]*\}\s*$",
     re.DOTALL,
 )
-_OPENING, _CLOSING = {"(": ")", "[": "]", "{": "}"}, frozenset(")]}")
+_OPENING = {"(": ")", "[": "]", "{": "}"}
+_CLOSING = frozenset(")]}")
 
 
 def is_mathematica(text: str) -> bool:

@@ -33,7 +33,8 @@ _Value: TypeAlias = Tree | Rows
 MatrixOf: TypeAlias = Callable[[str], Rows | None]
 """Matrix that a name stands for; None for another name."""
 
-_TIMES, _OVER = ("*", "@", "\\,"), ("/",)
+_TIMES = ("*", "@", "\\,")
+_OVER = ("/",)
 _NUMPY = re.compile(r"\b(?:np|numpy)\b|\barray\s*\(")
 """Text in numpy's notation, in which * multiplies matrices entry by entry."""
 
@@ -285,7 +286,8 @@ class _MatrixReader:
         if len(left[0]) != len(right) and len(right) == 1 and len(right[0]) == len(left[0]):
             right = _as_column(right)
         if len(left[0]) != len(right):
-            (m, n), (p, q) = _size(left), _size(right)
+            m, n = _size(left)
+            p, q = _size(right)
             raise AnswerError(f"{quote(self.text)}: a product of matrices of {m} x {n} and {p} x {q}")
         self.chain += 1
         self.products += len(left) * len(right) * len(right[0])

@@ -93,7 +93,8 @@ class _Writer(Algebra[_Text]):
         return _Text(self._write_call(tree.function, [self.of(one).text for one in tree.arguments]), _POWER)
 
     def power(self, tree: Power) -> _Text:
-        base, exponent = self.of(tree.base), self.of(tree.exponent)
+        base = self.of(tree.base)
+        exponent = self.of(tree.exponent)
         return _Text(self._write_power(base.inside(_POWER), exponent.inside(_POWER)), _POWER)
 
     def product(self, factors: Sequence[tuple[bool, _Text]]) -> _Text:

@@ -56,7 +56,8 @@ class ArmPlane:
     @classmethod
     def of(cls, axes: Axes) -> ArmPlane:
         """Return the frame of axes 1 and 2."""
-        u, v = axes.direction(1), axes.direction(2)
+        u = axes.direction(1)
+        v = axes.direction(2)
         height = u @ (axes.point(2) - axes.point(1))
         R = np.stack([np.cross(u, v), u, v]) + 0.0
 

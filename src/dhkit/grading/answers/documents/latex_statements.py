@@ -58,7 +58,8 @@ _BRACKET = re.compile(
     r"|\\(?P<side>left|right)(?![A-Za-z])\s*(?:\\?.)?|\\[{}]|\\.|[(){}\[\]]",
     re.DOTALL,
 )
-_OPENING, _CLOSING = ("(", "[", "{", r"\{"), (")", "]", "}", r"\}")
+_OPENING = ("(", "[", "{", r"\{")
+_CLOSING = (")", "]", "}", r"\}")
 
 _SYMMETRIC = re.compile(r"\\(?:text|textrm|mbox|mathrm|textit)\s*\{\s*(?:[Ss]ymm?\.?|[Ss]ymmetric|SYM\.?)\s*\}")
 _UNIT = re.compile(r"(?:[/ .*]*+(?>kg|mm|cm|Nm|rad|deg|[msNJWg])(?:\^?-?\d)?+)++", re.ASCII)

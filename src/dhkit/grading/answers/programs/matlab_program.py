@@ -86,7 +86,8 @@ _ASSUMPTIONS = frozenset(["real", "positive", "integer", "rational", "clear", "n
 """Words that may follow the names of ``syms``."""
 
 _PLAIN_NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
-_SUMS, _PRODUCTS = ("+", "-", ".+", ".-"), ("*", "/", ".*", "./")
+_SUMS = ("+", "-", ".+", ".-")
+_PRODUCTS = ("*", "/", ".*", "./")
 _POWERS = {"^": "^", "**": "^", ".^": ".^", ".**": ".^"}
 
 

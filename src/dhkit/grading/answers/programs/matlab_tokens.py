@@ -23,7 +23,8 @@ _STRING = re.compile(r"""(?P<string>'(?:[^']|'')*'|"(?:[^"\\]|""|\\.)*")""")
 _SPACE = re.compile(r"[ \t\f\v\r\u00a0]+")
 
 
-_OPENING, _CLOSING = "([{", ")]}"
+_OPENING = "([{"
+_CLOSING = ")]}"
 CHANGING = ("+=", "-=", "*=", "/=", "^=", "|=", "&=")
 STEPPING = ("++", "--")
 _ASSIGNING = ("=", *CHANGING, *STEPPING)

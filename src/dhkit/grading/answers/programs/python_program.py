@@ -693,7 +693,8 @@ class PythonProgram:
                 return Part(name, tuple(range(first, min(last, BOUNDS.index))), is_slice=True, number=value.number)
             case Matrix(), ast.Tuple([rows, columns]) if not value.is_flat:
                 m, n = value.shape
-                i, j = _chosen(rows, m), _chosen(columns, n)
+                i = _chosen(rows, m)
+                j = _chosen(columns, n)
                 chosen = [[value.entries[(a, b)] for b in j] for a in i]
                 if isinstance(rows, ast.Slice) and isinstance(columns, ast.Slice):
                     return matrix_of(chosen, multiplies_entries=value.multiplies_entries)
@@ -792,7 +793,8 @@ class PythonProgram:
         of_numpy = name in (*_ARRAYS, *_CASADI)
         match arguments:
             case [Scalar() as m, Scalar() as n, Matrix() as entries] if m.text.isdecimal() and n.text.isdecimal():
-                row_count, columns = int(m.text[:6]), int(n.text[:6])
+                row_count = int(m.text[:6])
+                columns = int(n.text[:6])
                 flat_entries = [x for row in entries.rows for x in row]
                 if row_count * columns != len(flat_entries):
                     raise UnreadError("a matrix whose entries do not fit its size is not read")
