@@ -28,8 +28,10 @@ from dhkit.bench.rounds import lasting, repeated, rounds
 from dhkit.description import write_robot
 from dhkit.display import value_line
 
-_BLOCK, _BLOCKS = bytes(256 * 1024), 128
-"""The block that the control loop hashes, which stays in the core's cache, and how many times."""
+_BLOCK = bytes(256 * 1024)
+"""Block that the control loop hashes; it stays in the core's cache."""
+_BLOCKS = 128
+"""Number of times that the control loop hashes the block."""
 _MAX_PROCESS_TIME = 120.0
 """Longest time of a new process, s."""
 _WARM_PROCESSES = 3

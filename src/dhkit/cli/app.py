@@ -22,8 +22,10 @@ from dhkit.cli.streams import clean_streams
 from dhkit.description.joint_text import DEGREES
 from dhkit.errors import DhkitError
 
-MAX_WORD_LENGTH, MAX_MESSAGE_LENGTH = 120, 600
-"""Longest word and longest message on stderr, characters; messages echo what was typed."""
+MAX_WORD_LENGTH = 120
+"""Longest word on stderr, characters: messages echo typed words."""
+MAX_MESSAGE_LENGTH = 600
+"""Longest message on stderr, characters."""
 LONG_WORD = re.compile(rf"\S{{{2 * MAX_WORD_LENGTH},}}")
 
 UsageError = cast(type[Exception], typer.BadParameter.__mro__[2])

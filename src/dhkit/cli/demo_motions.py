@@ -24,10 +24,12 @@ MIN_PIECE_TIME = 0.8
 """Shortest duration of a piece of a tour, s."""
 PEAK_SPEED_RATIO = 15 / 8
 """Peak over mean speed of a quintic blend."""
-MAX_ROTATION, MAX_TRANSLATION = 1.0, 0.3
-"""Farthest that a joint moves: rad, and shares of the arm's reach."""
+MAX_ROTATION = 1.0
+"""Largest motion of a revolute joint, rad."""
+MAX_TRANSLATION = 0.3
+"""Largest motion of a prismatic joint, as a share of the arm's reach."""
 LIMIT_SHARE = 0.8
-"""Largest share of the way to its limit that a joint moves."""
+"""Largest motion of a joint as a share of the way to its limit."""
 REST_TIME = 0.6
 """Rest at both ends of a motion there and back, s."""
 

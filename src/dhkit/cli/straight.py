@@ -20,8 +20,10 @@ PREFERRED_CONFIGURATIONS = ("nominal", "ready", "home")
 """Names of the configurations that lines are looked for at first."""
 RANDOM_STARTS = 8
 """Random configurations that are tried if there is no line at a named one."""
-ITERATION_STARTS, MAX_SOLUTIONS = 24, 4
-"""Starts of the iteration for an arm without closed form, and the most solutions that are kept."""
+ITERATION_STARTS = 24
+"""Starts of the iteration for an arm without closed form."""
+MAX_SOLUTIONS = 4
+"""Largest number of solutions of the iteration that are kept."""
 SAME_SOLUTION = 0.3
 """Largest difference of joint values, rad or m, of solutions that count as one."""
 MAX_STEP = 0.2

@@ -33,8 +33,11 @@ _CLASSES = dict(enumerate(("cell", "struct", "object", "char", "sparse matrix", 
     **{8 + k: f"{'u' if k % 2 else ''}int{8 << k // 2}" for k in range(8)},
     16: "function",
 }
-_STRUCT, _OBJECT, _CHARACTERS, _OPAQUE = 2, 3, 4, 17
-"""Classes with a layout of their own; an opaque variable is an object of one of MATLAB's own classes, as timeseries."""
+_STRUCT = 2
+_OBJECT = 3
+_CHARACTERS = 4
+_OPAQUE = 17
+"""Class of an object of one of MATLAB's own classes, such as timeseries; like the three above it has its own layout."""
 _FULL_MATRICES = range(6, 16)
 _COMPLEX_FLAG = 0x0800
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"

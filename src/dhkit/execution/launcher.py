@@ -17,8 +17,10 @@ import sys
 from contextlib import suppress
 from typing import NoReturn
 
-DEATH_SIGNAL, NO_NEW_PRIVILEGES = 1, 38
-"""Options of Linux's prctl(2)."""
+DEATH_SIGNAL = 1
+"""Option of Linux's prctl(2): the signal that the process gets when its parent ends."""
+NO_NEW_PRIVILEGES = 38
+"""Option of prctl(2): programs that it executes get no further rights."""
 MAX_FILE_BYTES = 64 << 20
 """Largest file that the program may write, bytes."""
 MAX_OPEN_FILES = 256

@@ -28,8 +28,10 @@ from dhkit.symbolic import Graph
 BLOCK = 64
 """Number of items of a block: 8 vectors of 8 doubles; all rows of a block fit into the first-level cache."""
 
-FLOAT, SMALL_INTEGER = "float64", "uint8"
-"""Types of an output's entries, by NumPy's names."""
+FLOAT = "float64"
+"""Type of an output's entries, by NumPy's name."""
+SMALL_INTEGER = "uint8"
+"""Type of the entries of an output of flags, by NumPy's name."""
 _STORED = {FLOAT: "double", SMALL_INTEGER: "i8"}
 """LLVM's names of these types."""
 

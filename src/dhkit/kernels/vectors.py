@@ -11,9 +11,10 @@ WIDTH = 8
 VECTOR = f"<{WIDTH} x double>"
 _MASK = f"<{WIDTH} x i1>"
 
-FUSING, EXACT = "contract nsz", "nsz"
-"""Liberties for LLVM: fuse products into sums and drop the sign of zero; or the latter alone, so that every operation
-is rounded as in IEEE 754. No others, so that NaN survives."""
+FUSING = "contract nsz"
+"""Liberties for LLVM: fuse products into sums, and drop the sign of zero. No others, so that NaN survives."""
+EXACT = "nsz"
+"""Liberty for LLVM: drop the sign of zero. Every operation is rounded as in IEEE 754."""
 
 
 @dataclass

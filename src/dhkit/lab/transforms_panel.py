@@ -20,8 +20,10 @@ from dhkit.model.mesh_reader import read_mesh
 
 BOX_EDGES = (0.36, 0.24, 0.12)
 """Edges of the box that is shown where no file is given, as shares of the arm's reach."""
-MAX_FILE_BYTES, MAX_TRIANGLES = 5_000_000, 5_000
-"""Largest size of a solid's file: the page gets it as text."""
+MAX_FILE_BYTES = 5_000_000
+"""Largest size of a solid's file, bytes: the page gets it as text."""
+MAX_TRIANGLES = 5_000
+"""Largest number of triangles of a solid."""
 MAX_STEPS = 30
 LISTED_VERTICES = 24
 """Vertices whose coordinates are listed, and whose numbers are drawn."""

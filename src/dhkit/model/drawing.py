@@ -22,28 +22,33 @@ Solid: TypeAlias = tuple[Geometry, Array]
 """A geometry and its pose in its link's DH frame, shape (4, 4), m."""
 
 _FIRST_DRUM_RADIUS = 0.05
+"""Radius of the first drum, relative to the reach."""
 _LAST_DRUM_RADIUS = 0.028
-"""Radius of the first and of the last drum, relative to the reach: arms taper."""
+"""Radius of the last drum, relative to the reach: arms taper."""
 _TUBE_RADIUS = 0.62
 """Radius of a tube, relative to the smaller drum at its ends, so that drums stay visible."""
 _DRUM_HALF_HEIGHT = 0.9
 """Half the height of a drum, relative to its radius: the tube, which is narrower, ends inside the drum."""
 _HUB_RADIUS = 0.8
+"""Radius of a hub, relative to its drum."""
 _HUB_HALF_LENGTH = 1.2
-"""Radius and half length of a hub, relative to its drum: slimmer, and visible at both faces."""
+"""Half length of a hub, relative to its drum's: it is visible at both faces."""
 _NESTED_RADIUS = 0.78
+"""Radius of a drum relative to the previous drum about the same point: all of them stay visible."""
 _NESTED_HALF_HEIGHT = 1.25
-"""Radius and half height of a drum relative to the previous drum about the same point: all of them stay visible."""
+"""Half height of a drum relative to the previous drum about the same point."""
 _MAX_FIRST_DRUM_HALF = 0.3
 """Half the height of the first drum, at most, relative to the height of the next axis: the drum stays below it."""
 _BLOCK_HALF_LENGTH = 1.3
 """Half the length of a slider's block, relative to its half width."""
 _BAR_HALF_WIDTH = 0.55
+"""Half width of a slider's bar, relative to the block's."""
 _STOP_HALF_WIDTH = 0.8
-"""Half widths of a slider's bar and of the stops at a rail's ends, relative to the block's."""
+"""Half width of the stops at a rail's ends, relative to the block's."""
 _PLATE_RADIUS = 1.8
+"""Radius of the foot's plate, relative to the radius of the drum at frame 0."""
 _POST_HEIGHT = 2.0
-"""Radius of the foot's plate and height of the post below a drum at frame 0, relative to the drum's radius."""
+"""Height of the post below the drum at frame 0, relative to the drum's radius."""
 _THICKNESS = 0.25
 """Thickness of plates and stops, relative to the radius of the drum or the half width of the block."""
 _GRIPPER_START = 1.25

@@ -26,8 +26,10 @@ _Y_TO_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dt
 _ROUND_SIDES = 48
 """Sides of round solids; a multiple of 4, so that the silhouette has the true radius."""
 
-_FRONT_SIDE, _BOTH_SIDES = 0, 2
-"""three.js's sides of a surface: both are drawn, at twice the cost, where a file's triangles may be reversed."""
+_FRONT_SIDE = 0
+"""three.js's number for drawing the front of triangles."""
+_BOTH_SIDES = 2
+"""three.js's number for drawing both sides, at twice the cost: triangles of a file may be reversed."""
 
 _ARROW_SIDES = 8
 _HALF_LINE_PIECES = 3

@@ -18,8 +18,10 @@ Motion = Trajectory | SimulationResult | tuple[ArrayLike, ArrayLike]
 
 _FRAME_RATE = 60.0
 """Frames per second of a page, Hz: the rate of most screens."""
-MIN_FRAMES, MAX_FRAMES = 121, 6001
-"""Fewest frames of a motion, for slow motion; and most, 2.5 MB for a 6-axis arm and 2.3 MB more for its ghost."""
+MIN_FRAMES = 121
+"""Least number of frames of a motion, for slow motion."""
+MAX_FRAMES = 6001
+"""Largest number of frames of a motion: 2.5 MB for a 6-axis arm and 2.3 MB more for its ghost."""
 
 
 class PlayedMotion(NamedTuple):

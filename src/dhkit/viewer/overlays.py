@@ -19,11 +19,12 @@ AXIS_COLORS = ("#e5484d", "#30a46c", "#3b82f6")
 """Colors of the x, y and z axes of frames, readable on white and on black; the page has them in ``colors.js``."""
 TINTS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#ee7733", "#009988")
 """Tol's bright and vibrant schemes (SRON/EPS/TN/09-002, 2021): the eight branches of a wrist-partitioned arm."""
-_HEAT_COLORMAP, _HEAT_END = "viridis", 0.87
-"""matplotlib's colormap of even steps, which colour-blind people can tell apart too, and the share of it that is used:
-its lightest colors are lost on white."""
+_HEAT_COLORMAP = "viridis"
+"""matplotlib's colormap of even steps, which colour-blind people can tell apart too."""
+_HEAT_END = 0.87
+"""Share of the colormap that is used: its lightest colors are lost on white."""
 _FLOOR_SHARE = 1.2
-"""Half an edge of the square that a floor without end is drawn as, as a share of the arm's size."""
+"""Half an edge of the square that stands for an infinite floor, as a share of the arm's size."""
 _MIN_AXIS_SHARE = 0.01
 """Smallest half axis that is drawn, as a share of the longest: a flat ball has no normals, and no light on it."""
 

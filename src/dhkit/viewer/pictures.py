@@ -49,8 +49,10 @@ _ROUND_SIDES = 40
 """Sides of a round solid."""
 _BLOCK_PIXELS = 4_000_000
 """Pixels of triangles that are drawn at once."""
-_MIN_EDGE, _MAX_EDGE = 16, 4000
-"""Smallest and largest width and height of a picture, px."""
+_MIN_EDGE = 16
+"""Smallest width and height of a picture, px."""
+_MAX_EDGE = 4000
+"""Largest width and height of a picture, px."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,8 +42,10 @@ if TYPE_CHECKING:
 HEADER = struct.Struct("<BBHId")
 LENGTH = struct.Struct("<I")
 MAX_SEQUENCE = 2**32
-VISIBLE_FLAG, GHOST_FLAG = 1, 2
-"""Flags of a message: the frames or the tool's path are drawn; a ghost moves along."""
+VISIBLE_FLAG = 1
+"""Flag of a message: the frames or the tool's path are drawn."""
+GHOST_FLAG = 2
+"""Flag of a message: a ghost moves along."""
 _WORD = 4
 """Bytes of a float: samples begin at a multiple of them."""
 

@@ -29,8 +29,10 @@ _ROOT = "/dhkit"
 _COINCIDENCE = 1e-9
 """Largest distance of origins, as a share of the arm's size, and largest difference of rotation entries, of frames that
 coincide: far above the rounding of a chain, far below what is seen."""
-_TRIAD_SHARE, PICTURE_TRIAD_SHARE = 0.13, 0.11
-"""Length of a triad in the browser, and in figures and pictures, as a share of the arm's size."""
+_TRIAD_SHARE = 0.13
+"""Length of a triad in the browser, as a share of the arm's size."""
+PICTURE_TRIAD_SHARE = 0.11
+"""Length of a triad in figures and pictures, as a share of the arm's size."""
 _NESTED_RATIO = 0.72
 """Length of a triad over that of the one before it at the same origin, so that both are seen."""
 _SIZES_PER_OCTAVE = 8

@@ -36,10 +36,12 @@ Answer: TypeAlias = Callable[[str, Mapping[str, object]], object]
 
 _LOG = logging.getLogger(__name__)
 _ADDRESS = "127.0.0.1"
-_START_TIMEOUT, _CLOSE_TIMEOUT = 10.0, 5.0
-"""Longest times that the server's thread may take to start and to stop, s."""
+_START_TIMEOUT = 10.0
+"""Longest time that the server's thread may take to start, s."""
+_CLOSE_TIMEOUT = 5.0
+"""Longest time that the server's thread may take to stop, s."""
 BEAT_PERIOD = 2.0
-"""Time between two signs of life to a page, s; the page gives the server up when three are missing."""
+"""Time between two heartbeats to a page, s; the page gives the server up when three are missing."""
 _PING_PERIOD = 15.0
 """Time between two pings, s: a browser that vanished without closing its connection is dropped."""
 _IDLE_TIMEOUT = 60.0

@@ -35,8 +35,10 @@ _MATRIX_WORDS = word_set("sym Matrix array matrix simplify transpose MutableDens
 TRANSPOSES = (["'"], [".'"], [".", "T"], ["^", "T"], ["^", "top"], ["^", "(", "T", ")"], ["^", "(", "top", ")"])
 """Signs of a transpose, in tokens."""
 
-_COLUMN_SIGNS, _ROW_SIGNS = (",", "&"), (";", "\\\\")
-"""Signs between the entries of a row, and between rows."""
+_COLUMN_SIGNS = (",", "&")
+"""Signs between the entries of a row."""
+_ROW_SIGNS = (";", "\\\\")
+"""Signs between rows."""
 
 _NOWHERE = -1
 """Place of the zeros beside a diagonal, which nobody typed."""

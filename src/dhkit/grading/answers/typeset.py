@@ -17,7 +17,9 @@ _VARIABLE = re.compile(r"(qdd|qd|q)(\d+)")
 _LATEX_FUNCTIONS = {"asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan"}
 _LATEX_NAMES = ("sin", "cos", "tan", "exp", "min", "max")
 _LATEX_MARKS = {"qdd": r"\ddot{q}", "qd": r"\dot{q}", "q": "q"}
-_SUM, _PRODUCT, _POWER = 0, 1, 2
+_SUM = 0
+_PRODUCT = 1
+_POWER = 2
 """Binding strengths of operations: a weaker one stands in brackets inside a stronger one."""
 
 

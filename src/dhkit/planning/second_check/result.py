@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from dhkit.display import repr_line, value_line
 from dhkit.planning.obstacles import Floor, Obstacle, link_name
 
-ACCEPTED_SHARE, ACCEPTED_GAP = 0.1, 1e-3
-"""Share of a clearance, and at least this, m, by which it may be missed between the states of a certificate."""
+ACCEPTED_SHARE = 0.1
+"""Share of a clearance by which it may be missed between the states of a certificate."""
+ACCEPTED_GAP = 1e-3
+"""Least gap, m, by which a clearance may be missed between the states of a certificate, whatever its share."""
 TOUCH = 1e-6
 """Depth, m, up to which two solids only touch."""
 
