@@ -57,7 +57,7 @@ check: $(CHECK_READY)  ## ruff, mypy --strict, import order, shape of the packag
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python tools/architecture.py
+	$(BIN)/python -m tools.architecture
 
 accept: $(ACCEPT_READY)  ## the laws at full size, example-robot-data's chains too; writes benchmarks/results/acceptance.json
 	DHKIT_ACCEPT=1 $(BIN)/python -m pytest -m law -q --no-header -p no:randomly tests

@@ -2,18 +2,18 @@
 
 Imports inside functions and under ``TYPE_CHECKING`` count, and so do the lazy imports of a package's stub.
 
-    python tools/architecture.py            # the checks; exit status 1 and one line a fault
-    python tools/architecture.py --lines    # code lines a package, without blank lines, comments and docstrings
+    python -m tools.architecture            # the checks; exit status 1 and one line a fault
+    python -m tools.architecture --density  # code lines and their density, by package, for information
 """
 
 import argparse
 import ast
-import io
 import sys
-import tokenize
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+
+from tools.density import density_table
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "dhkit"
@@ -94,22 +94,6 @@ def circles(graph: Mapping[str, set[str]]) -> list[list[str]]:
     return found
 
 
-def code_lines(text: str) -> int:
-    """Count the lines of a source text that are neither blank nor comment nor docstring."""
-    skipped = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
-    lines: set[int] = set()
-    for token in tokenize.generate_tokens(io.StringIO(text).readline):
-        if token.type not in skipped:
-            lines.update(range(token.start[0], token.end[0] + 1))
-    for node in ast.walk(ast.parse(text)):
-        body = getattr(node, "body", None)
-        for statement in body if isinstance(body, list) else []:
-            value = statement.value if isinstance(statement, ast.Expr) else None
-            if isinstance(value, ast.Constant) and isinstance(value.value, str):
-                lines.difference_update(range(statement.lineno, (statement.end_lineno or statement.lineno) + 1))
-    return len(lines)
-
-
 def faults() -> Iterator[str]:
     """Yield one line for each place where the package breaks a rule of its shape."""
     known = modules()
@@ -126,25 +110,12 @@ def faults() -> Iterator[str]:
             yield f"{name}: {length} lines, imported by {user} alone"
 
 
-def lines_by_package() -> Counter[str]:
-    """Return the code lines of each package, stubs included."""
-    counted: Counter[str] = Counter()
-    for path in PACKAGE.rglob("*.py*"):
-        if path.suffix in (".py", ".pyi"):
-            parts = path.relative_to(PACKAGE).parts
-            counted[parts[0] if len(parts) > 1 else "dhkit"] += code_lines(path.read_text())
-    return counted
-
-
 def main() -> int:
-    """Print the faults, or the lines."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--lines", action="store_true")
-    if parser.parse_args().lines:
-        counted = lines_by_package()
-        for package, lines in counted.most_common():
-            print(f"{package:14}{lines:8}")
-        print(f"{'all':14}{counted.total():8}")
+    """Print the faults, or the figures of density."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--density", action="store_true", help="print figures by package; no figure is a fault")
+    if parser.parse_args().density:
+        print(density_table(PACKAGE))
         return 0
     found = list(faults())
     print("\n".join(found) or "no import circles, no splinters")
