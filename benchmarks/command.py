@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from dhkit.bench.report import Report
+from dhkit.bench.benchmark_report import Report
 from dhkit.cli.bench import write
 
 

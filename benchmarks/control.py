@@ -19,9 +19,9 @@ from benchmarks.peers.aba_loop import AbaLoop, default_swing
 from benchmarks.peers.fdyn import Fdyn, own_puma_accelerations
 from benchmarks.simulation_report import BatchRow, IntegrationRow, ModelCheck, SimulationReport, SingleRow, Timing
 from dhkit.arm import Arm
+from dhkit.bench.benchmark_report import Missing, Requirement
 from dhkit.bench.contenders import Call, UnavailableError
 from dhkit.bench.machine import Machine
-from dhkit.bench.report import Missing, Requirement
 from dhkit.bench.rounds import calm, lasting, repeated, rounds
 from dhkit.control import ComputedTorque, PDGravity, SimulationResult, Sine
 from dhkit.description import Array

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+from dhkit.bench.benchmark_report import Missing, Report, Table, duration
 from dhkit.bench.machine import Machine
-from dhkit.bench.report import Missing, Report, Table, duration
 from dhkit.display import html_table, repr_line
 
 MEANING = (

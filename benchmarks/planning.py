@@ -20,9 +20,9 @@ import numpy as np
 from benchmarks.command import publish, tell
 from benchmarks.motion_report import MeshBuild, MotionReport, MotionRow
 from benchmarks.peers.toppra import StraightTiming
+from dhkit.bench.benchmark_report import Missing
 from dhkit.bench.contenders import UnavailableError
 from dhkit.bench.machine import Machine
-from dhkit.bench.report import Missing
 from dhkit.bench.rounds import calm
 from dhkit.description import Array, Description, library_robot
 from dhkit.dynamics import gravity_torque

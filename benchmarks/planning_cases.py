@@ -20,8 +20,8 @@ import numpy as np
 
 from benchmarks.command import publish, tell
 from benchmarks.planning import holdable_pairs
+from dhkit.bench.benchmark_report import Report, Table, duration
 from dhkit.bench.machine import Machine
-from dhkit.bench.report import Report, Table, duration
 from dhkit.bench.rounds import calm
 from dhkit.description import Payload, library_robot
 from dhkit.description.frames import world_to_tool

@@ -17,8 +17,8 @@ import numpy as np
 
 from benchmarks.command import publish, tell
 from benchmarks.peers.ompl import SampledPaths
+from dhkit.bench.benchmark_report import Report, Table, duration
 from dhkit.bench.machine import Machine
-from dhkit.bench.report import Report, Table, duration
 from dhkit.description import Array, Description, library_robot
 from dhkit.display import html_table, repr_line
 from dhkit.dynamics import gravity_torque

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from dhkit.bench.benchmark_report import Missing, Report, Requirement, Table, duration, requirements_text
 from dhkit.bench.machine import Machine
-from dhkit.bench.report import Missing, Report, Requirement, Table, duration, requirements_text
 from dhkit.display import html_table, repr_line
 
 MEANING = (

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from dhkit.arm import Arm
 from dhkit.bench import BenchReport, Requirement, Row
+from dhkit.bench.benchmark_report import BATCH
 from dhkit.bench.derivations import CASADI, INVERSE_DYNAMICS, PROOFS
 from dhkit.bench.peers import eaik, pinocchio
-from dhkit.bench.report import BATCH
 from dhkit.bench.runner import REPEATS
 from dhkit.cli.bench import run
 

@@ -29,11 +29,11 @@ from dhkit.bench import (
     run,
 )
 from dhkit.bench.agreement import judge
+from dhkit.bench.benchmark_report import BATCH, duration
 from dhkit.bench.contenders import import_peer, one_by_one
 from dhkit.bench.geometry import OrthoParallel, bare, joint_axes
 from dhkit.bench.machine import cores
 from dhkit.bench.peers import all_contenders, dhkit_arm, eaik, ikpy, pinocchio, roboticstoolbox, ssik
-from dhkit.bench.report import BATCH, duration
 from dhkit.bench.rounds import items_within
 from dhkit.cli import main
 

@@ -10,11 +10,11 @@ from benchmarks.targets import targets
 
 from dhkit import Arm
 from dhkit.bench import BenchReport, Derivation, Machine, derivations, run
+from dhkit.bench.benchmark_report import BATCH
 from dhkit.bench.contenders import Workload
 from dhkit.bench.derivations import CASADI, INVERSE_DYNAMICS, PEER, operations
 from dhkit.bench.peers import dhkit_arm, pinocchio
 from dhkit.bench.peers.sympy_mechanics import lagranges_equations
-from dhkit.bench.report import BATCH
 
 pytestmark = pytest.mark.slow
 

@@ -11,8 +11,8 @@ from dhkit import Arm
 from dhkit.cli import main
 from dhkit.execution.isolation import Isolation, Kind
 from dhkit.programs import Program
+from dhkit.programs.check_report import share_within
 from dhkit.programs.checks import check
-from dhkit.programs.report import share_within
 from dhkit.programs.rubric import CheckRubric
 from programs.puma_solutions import EDITS, solution
 

@@ -6,7 +6,7 @@ import pytest
 from dhkit.description import library_robot
 from dhkit.verification import VerificationReport
 from dhkit.verification.measure import Floors, forward_tolerance, relative_error
-from dhkit.verification.report import Agreement
+from dhkit.verification.verification_report import Agreement
 
 
 def test_differences_are_relative_to_the_largest_entry_or_the_floor():

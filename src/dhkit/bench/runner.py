@@ -10,12 +10,12 @@ import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.bench.agreement import Verdict, judge
+from dhkit.bench.benchmark_report import BATCH, BenchReport, Ending, Missing, Outcome, Requirement, Row
 from dhkit.bench.contenders import QUANTITIES, Call, Contender, UnavailableError, Workload
 from dhkit.bench.derivations import Derivation, Operations, derivations, operations
 from dhkit.bench.machine import Machine
 from dhkit.bench.peers import all_contenders, dhkit_arm
 from dhkit.bench.probes import FirstCall, PeakMemory, ThreadScaling, first_call, peak_memory, thread_scaling
-from dhkit.bench.report import BATCH, BenchReport, Ending, Missing, Outcome, Requirement, Row
 from dhkit.bench.rounds import calm, items_within, lasting, repeated, rounds
 from dhkit.description import Array
 

@@ -12,7 +12,7 @@ import typer
 
 from dhkit.arm import Arm
 from dhkit.bench import QUANTITIES, BenchReport, Ending, Requirement, run as run_bench
-from dhkit.bench.report import Report
+from dhkit.bench.benchmark_report import Report
 from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.options import Json, Seed, read_arm
 from dhkit.cli.output import print_json, say

@@ -29,8 +29,8 @@ from dhkit.description import Array
 from dhkit.errors import DescriptionError, PlanningError
 from dhkit.planning import PlanOptions, PlanReport, Progress, ToolSpeed
 from dhkit.planning.along.path_motion import DEFAULT_INTERVALS as PATH_INTERVALS
+from dhkit.planning.plan_report import more_text, seconds_text
 from dhkit.planning.program import MAX_ITERATIONS
-from dhkit.planning.report import more_text, seconds_text
 from dhkit.trajectories import JointPath, Limits, Trajectory, joint_path, tool_line
 from dhkit.trajectories.archives import ARCHIVES
 from dhkit.trajectories.files import TABLES

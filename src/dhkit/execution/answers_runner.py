@@ -80,7 +80,7 @@ def main(packages: str, path: str) -> None:
     except BaseException as error:
         write(error_fields(error, name))
         return
-    program = Program(namespace, name, symbolic)
+    program = ExecutedFile(namespace, name, symbolic)
     write({"functions": program.functions(), "names": program.names(lines)})
     for line in requests:
         if not line.strip():
@@ -259,7 +259,7 @@ class Parameters:
 # What a file has
 
 
-class Program:
+class ExecutedFile:
     """An executed file, and what is asked of it."""
 
     def __init__(self, namespace: Namespace, file: str, symbolic: Symbolic) -> None:

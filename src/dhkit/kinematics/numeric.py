@@ -135,7 +135,7 @@ def solve_numerically(
     posed = are_poses(poses)
     q = np.full((posed.size, n), np.nan)
     distance = np.full(posed.size, np.nan)
-    search = Search(newton, tolerance, restarts, seed)
+    search = NumericSearch(newton, tolerance, restarts, seed)
     rows = np.flatnonzero(posed)
     goals = orthonormal(poses[posed]).reshape(-1, 16)
 
@@ -166,7 +166,7 @@ def solve_numerically(
 
 
 @dataclass(frozen=True, eq=False)
-class Search:
+class NumericSearch:
     """The search for one solution of each pose."""
 
     newton: Newton

@@ -20,7 +20,7 @@ The way from a request to a motion, through rooms (folders) and files::
                │   some exceeded  │  all kept
                └──────────────────┤
                                   v
-    report.py        cost, certificate, other branches, classical motions to compare with
+    plan_report.py   cost, certificate, other branches, classical motions to compare with
                                   │
                                   v
                      Trajectory with its report
@@ -55,9 +55,9 @@ from dhkit.planning.criteria import (
     TorqueSpeedLine,
 )
 from dhkit.planning.obstacles import Distances, Floor, Obstacle, Scene, distance
+from dhkit.planning.plan_report import BranchReport, PlanReport
 from dhkit.planning.planner import Planner
 from dhkit.planning.program import Progress
-from dhkit.planning.report import BranchReport, PlanReport
 from dhkit.planning.request import PathOptions, PlanOptions
 
 __all__ = [

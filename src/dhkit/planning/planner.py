@@ -19,6 +19,7 @@ from dhkit.errors import PlanningError
 from dhkit.planning.certificate import Checker
 from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, prepare
 from dhkit.planning.many import ManyProgress, SimilarMotions, solve_many
+from dhkit.planning.plan_report import BranchReport, classical_motions, report_of
 from dhkit.planning.program import (
     MAX_SMALL_JOINTS,
     MIN_LEG_INTERVALS,
@@ -33,7 +34,6 @@ from dhkit.planning.program import (
     delayed_interrupts,
     leg_durations,
 )
-from dhkit.planning.report import BranchReport, classical_motions, report_of
 from dhkit.planning.request import (
     PlanKeywords,
     PlanOptions,
@@ -49,7 +49,7 @@ from dhkit.planning.request import (
     require_possible,
     smoothed,
 )
-from dhkit.planning.search import FINER, RESOLUTION, PlannedMotion, Search, coarser, motion_around
+from dhkit.planning.search import FINER, RESOLUTION, MotionSearch, PlannedMotion, coarser, motion_around
 from dhkit.symbolic import Friction
 from dhkit.trajectories import Limits, Trajectory
 
@@ -365,7 +365,7 @@ class Planner:
         attempt = 0
         while True:
             program = self._counted_program(task, attempt, work)
-            search = Search(task.without_obstacles, program, work, progress, is_last=attempt == last)
+            search = MotionSearch(task.without_obstacles, program, work, progress, is_last=attempt == last)
             finer = partial(self._counted_program, task, attempt, work, FINER)
             try:
                 found = replace(search(warm), attempt=attempt)
@@ -400,7 +400,7 @@ class Planner:
             task = quickest._task(replace(request, duration=None), routes[0].points)
             quick = task.without_obstacles
             program, _ = quickest.program(quick)
-            least = Search(quick, program, work)().trajectory.duration
+            least = MotionSearch(quick, program, work)().trajectory.duration
         except PlanningError:
             return error
         if least <= request.duration * (1 + DURATION_TOLERANCE):
@@ -415,4 +415,4 @@ class Planner:
         if task.avoidance or self.intervals_for(task) <= MIN_LEG_INTERVALS:
             return None
         program, _ = self.program(task, best.attempt, scale=0.5)
-        return coarser(Search(task.without_obstacles, program, work), best.trajectory)
+        return coarser(MotionSearch(task.without_obstacles, program, work), best.trajectory)

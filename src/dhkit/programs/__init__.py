@@ -2,10 +2,10 @@
 
 from dhkit.execution.isolation import Isolation, IsolationError, find_isolation
 from dhkit.execution.process import Limits, ProgramError
+from dhkit.programs.check_report import CheckReport, Part
 from dhkit.programs.checks import check
 from dhkit.programs.program import FUNCTIONS, Program, protect_from_children
 from dhkit.programs.random_poses import random_states
-from dhkit.programs.report import CheckReport, Part
 from dhkit.programs.rubric import CheckRubric
 
 __all__ = [

@@ -14,10 +14,10 @@ from dhkit.errors import AnswerError, DhkitError
 from dhkit.execution.process import ProgramError
 from dhkit.programs.bounds import BOUNDS
 from dhkit.programs.caller import LENGTH_UNITS, POSE_TOLERANCE, Caller
+from dhkit.programs.check_report import CheckReport, Part, share_within
 from dhkit.programs.inverse import score_inverse
 from dhkit.programs.program import Program
 from dhkit.programs.random_poses import random_states
-from dhkit.programs.report import CheckReport, Part, share_within
 from dhkit.programs.rubric import CheckRubric, ControllerTask
 
 _MAX_ROUNDING = 2e-3

@@ -16,8 +16,8 @@ from dhkit.execution.process import ProgramError
 from dhkit.kinematics import classify
 from dhkit.programs.bounds import BOUNDS
 from dhkit.programs.caller import LENGTH_UNITS, POSE_TOLERANCE, Caller
+from dhkit.programs.check_report import Part, share_within
 from dhkit.programs.random_poses import poses_out_of_reach, random_states, regular_states, singular_states
-from dhkit.programs.report import Part, share_within
 from dhkit.programs.rubric import CheckRubric
 
 _SAME_SOLUTION = 1e-5

@@ -2,7 +2,7 @@
 
 from dhkit.verification.comparison import verify
 from dhkit.verification.foreign import verify_urdf
-from dhkit.verification.report import Agreement, VerificationReport
 from dhkit.verification.states import JointStates, random_motions, random_states
+from dhkit.verification.verification_report import Agreement, VerificationReport
 
 __all__ = ["Agreement", "JointStates", "VerificationReport", "random_motions", "random_states", "verify", "verify_urdf"]

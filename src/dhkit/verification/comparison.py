@@ -13,8 +13,8 @@ from dhkit.errors import DescriptionError
 from dhkit.model import pinocchio_model
 from dhkit.verification.measure import TOLERANCE, Floors, forward_tolerance, relative_error
 from dhkit.verification.reference import PinocchioResults
-from dhkit.verification.report import Agreement, VerificationReport
 from dhkit.verification.states import JointStates, random_motions
+from dhkit.verification.verification_report import Agreement, VerificationReport
 
 _FRAME_TOLERANCE = 1e-13
 """Tolerance for positions over the lengths of the table (at least 1 m) and rotation entries: some hundred roundings."""

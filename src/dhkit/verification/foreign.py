@@ -17,9 +17,9 @@ from dhkit.verification.comparison import Comparison, largest, worst
 from dhkit.verification.differences import differences
 from dhkit.verification.measure import Floors, relative_error
 from dhkit.verification.reference import PinocchioResults
-from dhkit.verification.report import VerificationReport, printable
 from dhkit.verification.second_opinion import second_opinion
 from dhkit.verification.states import random_motions
+from dhkit.verification.verification_report import VerificationReport, printable
 
 _SAME_POSE = 1e-12
 """Differences of positions, m, and rotation entries up to this are rounding."""

@@ -19,10 +19,10 @@ from dhkit.planning.along.path_states import PathStates, knots_of
 from dhkit.planning.along.timing import SmoothTimingProgram, TimingProgram
 from dhkit.planning.certificate import Checker
 from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, loaded
+from dhkit.planning.plan_report import report_of
 from dhkit.planning.program import ProgressCall, Starts, Task, Work
-from dhkit.planning.report import report_of
 from dhkit.planning.request import PathKeywords, PathOptions, checked_constraints, checked_limits, smoothed
-from dhkit.planning.search import TIME_SCALING_MARGIN, PlannedMotion, Search
+from dhkit.planning.search import TIME_SCALING_MARGIN, MotionSearch, PlannedMotion
 from dhkit.symbolic import Friction
 from dhkit.trajectories import JointPath, Trajectory
 from dhkit.trajectories.timing import check_duration, default_limits
@@ -139,7 +139,7 @@ def _best_timing(task: Task, intervals: int, work: Work, progress: ProgressCall 
     s = knots_of(path, intervals, rough, states.even_speeds(limits))
 
     def searched(task: Task, program: PathProgram[Profile], start: Profile | None) -> tuple[PlannedMotion, Profile]:
-        search = Search(task, program, work, progress)
+        search = MotionSearch(task, program, work, progress)
         starts = program.starts(task, None)
         if start is not None:
             starts = Starts([lambda: program.again(start, start), *starts.guesses])

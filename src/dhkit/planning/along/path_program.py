@@ -18,7 +18,7 @@ from dhkit.planning.program import (
     Indices,
     LocalFunction,
     Margins,
-    Program,
+    OptimizationProgram,
     RowKind,
     Rows,
     Scaling,
@@ -74,7 +74,7 @@ class IntervalSymbols(NamedTuple):
         return casadi.vertcat(self.step, self.left, self.right, *self.given, self.scale)
 
 
-class PathProgram(Program[Profile]):
+class PathProgram(OptimizationProgram[Profile]):
     """A program of one task along a path.
 
     Its parameters are, for each interval, the length in s and the path's coefficients at both ends; then those of all

@@ -9,18 +9,18 @@ from dhkit.planning.program.motion_program import (
     leg_durations,
     straight_motion,
 )
-from dhkit.planning.program.problem import Problem
-from dhkit.planning.program.program import (
+from dhkit.planning.program.optimization_program import (
     Arguments,
     Iterate,
     Margins,
-    Program,
+    OptimizationProgram,
     Starts,
     Task,
     limit_rows,
     row_bounds,
     worst_row,
 )
+from dhkit.planning.program.problem import Problem
 from dhkit.planning.program.solver import Progress, ProgressCall, Solution, Solver, delayed_interrupts
 from dhkit.planning.program.work import MAX_ITERATIONS, SearchLimitError, Work
 
@@ -39,8 +39,8 @@ __all__ = [
     "Margins",
     "Mesh",
     "MotionProgram",
+    "OptimizationProgram",
     "Problem",
-    "Program",
     "Progress",
     "ProgressCall",
     "RowKind",

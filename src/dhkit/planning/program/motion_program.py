@@ -13,8 +13,8 @@ from dhkit.planning.criteria import Limit, LoadedArm, Objective, States, cost_of
 from dhkit.planning.obstacles import PlaneRow
 from dhkit.planning.program.blocks import Indices
 from dhkit.planning.program.mesh import Curve, Knots, Mesh, assemble_trajectory, knots_along
+from dhkit.planning.program.optimization_program import Arguments, Margins, OptimizationProgram, Starts, Task
 from dhkit.planning.program.problem import USUAL_MOVE, Problem
-from dhkit.planning.program.program import Arguments, Margins, Program, Starts, Task
 from dhkit.planning.program.solver import Solver
 from dhkit.trajectories import Limits, Trajectory
 
@@ -144,7 +144,7 @@ def detour(task: Task, mesh: Mesh, durations: Array, seed: int) -> Knots:
     return knots_along(Trajectory.from_samples(task.arm, times, q, qd), mesh, times[2::2])
 
 
-class MotionProgram(Program[Knots]):
+class MotionProgram(OptimizationProgram[Knots]):
     """A problem with its solver.
 
     Parameters

@@ -21,7 +21,7 @@ from dhkit.planning.criteria import LOAD, Constraint, Limit, Objective, Point
 from dhkit.planning.obstacles import PlaneRow
 from dhkit.planning.program.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows, Scaling
 from dhkit.planning.program.mesh import Curve, Interval, Knots, Mesh
-from dhkit.planning.program.program import limit_rows
+from dhkit.planning.program.optimization_program import limit_rows
 from dhkit.symbolic import Friction
 from dhkit.symbolic.differentiable.frames import SymbolicTable
 from dhkit.trajectories import Limits

@@ -21,7 +21,7 @@ from dhkit.planning.criteria import Limit
 from dhkit.planning.obstacles import Gaps, Separation
 from dhkit.planning.program import Knots, Margins, MotionProgram, SearchLimitError, Task, knots_along
 from dhkit.planning.search.sampling import PathSampler
-from dhkit.planning.search.search import Excess, PlannedMotion, Search
+from dhkit.planning.search.search import Excess, MotionSearch, PlannedMotion
 from dhkit.trajectories import Trajectory
 
 POINTS = 9
@@ -114,7 +114,7 @@ class AvoidingSearch:
     """
 
     def __init__(
-        self, task: Task, search: Search[Knots], program: MotionProgram, finer: Callable[[], MotionProgram]
+        self, task: Task, search: MotionSearch[Knots], program: MotionProgram, finer: Callable[[], MotionProgram]
     ) -> None:
         avoidance = task.avoidance
         self.task = task
@@ -422,7 +422,7 @@ class AvoidingSearch:
 def motion_around(
     task: Task,
     free: PlannedMotion,
-    search: Search[Knots],
+    search: MotionSearch[Knots],
     program: MotionProgram,
     finer: Callable[[], MotionProgram],
     warm: Trajectory | None,

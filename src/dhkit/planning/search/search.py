@@ -14,7 +14,7 @@ from dhkit.planning.criteria import Limit, States, cost_of
 from dhkit.planning.program import (
     Iterate,
     Margins,
-    Program,
+    OptimizationProgram,
     ProgressCall,
     SearchLimitError,
     Solution,
@@ -134,11 +134,11 @@ class _Slowed:
 
 
 @dataclass(eq=False)
-class Search(Generic[Iterate]):
+class MotionSearch(Generic[Iterate]):
     """The search for one motion."""
 
     task: Task
-    program: Program[Iterate]
+    program: OptimizationProgram[Iterate]
     work: Work
     """Counts the solutions and iterations, and says when the search ends."""
     progress: ProgressCall | None = None
@@ -304,7 +304,7 @@ class Search(Generic[Iterate]):
         self,
         guess: Iterate,
         margins: Margins | None = None,
-        program: Program[Iterate] | None = None,
+        program: OptimizationProgram[Iterate] | None = None,
         warm: Solution | None = None,
     ) -> Iterate:
         """Return a solution from an initial guess, or from a solution from it with other margins, ``warm``.
@@ -350,7 +350,7 @@ class Excess:
     certificate: Certificate
 
 
-def coarser(search: Search[Iterate], motion: Trajectory) -> tuple[int, float] | None:
+def coarser(search: MotionSearch[Iterate], motion: Trajectory) -> tuple[int, float] | None:
     """Return the number of intervals of a coarser program and the cost of its motion; None if the limit is reached."""
     if search.work.is_over:
         return None

@@ -157,7 +157,7 @@ class Starts(Generic[Iterate]):
     """Number of the first guesses that are all solved, of which the best solution is taken first."""
 
 
-class Program(ABC, Generic[Iterate]):
+class OptimizationProgram(ABC, Generic[Iterate]):
     """A nonlinear program whose solutions are motions of tasks."""
 
     blocks: BlockProgram
@@ -195,7 +195,7 @@ class Program(ABC, Generic[Iterate]):
     def place(self, interval: float) -> str:
         """Return a place of the motion as text, given by the index of an interval."""
 
-    def tightened(self, margins: Margins, more: dict[int, Array]) -> tuple[Program[Iterate], Margins]:
+    def tightened(self, margins: Margins, more: dict[int, Array]) -> tuple[OptimizationProgram[Iterate], Margins]:
         """Return the program and the margins for another solution; ``more`` are margins to add, (intervals, rows)."""
         return self, margins.raised(more)
 
