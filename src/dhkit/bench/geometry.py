@@ -165,12 +165,14 @@ class OrthoParallel:
 
 def _fit_upright(description: Description) -> OrthoParallel:
     axes = joint_axes(description)
-    z, y = axes.directions[0], axes.directions[1]
+    z = axes.directions[0]
+    y = axes.directions[1]
     x = np.cross(y, z)
     q = np.zeros(6)
 
     def turn(joint: int, current: Array, target: Array) -> JointAxes:
-        """Turn a joint until one vector has the direction of another."""
+        """Turn a joint until one vector has the direction of another, seen along the joint's axis z."""
+        # Signed angle about z from c to t:  tan = z . (c x t) / (c . t - (z . c)(z . t)).
         axis = joint_axes(description, q).directions[joint]
         q[joint] = np.arctan2(axis @ np.cross(current, target), current @ target - (axis @ current) * (axis @ target))
         return joint_axes(description, q)

@@ -141,6 +141,8 @@ class Adaptive:
         m = effective_inertia(description, q)
         if not (m > 0).all():
             raise DescriptionError(f"{description.name}: joint {int(np.argmin(m)) + 1} feels no inertia")
+
+        # Both poles are real:  lambda = w (z - sqrt(z^2 - 1)) and kd / m = w (z + sqrt(z^2 - 1)), with product w^2.
         apart = np.sqrt(z * z - 1)
         kd = m * w * (z + apart)
         Gamma = positive(adaptation, "adaptation") * _inverse_excitation(description, kd)
@@ -155,6 +157,8 @@ class Adaptive:
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
         """Return the torques, shape (n,), N m and N, and store the estimate's rate for the next call."""
         Y, known, s = self._terms(q, qd, setpoint)
+
+        # With s = qd_r - qd the estimate's rate is Gamma Y^T s; it is integrated by the trapezoidal rule.
         rate = self.adaptation @ (Y.T @ s)
         if self._time is not None:
             self.estimate = self.estimate + (t - self._time) / 2 * (self._rate + rate)

@@ -304,6 +304,9 @@ class DormandPrince:
             y = solver.y_old + s * (solver.y - solver.y_old)
             return self.torques(t, y[:n], y[n : 2 * n], y[2 * n : -3])[0]
 
+        # The torques of a continuous controller change by less and less as the interval is halved: below the floor
+        #     max(JUMP_SHARE |tau(high) - tau(low)|, TORQUE_NOISE |tau|)
+        # after some halvings. Those of a jump keep its height.
         low = 0.0
         high = LOOK_AHEAD
         below = torques_at(low)

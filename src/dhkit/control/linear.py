@@ -105,6 +105,7 @@ class LQR:
         self.R = _weights(R, 1 / torques**2, "R")
         if np.linalg.eigvalsh(self.Q).min() < 0 or np.linalg.eigvalsh(self.R).min() <= 0:
             raise ValueError("Q is to be positive semidefinite, and R positive definite")
+        # P solves A^T P + P A - P B R^-1 B^T P + Q = 0, and K = R^-1 B^T P.
         try:
             self.P = solve_continuous_are(self.A, self.B, self.Q, self.R)
         except np.linalg.LinAlgError as error:

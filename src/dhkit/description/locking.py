@@ -324,6 +324,8 @@ def _common_normal(Y: ExactPose, values: Mapping[str, Expression]) -> _Row:
 
 def _parallel_axes_row(Y: ExactPose, is_opposite: bool) -> _Row:
     """Return the row of axes that point in equal or opposite directions: a normal through the first joint's frame."""
+    # delta = 0 and epsilon = z: the normal of length a = hypot(x, y) points to (x, y), so
+    # tan(beta) = y / x. Y turns x by beta + gamma if the axes point alike, by beta - gamma if they are opposite.
     x, y, z = Y[:3, 3]
     turn = arc_tangent(Y[1, 0], Y[0, 0])
     if y.is_zero:
@@ -340,6 +342,8 @@ def _parallel_axes_row(Y: ExactPose, is_opposite: bool) -> _Row:
 
 def _skew_axes_row(Y: ExactPose, number: Callable[[Expression], float]) -> _Row:
     """Return the row of other axes: beta from the second axis' direction, the rest from its position."""
+    # The second axis (u, v, w) is perpendicular to the normal (cos beta, sin beta, 0), so
+    #     (u, v) = sin(alpha) (sin beta, -cos beta),    w = cos(alpha).
     x, y, z = Y[:3, 3]
     u, v, w = Y[:3, 2]
     if u.is_zero:
@@ -351,8 +355,18 @@ def _skew_axes_row(Y: ExactPose, number: Callable[[Expression], float]) -> _Row:
     else:
         beta = arc_tangent(u, -v)
         sine = sqrt(u * u + v * v)
-    c, s = (cos(beta), sin(beta)) if u.is_zero or v.is_zero else (-v / sine, u / sine)
+    if u.is_zero or v.is_zero:
+        c = cos(beta)
+        s = sin(beta)
+    else:
+        c = -v / sine
+        s = u / sine
+
+    # Y's position is a (c, s, 0) + epsilon (0, 0, 1) + delta (u, v, w): across the normal only the last term has a part,
+    #     x s - y c = delta sin(alpha),    x c + y s = a,    z = epsilon + delta w.
     delta = (x * s - y * c) / sine
+
+    # Row z of Y is (sin(alpha) sin(gamma), sin(alpha) cos(gamma), cos(alpha)).
     sign = -1 if number(sine) < 0 else 1
     gamma = arc_tangent(Y[2, 0] * sign, Y[2, 1] * sign)
     return _Row(beta, z - delta * w, x * c + y * s, arc_tangent(sine, w), gamma, delta)

@@ -162,6 +162,7 @@ def _axes(order: str) -> tuple[tuple[int, int, int], bool]:
 
 
 def _cos_sin(angles: Array, degrees: bool) -> tuple[Array, Array]:
+    """Return cosines and sines of angles, rad or degrees; those of right angles in degrees are exact."""
     if not degrees:
         return np.cos(angles), np.sin(angles)
     # Multiples of 90 degrees are split off in degrees, which is exact, so that 90 degrees have the cosine 0.
@@ -169,6 +170,8 @@ def _cos_sin(angles: Array, degrees: bool) -> tuple[Array, Array]:
     remainder = np.radians(angles - 90.0 * quarter)
     c = np.cos(remainder)
     s = np.sin(remainder)
+
+    # cos(90 k + r) and sin(90 k + r) for k mod 4 = 0, 1, 2 and 3.
     quadrant = np.where(np.isfinite(quarter), np.mod(quarter, 4), 0)
     cosine = np.select([quadrant == 0, quadrant == 1, quadrant == 2], [c, -s, -c], s)
     sine = np.select([quadrant == 0, quadrant == 1, quadrant == 2], [s, c, -s], -c)
@@ -176,11 +179,14 @@ def _cos_sin(angles: Array, degrees: bool) -> tuple[Array, Array]:
 
 
 def _from_euler(angles: Array, order: str, degrees: bool) -> Array:
+    """Return R = R_i(p) R_j(q) R_k(r), shape (..., 3, 3); angles about fixed axes are multiplied in reverse order."""
     axes, extrinsic = _axes(order)
     cosines, sines = _cos_sin(angles[..., ::-1] if extrinsic else angles, degrees)
     rotation = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
     for k, axis in enumerate(axes):
         factor = np.zeros((*angles.shape[:-1], 3, 3))
+
+        # The axes (axis, i, j) are right-handed: the rotation turns i towards j.
         i = (axis + 1) % 3
         j = (axis + 2) % 3
         factor[..., axis, axis] = 1.0
@@ -218,10 +224,13 @@ def _to_euler(R: Array, order: str) -> Array:
 
 
 def _from_quaternion(quaternion: Array) -> Array:
+    """Return the rotations of quaternions (x, y, z, w) of any length, shapes (..., 3, 3) and (..., 4)."""
     norm = np.linalg.norm(quaternion, axis=-1, keepdims=True)
     if np.any(norm == 0.0):
         raise ValueError("quat has zero length; expected (x, y, z, w) of a rotation")
     x, y, z, w = np.moveaxis(quaternion / norm, -1, 0)
+
+    # R = 1 + 2 w [v]_x + 2 [v]_x^2 with v = (x, y, z) (Euler-Rodrigues).
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],

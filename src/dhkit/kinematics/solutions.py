@@ -175,6 +175,7 @@ class IKSolutions:
 
         With limits, as near as they allow; angles that no winding brings inside them stay outside.
         """
+        # q + 2 pi k with k the whole number nearest to (near - q) / (2 pi), and lower <= q + 2 pi k <= upper.
         with np.errstate(invalid="ignore"):
             turns = np.rint((near - q) / math.tau)
             if limits:
@@ -295,12 +296,14 @@ class IKSolutions:
         raise ValueError(f"joint values have shape {near.shape}; expected {expected[-1:]} or {expected}")
 
     def _closest(self, q: Array, near: Array, usable: NDArray[np.bool_]) -> Array:
+        """Return the usable branch with the least squared distance from ``near``, (..., n); NaN if there is none."""
         gaps = np.where(usable, np.sum((q - near[..., None, :]) ** 2, axis=-1), np.inf)
         best = np.argmin(np.where(np.isnan(gaps), np.inf, gaps), axis=-1)
         chosen = np.take_along_axis(q, best[..., None, None], axis=-2)[..., 0, :]
         return np.where(np.any(usable, axis=-1, keepdims=True), chosen, np.nan)
 
     def _choices(self, i: int, value: float) -> list[float]:
+        """Return the values of joint i (from 0) inside its limits that differ from one by whole turns."""
         lower = float(self.lower[i])
         upper = float(self.upper[i])
         if np.isnan(value):

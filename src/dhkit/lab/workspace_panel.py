@@ -138,6 +138,7 @@ def _distance_from_line(point: Array, line: Array) -> float:
         return np.inf
     if len(line) == 1:
         return float(np.linalg.norm(point - line[0]))
+    # The nearest point of a piece a + s (b - a) has s = (p - a) . (b - a) / |b - a|^2, cut to [0, 1].
     start = line[:-1]
     segment = np.diff(line, axis=0)
     length = np.einsum("ij,ij->i", segment, segment)
@@ -163,6 +164,8 @@ def _sample(arm: Arm, through: Array | None, job: Job) -> tuple[Array, Array, st
         axis = first_axis(arm.description)
         local = (space.positions - axis[:3, 3]) @ axis[:3, :3]
         towards = (through - axis[:3, 3]) @ axis[:3, :3]
+
+        # Distance from the plane through axis 1 (z) and the point: its normal is (-sin, cos) of the point's angle.
         angle = np.arctan2(towards[1], towards[0])
         offset = -np.sin(angle) * local[:, 0] + np.cos(angle) * local[:, 1]
         chosen = np.flatnonzero(np.abs(offset) < HALF_THICKNESS * max(arm.description.reach, 1e-9))[:MAX_POINTS]

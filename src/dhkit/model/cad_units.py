@@ -87,6 +87,7 @@ class Assembly:
             for link in (joint - 1, joint):
                 if meshes := self.meshes.get(link):
                     low, high = (metres * bound for bound in common_bounds(meshes))
+                    # The distance of a point from a box is the length of its part outside: max(low - p, p - high, 0).
                     outside = np.maximum(np.maximum(low - points, points - high), 0)
                     distances[joint, link] = float(np.linalg.norm(outside, axis=1).min())
         return distances

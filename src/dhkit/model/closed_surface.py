@@ -133,9 +133,10 @@ def tetrahedra(a: Array, b: Array, c: Array) -> Array:
 
     Volumes are in the unit of the corners cubed: m^3 for m.
     """
-    (ax, ay, az) = a.T
-    (bx, by, bz) = b.T
-    (cx, cy, cz) = c.T
+    # V = a . (b x c) / 6
+    ax, ay, az = a.T
+    bx, by, bz = b.T
+    cx, cy, cz = c.T
     volumes: Array = (ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)) / 6
     return volumes
 

@@ -23,12 +23,15 @@ def triangles_of(vertices: Array, corners: NDArray[np.intp], counts: NDArray[np.
     counts
         The number of corners of each polygon, shape (p,); polygons with fewer than three are left out.
     """
+    # The fan of a polygon 0 ... k - 1: triangles (0, i + 1, i + 2) for i = 0 ... k - 3, right where it is convex.
     starts = np.cumsum(counts) - counts
     sizes = np.maximum(counts - 2, 0)
     first_triangles = np.cumsum(sizes) - sizes
     first = np.repeat(starts, sizes)
     step = np.arange(int(sizes.sum())) - np.repeat(first_triangles, sizes)
     triangles: NDArray[np.intp] = corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
+
+    # Polygons with a concave corner are triangulated one by one.
     for k in np.unique(counts[counts > 3]):
         chosen = np.flatnonzero(counts == k)
         rings = corners[starts[chosen][:, None] + np.arange(k)]
@@ -52,6 +55,8 @@ def _is_concave(points: Array) -> NDArray[np.bool_]:
     with np.errstate(invalid="ignore", over="ignore"):  # coordinates that are not finite are refused later
         edges = np.roll(points, -1, axis=1) - points
         turns = np.einsum("pki,pi->pk", np.cross(edges, np.roll(edges, -1, axis=1)), _normals(points))
+
+        # A corner is concave if its turn e_i x e_(i+1) points against the normal.
         longest = (edges**2).sum(axis=2).max(axis=1) * np.linalg.norm(_normals(points), axis=1)
         concave: NDArray[np.bool_] = (turns < -_CONCAVE_SINE * longest[:, None]).any(axis=1)
     return concave
@@ -63,6 +68,8 @@ def _triangulate(points: Array) -> NDArray[np.intp]:
 
     normal = _normals(points[None])[0]
     normal = normal / np.linalg.norm(normal)
+
+    # Coordinates in the polygon's plane: u and normal x u.
     across = np.eye(3)[np.argmin(np.abs(normal))]
     u = np.cross(across, normal)
     u /= np.linalg.norm(u)

@@ -168,14 +168,21 @@ def _moments(mesh: TriangleMesh) -> tuple[float, Array, Array]:
     size = mesh.size or 1.0
     middle = mesh.bounds.mean(axis=0)
     scaled = TriangleMesh((mesh.vertices - middle) / size, mesh.faces)
+
+    # The solid is the sum of the signed tetrahedra (0, a, b, c) of its triangles, of volumes v (Tonon 2004).
     a, b, c = scaled.corners_about(np.zeros(3))
     v = tetrahedra(a, b, c)
     volume = float(v.sum())
     if volume <= MIN_VOLUME:
         return volume * size**3, middle, np.zeros((3, 3))
+
+    # A tetrahedron's centre is (a + b + c) / 4.
     centre = v @ (a + b + c) / (4 * volume)
     a, b, c = scaled.corners_about(centre)
     v = tetrahedra(a, b, c)
+
+    # Integral of r r^T over a tetrahedron with one corner at 0, with s = a + b + c:
+    #     v (a a^T + b b^T + c c^T + s s^T) / 20.
     s = a + b + c
     remainder = v @ s / (4 * volume)  # the rounding error of the centre
     second = np.sum([(x * v[:, None]).T @ x for x in (a, b, c, s)], axis=0) / 20

@@ -186,6 +186,7 @@ def _common_volume(solid: Manifold | None, around: list[tuple[Manifold | None, b
 
 def _signed_volume(corners: Array) -> float:
     """Return the volume enclosed by triangles, negative if they are inside out, about the middle of their box."""
+    # V = sum a . (b x c) / 6 over the triangles; about the middle of the box few digits are lost.
     middle = (corners.min(axis=(0, 1)) + corners.max(axis=(0, 1))) / 2
     a, b, c = np.moveaxis(corners - middle, 1, 0)
     return float((np.einsum("ij,ij->i", a, np.cross(b, c)) / 6).sum())
@@ -234,8 +235,14 @@ class _Rays:
 
 def _exits_minus_entries(corners: Array) -> float:
     """Return how often the ray from 0 along z passes out of triangles, minus how often in."""
+    # Seen along z: u, v, w are twice the signed areas of (0, b, c), (0, c, a) and (0, a, b), the barycentric
+    # coordinates of the ray times the area of (a, b, c). The ray hits the triangle if all have one sign, at the height
+    #     (u a_z + v b_z + w c_z) / area;
+    # it passes out where the triangle faces along z (area > 0), and in where it faces against it.
     a, b, c = np.moveaxis(corners, 1, 0)
-    u, v, w = (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] for p, q in ((b, c), (c, a), (a, b)))
+    u = b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0]
+    v = c[:, 0] * a[:, 1] - c[:, 1] * a[:, 0]
+    w = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     area = u + v + w
     is_hit = ((u > 0) & (v > 0) & (w > 0)) | ((u < 0) & (v < 0) & (w < 0))
     is_ahead = is_hit & ((u * a[:, 2] + v * b[:, 2] + w * c[:, 2]) * area > 0)

@@ -245,6 +245,7 @@ class _ReportReader:
         deviations = []
         axes = {match[1]: match for match in _AXIS.finditer(self.text, block.end())}
         for sign in (1.0, -1.0):
+            # The right tensor I has the listed moments m_k as eigenvalues, and the listed axes e_k: I e_k = m_k e_k.
             tensor = _with_products_times(-sign, listed)
             deviation = float(np.abs(np.linalg.eigvalsh(tensor) - np.sort(moments)).max())
             if set(axes) == set("xyz"):
@@ -262,7 +263,11 @@ class _ReportReader:
         mass = centre.mass
         com = centre.com
         com_half = centre.com_half
+
+        # I_origin = I_com + m (c^2 1 - c c^T) (Steiner).
         steiner = mass * (com @ com * np.eye(3) - np.outer(com, com))
+
+        # Half units of the last places of all numbers are carried through the same formula.
         reach = float(np.abs(com).max()) + com_half
         allowed = (
             _MISFIT_ROUNDINGS * (float(half.max() + origin_half.max()) + mass * com_half * 2 * reach)

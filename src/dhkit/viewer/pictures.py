@@ -260,14 +260,20 @@ class _Camera:
         low = points.min(axis=0)
         high = points.max(axis=0)
         span = high - low
+
+        # The direction from the scene towards the camera: obliquely from above, and steeper for a flat scene.
         towards = _SPACE_DIRECTION if abs(up[2]) > 0.5 else np.array([0.18, 0.0, 1.0]) + 0.14 * up
         if abs(up[2]) > 0.5 and span[2] < 0.25 * max(span[0], span[1]):
             towards = _FLAT_DIRECTION
+
+        # The camera's axes as rows of R: right, down, ahead.
         ahead = -towards / np.linalg.norm(towards)
         right = np.cross(ahead, up)
         right /= np.linalg.norm(right)
         R = np.stack([right, np.cross(ahead, right), ahead])
         fine = (_SUPERSAMPLING * size[0], _SUPERSAMPLING * size[1])
+        # A camera at the distance D from the centre sees the point (x, y, depth) at f x / (D + depth) pixels, which
+        # are at most half the width w:  D >= 2 f |x| / w - depth,  and likewise for y.
         focal_length = 0.5 * min(fine) / np.tan(_FIELD_OF_VIEW / 2)
         centre = (low + high) / 2
         across = np.abs((points - centre) @ R[:2].T) * 2 * focal_length / np.array(fine)
@@ -280,7 +286,10 @@ class _Camera:
         """Return points, shape (..., 3), m, world, as fine pixels right and down from the upper left, and depth, m."""
         local = (points - self.eye) @ self.R.T
         depth = np.maximum(local[..., 2:], self.min_depth)
-        return np.concatenate([self.focal_length * local[..., :2] / depth + 0.5 * np.array(self.size), depth], axis=-1)
+
+        # Pinhole camera: (u, v) = f (x, y) / depth, about the middle of the picture.
+        pixels = self.focal_length * local[..., :2] / depth + 0.5 * np.array(self.size)
+        return np.concatenate([pixels, depth], axis=-1)
 
 
 # Pixels
@@ -344,6 +353,7 @@ def _rasterize(corners: Array, colors: Array, image: NDArray[np.uint8]) -> NDArr
 def _draw_block(corners: Array, colors: Array, drawn: NDArray[np.uint8], nearest: Array, size: tuple[int, int]) -> None:
     """Draw triangles, shape (m, 3, 3), over pixels, shape (height * width, 3), and update their largest 1/depth."""
     height, width = size
+    # The pixels of each span: those whose centres, at x + 1/2, lie between its ends.
     which, y, left, right = _spans(corners[..., :2], height)
     first = np.clip(np.ceil(left - 0.5), 0, width).astype(int)
     counts = np.clip(np.floor(right - 0.5), -1, width - 1).astype(int) - first + 1
@@ -355,6 +365,9 @@ def _draw_block(corners: Array, colors: Array, drawn: NDArray[np.uint8], nearest
     x = np.repeat(first, counts) + _ranges(counts)
     which = np.repeat(which, counts)
     y = np.repeat(y, counts)
+
+    # Barycentric coordinates of a pixel's centre p in the triangle a, b, c (shares of its area):
+    #     p = a + beta (b - a) + gamma (c - a).
     (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (corners[:, k].T for k in range(3))
     area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
     area = np.where(np.abs(area) < 1e-12, np.inf, area)
@@ -363,6 +376,7 @@ def _draw_block(corners: Array, colors: Array, drawn: NDArray[np.uint8], nearest
     beta = (px * (cy - ay)[which] - py * (cx - ax)[which]) / area[which]
     gamma = (py * (bx - ax)[which] - px * (by - ay)[which]) / area[which]
     pixel = y * width + x
+
     # 1/depth is linear across the picture; the largest is the nearest.
     nearness = 1 / az[which] + beta * (1 / bz - 1 / az)[which] + gamma * (1 / cz - 1 / az)[which]
     np.maximum.at(nearest, pixel, nearness)
@@ -372,17 +386,20 @@ def _draw_block(corners: Array, colors: Array, drawn: NDArray[np.uint8], nearest
 
 def _spans(corners: Array, height: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Array, Array]:
     """Return the rows of pixels that triangles, shape (m, 3, 2), cover: triangle, row, left and right end."""
+    # Rows whose middle, at y + 1/2, lies between a triangle's lowest and highest corner.
     low = np.clip(np.ceil(corners[..., 1].min(axis=1) - 0.5), 0, height).astype(int)
     high = np.clip(np.floor(corners[..., 1].max(axis=1) - 0.5), -1, height - 1).astype(int)
     counts = np.maximum(high - low + 1, 0)
     which = np.repeat(np.arange(len(corners)), counts)
     row = np.repeat(low, counts) + _ranges(counts)
+
+    # A span ends where the middle of the row crosses edges p q of the triangle.
     at = row + 0.5
     left = np.full(len(which), np.inf)
     right = np.full(len(which), -np.inf)
     for k in range(3):
-        (px, py) = corners[which, k].T
-        (qx, qy) = corners[which, (k + 1) % 3].T
+        px, py = corners[which, k].T
+        qx, qy = corners[which, (k + 1) % 3].T
         crosses = (py <= at) != (qy <= at)
         with np.errstate(divide="ignore", invalid="ignore"):
             x = px + (at - py) / (qy - py) * (qx - px)
@@ -408,6 +425,8 @@ def _draw_ground(description: Description, camera: _Camera) -> NDArray[np.uint8]
     lines = int(np.ceil(1.3 * size / step))
     half = lines * step
     along = np.linspace(-half, half, 8 * lines + 1)
+
+    # Each grid line is drawn in pieces, whose colour fades with the distance of their middle from the origin.
     for offset in step * np.arange(-lines, lines + 1):
         for swapped in (False, True):
             points = np.stack([along, np.full_like(along, offset), np.zeros_like(along)], axis=1)
@@ -445,6 +464,8 @@ def _finish(
             (label.text, camera.project(nodes[label.frame][:3, 3])[:2] / _SUPERSAMPLING)
             for label in frame_labels(description)
         ]
+
+    # The fine picture is reduced, and names are written at the size of the small one.
     small = drawn.resize((camera.size[0] // _SUPERSAMPLING, camera.size[1] // _SUPERSAMPLING), Image.Resampling.LANCZOS)
     draw = ImageDraw.Draw(small)
     font = ImageFont.load_default(max(12, small.height // 36))

@@ -63,6 +63,8 @@ def chain_fit(axes: Axes) -> Fit | None:
         return None
     revolute = [i for i in range(1, axes.n + 1) if not axes.prismatic[i - 1]]
     first = revolute[0]
+
+    # All points are taken in the plane (u, v) perpendicular to the revolute axes, from the first axis.
     R = _across(axes.direction(first))
     origin = axes.point(first)
     tool = R @ (axes.T_world_tool[:3, 3] - origin)
@@ -70,8 +72,12 @@ def chain_fit(axes: Axes) -> Fit | None:
     end = R @ (axes.point(revolute[2]) - origin) if len(revolute) == 3 else tool
     upper = elbow[:2]
     fore = end[:2] - elbow[:2]
+
+    # Without an upper or a fore arm the elbow's angle is not determined.
     if min(np.linalg.norm(upper), np.linalg.norm(fore)) <= axes.tolerance * axes.scale:
         return None
+
+    # The tool's axis that lies best in the plane tells the sum of the angles.
     seen = R @ axes.T_world_tool[:3, :3]
     column = int(np.argmax(np.linalg.norm(seen[:2], axis=0)))
     slides = ", a slide along them" if "P" in axes.kinds else ""

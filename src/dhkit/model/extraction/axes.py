@@ -178,6 +178,7 @@ def length_costs(lengths: Array) -> Array:
 
 def angle_costs(angles: Array) -> Array:
     """Return the costs of entries with these angles, rad, any shape; same shape."""
+    # 0 costs nothing; +-90 degrees cost an entry; 180 degrees and oblique angles cost more.
     quarter = np.round(angles / (np.pi / 2))
     is_oblique = np.abs(angles - quarter * (np.pi / 2)) > ZERO
     is_straight = ~is_oblique & (np.abs(quarter) == 2)
