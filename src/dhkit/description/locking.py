@@ -362,7 +362,7 @@ def _skew_axes_row(Y: ExactPose, number: Callable[[Expression], float]) -> _Row:
         c = -v / sine
         s = u / sine
 
-    # Y's position is a (c, s, 0) + epsilon (0, 0, 1) + delta (u, v, w): across the normal only the last term has a part,
+    # Y's position is a (c, s, 0) + epsilon (0, 0, 1) + delta (u, v, w). Across the normal only delta counts:
     #     x s - y c = delta sin(alpha),    x c + y s = a,    z = epsilon + delta w.
     delta = (x * s - y * c) / sine
 
