@@ -19,7 +19,10 @@ class ExpressionError(DhkitError):
 
 
 class DescriptionError(DhkitError):
-    """A robot file, table or assignment that cannot be used: names file, joint and key, what was found and expected."""
+    """A robot file, table or assignment that cannot be used.
+
+    Its message names file, joint and key, the value found and the value expected.
+    """
 
 
 class ModelError(DhkitError):

@@ -144,7 +144,7 @@ class Requirement:
     Attributes
     ----------
     quantity, what
-        The quantity, and what is compared.
+        The quantity, and the property that is compared.
     required, target
         The required number, and a better one that is aimed at.
     at_most
@@ -180,7 +180,7 @@ class Requirement:
 
     @property
     def cells(self) -> tuple[str, str, str, str]:
-        """Cells of a row: what is compared, required number, measured number, verdict."""
+        """Cells of a row: compared property, required number, measured number, verdict."""
         target = f" (target {self.target:g})" if self.target else ""
         bound = f"at {'most' if self.at_most else 'least'} {self.required:g}{target}"
         measured = "not measured" if self.measured is None else f"{self.measured:.3g}"
@@ -350,7 +350,7 @@ class BenchReport(Report):
 
     @property
     def tables(self) -> list[Table]:
-        """Timings by quantity, requirements, and what the probes measured."""
+        """Timings by quantity, requirements, and results of the probes."""
         columns = ("contender", "called", "items", "time", "quartiles", "x batch", "x single", "solutions", "error")
         tables: list[Table] = [
             (quantity, columns, [_cells(row) for row in self.rows if row.quantity == quantity])

@@ -50,7 +50,7 @@ def reset(controller: object) -> None:
     if isinstance(controller, type):
         raise TypeError(f"controller is the class {controller.__name__}; expected an object of it")
     if controller is not None and not callable(controller):
-        raise TypeError(f"controller is {type(controller).__name__}; expected what can be called")
+        raise TypeError(f"controller is {type(controller).__name__}; expected a callable")
     method = getattr(controller, "reset", None)
     if not callable(method):
         return

@@ -13,7 +13,7 @@ from dhkit.expressions import CONSTANTS, Expression, parse
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?", re.ASCII)
 """A decimal, as files have it."""
 _JOINT_VARIABLE = re.compile(r"\s*q_?([0-9]{1,2})\s*([+-].*)?", re.ASCII | re.DOTALL)
-"""A joint variable and what is added to it."""
+"""A joint variable and the constant added to it."""
 
 Entry = TypeVar("Entry")
 

@@ -33,7 +33,7 @@ class Description(RobotData):
     Raises
     ------
     DescriptionError
-        The values describe no robot; the message names joint and key, what was found and what was expected.
+        The values describe no robot; the message names joint and key, the value found and the value expected.
     """
 
     def __post_init__(self) -> None:

@@ -56,7 +56,7 @@ def read_robot(path: str | Path) -> Description:
     Raises
     ------
     DescriptionError
-        It cannot be read, or describes no robot: file, joint, key, what was found and expected.
+        It cannot be read, or describes no robot: file, joint, key, the value found and the value expected.
     """
     path = Path(path)
     content = read_bounded(path, BOUNDS.file_bytes)

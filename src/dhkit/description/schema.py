@@ -38,7 +38,7 @@ JsonSchema: TypeAlias = dict[str, Any]
 
 
 def expected(text: str) -> PydanticCustomError:
-    """Return a fault whose message is what was found and then this text."""
+    """Return a fault whose message is the value found and then this text."""
     return PydanticCustomError("expected", "{text}", {"text": text})
 
 
@@ -304,7 +304,7 @@ def validated(document: Document) -> RobotForm:
     Raises
     ------
     DescriptionError
-        The first fault: where, what was found, what was expected.
+        The first fault: where, the value found, the value expected.
     """
     try:
         return RobotForm.model_validate(document)

@@ -27,7 +27,7 @@ from dhkit.description.values import (
 from dhkit.expressions import Expression
 
 _Content: TypeAlias = dict[str, Any]
-"""Keys of a table with what tomlkit takes as values."""
+"""Keys of a table, with values that tomlkit takes."""
 
 
 def toml_text(description: RobotData) -> str:

@@ -46,7 +46,7 @@ def check(description: RobotData) -> tuple[str, ...]:
     Raises
     ------
     DescriptionError
-        The first fault: joint, key, what was found and what was expected.
+        The first fault: joint, key, the value found and the value expected.
     """
     for what, count, least, most in (
         ("joints", description.n, 1, BOUNDS.joints),

@@ -256,11 +256,11 @@ class Parameters:
         return self._symbol(name)
 
 
-# What a file has
+# The executed file
 
 
 class ExecutedFile:
-    """An executed file, and what is asked of it."""
+    """An executed file, and the answers to requests about it."""
 
     def __init__(self, namespace: Namespace, file: str, symbolic: Symbolic) -> None:
         self.namespace = namespace

@@ -1,4 +1,4 @@
-"""Bounds on programs of others and on what they answer."""
+"""Bounds on programs of others and on their answers."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ def package_paths(names: tuple[str, ...]) -> dict[Path, Path]:
         with suppress(metadata.PackageNotFoundError):
             distribution = metadata.distribution(name)
             requirements = distribution.requires or ()
-            # Behind a semicolon stands what extras and other systems need.
+            # Requirements of extras and other systems follow a semicolon.
             waiting += [_name_of(requirement) for requirement in requirements if ";" not in requirement]
             for top in {file.parts[0] for file in distribution.files or ()}:
                 if top not in ("..", "bin", "__pycache__", "cmeel.prefix"):

@@ -30,7 +30,7 @@ class Child:
     limits
         Limits of time and memory.
     isolation
-        What the program can see and reach.
+        Isolation of the program: files and resources that it can use.
 
     Attributes
     ----------

@@ -23,7 +23,7 @@ def python_command(isolation: Isolation, runner: Path, folder: Path) -> list[str
     Parameters
     ----------
     isolation
-        What the program can see and reach.
+        Isolation of the program: files and resources that it can use.
     runner
         The runner's file.
     folder
@@ -60,7 +60,7 @@ def isolated_command(
     Parameters
     ----------
     isolation
-        What the program can see and reach.
+        Isolation of the program: files and resources that it can use.
     program
         The program and its arguments, with paths as it sees them.
     folder

@@ -145,7 +145,7 @@ class Process:
     limits
         Limits of the program.
     isolation
-        What the program can see and reach.
+        Isolation of the program: files and resources that it can use.
     shown
         Further files that the program may read, at their own paths.
     """

@@ -57,7 +57,7 @@ def grade(
     Raises
     ------
     AnswerError
-        The sheet cannot be judged; the message names the key, what was found and what was expected.
+        The sheet cannot be judged; the message names the key, the value found and the value expected.
     DescriptionError
         The robot file describes no robot.
     """
@@ -183,7 +183,7 @@ def robot_of(sheet: AnswerSheet, folder: str | Path) -> Description:
 
 
 def prepare(description: Description | None, report: GradeReport | None = None) -> None:
-    """Import and derive what the next sheets need, so that processes forked from this one inherit it.
+    """Import modules and derive equations that the next sheets need, so that processes forked from this one inherit it.
 
     Parameters
     ----------

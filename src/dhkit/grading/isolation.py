@@ -91,7 +91,7 @@ class Worker:
     received: bytearray = field(default_factory=bytearray)
 
     def read(self) -> bool:
-        """Receive what is in the pipe; return whether the process has closed it, its result being complete."""
+        """Receive the contents of the pipe; return whether the process has closed it, its result being complete."""
         piece = os.read(self.pipe, _PIPE_BYTES)
         self.received += piece
         return not piece
@@ -171,7 +171,7 @@ def is_late(status: int) -> bool:
 
 
 def _run(end: int, work: Callable[[], bytes], limits: WorkerLimits) -> NoReturn:
-    """Run in the child: work, write the result, and exit without cleaning up what belongs to the parent."""
+    """Run in the child: work, write the result, and exit without cleaning up resources of the parent."""
     import fcntl
 
     status = 1

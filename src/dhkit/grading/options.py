@@ -33,7 +33,7 @@ class GradeOptions(Options):
     then the formulas that its names stand for. Functions that cannot be called with symbols are called with numbers,
     and agree at sampled states at best."""
     isolation: Isolation | None = None
-    """What an executed program can see and reach; by default the best that works on this system, or none."""
+    """Isolation of an executed program; by default the best that works on this system, or none."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.task, AnswerSheet | None):

@@ -290,7 +290,7 @@ class GradeReport:
 
     @property
     def conclusion(self) -> str:
-        """The verdict in words, with the parameter values at which it holds and what the sheet lacks to pass."""
+        """The verdict in words, with the parameter values at which it holds and the reasons for not passing."""
         values = ", ".join(f"{name} = {value:g}" for name, value in self.at_values.items())
         proof = ", and a proof is asked for" if self._lacks_proof else ""
         return f"{self.verdict.value}{f', judged at {values}' if values else ''}{proof}"
@@ -302,7 +302,7 @@ class GradeReport:
 
     @property
     def missing_text(self) -> str:
-        """What is missing, by name; of steps of inverse kinematics with the joint that none finds."""
+        """Missing quantities, by name; of steps of inverse kinematics with the joint that none finds."""
         incomplete = (entry for entry in self._incomplete if not entry.answer)
         return ", ".join(
             f"{entry.name} ({entry.statement})" if entry.statement.startswith(NO_STEP) else entry.name

@@ -59,7 +59,7 @@ class Credit:
 
 @dataclass(frozen=True, config=_STRICT)
 class Rubric:
-    """What answers are worth.
+    """Weights of the answers.
 
     Examples
     --------
@@ -108,7 +108,7 @@ class Rubric:
         Raises
         ------
         AnswerError
-            The first thing wrong, after ``place``: key, what was found, what was expected.
+            The first thing wrong, after ``place``: key, the value found, the value expected.
         """
         if not isinstance(data, Mapping):
             raise AnswerError(f"{place}found {_short_repr(data)}; expected a table")

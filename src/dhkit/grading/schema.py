@@ -62,7 +62,7 @@ def task_schema() -> Schema:
 
 def rubric_schema() -> Schema:
     """Return the JSON Schema of rubrics, the file of ``dhkit grade --rubric``, from the form that validates them."""
-    schema = TypeAdapter(Rubric).json_schema() | {"description": "What answers are worth."}
+    schema = TypeAdapter(Rubric).json_schema() | {"description": "Weights of the answers."}
     schema["properties"]["weights"]["propertyNames"] = {"pattern": _whole(WEIGHED.pattern)}
     schema["$defs"]["Credit"]["properties"]["mistakes"]["propertyNames"] = {"enum": sorted(LIBRARY)}
     return titled_schema("dhkit rubric", schema)
@@ -86,7 +86,7 @@ def _properties() -> Schema:
         "student": _text("Student's name."),
         "rubric": {
             "$ref": "#/$defs/Rubric",
-            "description": "What answers are worth, unless --rubric says it; a sheet's own counts where it is alone.",
+            "description": "Weights of the answers, unless --rubric says it; a sheet's own counts where it is alone.",
         },
         "q": names | {"description": "Names of the joint variables (rad, m), one a joint; q1 ... qn unless given."},
         "qd": names | {"description": "Names of their rates (rad/s, m/s)."},

@@ -74,7 +74,7 @@ def check_whole(name: str, value: object, least: int) -> None:
     Raises
     ------
     ValueError
-        It is not; gives the name, what was found and what is expected.
+        It is not; gives the name, the value found and the value expected.
     """
     if not isinstance(value, int | np.integer) or value < least:
         raise ValueError(f"{name} is {value!r}; expected a whole number, {least} or more")

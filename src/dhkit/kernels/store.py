@@ -21,7 +21,7 @@ from dhkit.kernels.machine_code import processor
 log = logging.getLogger(__name__)
 
 PACKAGES = ("control", "description", "dynamics", "expressions", "kernels", "kinematics", "symbolic")
-"""Packages of dhkit whose sources determine what a kernel computes."""
+"""Packages of dhkit whose sources determine the results of a kernel."""
 _VERSIONS = ("casadi", "llvmlite", "numpy")
 """Packages whose versions determine programs and machine code."""
 

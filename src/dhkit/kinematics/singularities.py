@@ -88,7 +88,7 @@ def singularities(description: Description) -> Singularities:
     Raises
     ------
     ModelError
-        No closed form is known for this arm; says how its axes lie and what to use.
+        No closed form is known for this arm; says how its axes lie and which function to use.
 
     Examples
     --------

@@ -147,7 +147,7 @@ class Workspace:
 
     @property
     def estimate(self) -> Estimate | None:
-        """The volume, area or length of what is reached; None for a curved surface, a curve or a point.
+        """The volume, area or length of the reached set; None for a curved surface, a curve or a point.
 
         It is an estimate by cells of edge ``grid.edge``: see :class:`Estimate`.
         """

@@ -143,7 +143,7 @@ class Goal:
     text
         The goal in words.
     points
-        What the goal is worth.
+        Points of the goal.
     condition
         The goal as a condition that is checked.
     """

@@ -43,7 +43,7 @@ MAX_NUMBER = 1e4
 """Largest number, rad or m."""
 PANEL_ENTRY = re.compile(r'^ +\["(\w+)", ', re.MULTILINE)
 DIRECTION_CONTROLS = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
-"""Characters that change the direction of the text after them, and so what a reader sees."""
+"""Characters that change the direction of the text after them, and so the text that a reader sees."""
 
 
 @cache
@@ -186,7 +186,7 @@ class GoalForm:
 
 @dataclass(frozen=True, config=STRICT)
 class StepForm:
-    """A step: what is to be read, and what is to be reached."""
+    """A step: a text to read, and goals to reach."""
 
     title: Line
     text: Text | None = None
@@ -229,7 +229,7 @@ def validated(document: Mapping[str, object]) -> AssignmentForm:
     Raises
     ------
     DescriptionError
-        The message names the first fault: its place, what was found and what was expected.
+        The message names the first fault: its place, the value found and the value expected.
     """
     try:
         return TypeAdapter(AssignmentForm).validate_python(dict(document))

@@ -360,7 +360,7 @@ class ControlPanel(Panel):
         Raises
         ------
         ValueError
-            Names what is missing.
+            Names the missing part.
         """
         if reference is ReferenceKind.MOTION and self.motions.motion is None:
             raise ValueError("control: there is no motion to follow; expected one planned first (Motion)")

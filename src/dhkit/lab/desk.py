@@ -145,5 +145,5 @@ class Desk:
         }
 
     def close(self) -> None:
-        """End what runs in the background."""
+        """End the background work."""
         self._contacts.close()

@@ -46,7 +46,7 @@ class Lab:
         A program with ``fk``, ``ik`` or ``controller`` that is compared with the arm: a ``.py`` or ``.m`` file, or a
         command; see :class:`dhkit.programs.Program`.
     isolation
-        What that program can see and reach; None for the best that works here.
+        Isolation of the program: files and resources that it can use; None for the best that works here.
     solid
         An ``.stl`` file with the solid of the panel of transforms; by default a box.
     assignment
@@ -139,7 +139,7 @@ class Lab:
             return handler(data)
 
     def close(self) -> None:
-        """End what runs, and the server."""
+        """End running work, and the server."""
         with self._lock:
             self._closed = True
         for panel in self._panels:

@@ -45,7 +45,7 @@ class OwnPanel(Panel):
     source
         The program, as :class:`dhkit.programs.Program` takes it; None if there is none.
     isolation
-        What the program can see and reach; None for the best that works here.
+        Isolation of the program: files and resources that it can use; None for the best that works here.
     lock
         Held while a score is taken.
     """
@@ -121,7 +121,7 @@ class OwnPanel(Panel):
         return program.controller
 
     def publish(self) -> None:
-        """Send what is known about the program to the pages."""
+        """Send the state of the program to the pages."""
         state = {"ghosts": self._shows_ghosts, **self._state} if self.source is not None else None
         self.desk.view.panel("own", state)
 

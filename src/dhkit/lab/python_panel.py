@@ -1,4 +1,4 @@
-"""The panel "Copy as Python": the lines of Python that do what a person has done in the lab."""
+"""The panel "Copy as Python": the lines of Python equivalent to a person's work in the lab."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ FRICTION_ARGUMENTS = {
 
 
 class PythonPanel(Panel):
-    """The request for the lines of Python that do what the panels show; they run as they are."""
+    """The request for the lines of Python equivalent to the panels; they run as they are."""
 
     def __init__(self, desk: Desk, tool: ToolPanel, motions: MotionPanel, control: ControlPanel) -> None:
         super().__init__(desk)

@@ -188,6 +188,6 @@ class Panel:
         """Send the panel's state to the pages; a panel without state sends nothing."""
 
     def close(self) -> None:
-        """End what the panel runs in the background."""
+        """End the background work of the panel."""
         if self.jobs is not None:
             self.jobs.close()

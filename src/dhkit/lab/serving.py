@@ -1,4 +1,4 @@
-"""Serving a lab: in the foreground until it is interrupted, or beside what a program does."""
+"""Serving a lab: in the foreground until it is interrupted, or beside a running program."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The panel of answers: what somebody derived for this robot is judged in a process of its own."""
+"""The panel of answers: a derivation for this robot is judged in a process of its own."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def _judge(description: Description, text: str, suffix: str, job: Job) -> JsonOb
 
 
 def _report_state(report: GradeReport, folder: str) -> JsonObject:
-    """Return what the page shows of a report, without the name of the folder that it was made in."""
+    """Return the parts of a report that the page shows, without the name of the folder that it was made in."""
     return {
         "running": False,
         "error": report.error.replace(f"{folder}{os.sep}answer", "the answer") or None,

@@ -61,7 +61,7 @@ class TaskPanel(Panel):
         self.publish()
 
     def publish(self) -> None:
-        """Send the assignment, and what has been reached, to the pages."""
+        """Send the assignment, and the goals reached, to the pages."""
         with self._lock:
             self.desk.view.panel("task", None if self.assignment is None else self._state(self.assignment))
 

@@ -139,7 +139,7 @@ def _amount(step: Fields) -> float:
 
 
 def _formulas(k: int, kind: str, axis: str, amount: float, about: str) -> tuple[str, str]:
-    """Return the pose after step k, and what the step does to points in the world, as LaTeX."""
+    """Return the pose after step k, and its effect on points in the world, as LaTeX."""
     size = f"{np.degrees(amount):.4g}^{{\\circ}}" if kind == "turn" else rf"{amount:.4g}\,\mathrm{{m}}"
     E = f"{'R' if kind == 'turn' else 'D'}_{{{axis}}}({size})"
     if about == "fixed":

@@ -66,7 +66,7 @@ class WorkspacePanel(Panel):
         return dict(zip(("distance", "boundary", "point"), nearest or (None, None, None), strict=True))
 
     def publish(self) -> None:
-        """Send what is drawn to the pages."""
+        """Send the drawing to the pages."""
         self.desk.view.panel("workspace", self._state)
 
     def _publish(self, **state: object) -> None:

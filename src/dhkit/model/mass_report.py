@@ -63,7 +63,7 @@ def read_mass_report(path: str | Path) -> tuple[ReportedMass, ...]:
     Raises
     ------
     ModelError
-        It cannot be read: one line with file, line, what was found and what was expected.
+        It cannot be read: one line with file, line, the value found and the value expected.
     """
     path = Path(path)
     content = read_bounded(path, BOUNDS.report_bytes, "a report of mass properties", ModelError)

@@ -87,9 +87,9 @@ MeshVersions: TypeAlias = tuple[Path | None, tuple[tuple[int, int, int] | None, 
 
 
 def mesh_versions(description: Description) -> MeshVersions:
-    """Return what a cache of a robot's shapes depends on beside the description: the files of its meshes.
+    """Return the dependencies of a cache of a robot's shapes beside the description: the files of its meshes.
 
-    A file that is replaced has another version, and what was computed from it is computed again.
+    A file that is replaced has another version, and values computed from it are computed again.
     """
     folder = description.mesh_folder
     if folder is None:

@@ -57,7 +57,7 @@ class Chain:
     zero_poses
         Every link in the base link, shape (4, 4) each, m, with all joints at zero.
     notes
-        Unusual elements of the file, and what was done to get a chain.
+        Unusual elements of the file, and changes that make a chain of it.
     """
 
     tree: UrdfTree

@@ -327,7 +327,7 @@ def _by_name(robot: Element, tag: str) -> dict[str, Element]:
 def _parent_joints(links: Mapping[str, Element], joints: Mapping[str, Element]) -> dict[str, str]:
     """Return the name of the joint between each link and its parent."""
     if not links:
-        raise ModelError("no links; expected a robot (of a xacro file: what xacro makes of it)")
+        raise ModelError("no links; expected a robot (of a xacro file: its expansion by xacro)")
     parents: dict[str, str] = {}
     for name, joint in joints.items():
         for tag in ("parent", "child"):

@@ -80,7 +80,7 @@ class UrdfShape:
 class UrdfLink:
     """A link: its inertial, visual and collision elements.
 
-    ``fault`` is what is wrong with them; they are left out, and a chain with the link is refused.
+    ``fault`` says what is wrong with them; they are left out, and a chain with the link is refused.
     """
 
     name: str
@@ -111,7 +111,7 @@ class UrdfJoint:
     mimics
         The joint that this one follows, or None.
     fault
-        What is wrong with its limits or its dynamics, which are left out; a chain with it is refused.
+        Fault of its limits or its dynamics, which are left out; a chain with it is refused.
     """
 
     name: str

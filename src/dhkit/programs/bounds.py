@@ -1,4 +1,4 @@
-"""Bounds on programs of users and on what their functions return."""
+"""Bounds on programs of users and on the results of their functions."""
 
 from __future__ import annotations
 

@@ -126,7 +126,7 @@ def _pose(call: Caller, q: Array) -> Array | None:
 
 
 def _pose_hint(poses: Array, error: float) -> tuple[str, ...]:
-    """Return what is wrong with poses, shape (N, 4, 4), whatever the arm is; ``error`` is the largest difference."""
+    """Return the fault of poses, shape (N, 4, 4), whatever the arm is; ``error`` is the largest difference."""
     R = poses[:, :3, :3]
     if np.ptp(poses, axis=0).max() < POSE_TOLERANCE:
         return ("it gives the same pose for every q",)

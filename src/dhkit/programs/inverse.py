@@ -199,7 +199,7 @@ class _PoseJudge:
         return np.abs(np.where(self._prismatic, d, np.remainder(d + np.pi, 2 * np.pi) - np.pi))
 
     def _diagnosis(self, q: Array, T: Array, true_q: Array) -> str:
-        """Return what is wrong with a solution: its unit, or the first joint that differs from the nearest branch."""
+        """Return the fault of a solution: its unit, or the first joint that differs from the nearest branch."""
         if self._pose_error(q * np.where(self._prismatic, 1.0, np.pi / 180), T) < POSE_TOLERANCE:
             return "the angles are in degrees; expected radians"
         if not self.has_closed_form:

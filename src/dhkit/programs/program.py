@@ -38,7 +38,7 @@ class Program:
     limits
         Limits of time and memory.
     isolation
-        What the program can see and reach; by default the best that works on this system, or none.
+        Isolation of the program; by default the best that works on this system, or none.
 
     Raises
     ------

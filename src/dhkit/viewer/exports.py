@@ -33,7 +33,7 @@ _EMPTY_LENGTH = 20
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """An arm in a state, and what is drawn beside it.
+    """An arm in a state, and the drawings beside it.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Exportable(ABC):
 
     @abstractmethod
     def snapshot(self) -> Snapshot:
-        """Return what the view shows now."""
+        """Return the present contents of the view."""
 
     def html(
         self,

@@ -48,7 +48,7 @@ def limits_state(description: Description) -> dict[str, Any]:
 
 
 def arm_state(description: Description, *, assumed_bodies: bool = False) -> dict[str, object]:
-    """Return what panels show of an arm: joints with limits, configurations by name, family, reach (m)."""
+    """Return an arm's values for panels: joints with limits, configurations by name, family, reach (m)."""
     limits = limits_state(description)
     numbers = description.numbers
     fit = classify(description)

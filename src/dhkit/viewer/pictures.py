@@ -32,7 +32,7 @@ _SUPERSAMPLING = 2
 _FIELD_OF_VIEW = np.radians(34.0)
 """Angle of view across the shorter edge, rad, as in the page."""
 _MARGIN = 1.12
-"""Size of the picture over that of what is drawn."""
+"""Size of the picture over that of the drawn scene."""
 _SPACE_DIRECTION = np.array([0.62, -0.78, 0.36])
 """Direction from the arm to the camera, world, for an arm that moves in space."""
 _FLAT_DIRECTION = np.array([0.35, -0.5, 1.6])
@@ -167,7 +167,7 @@ def pictures(
         yield _finish(image, camera, description, nodes if frames else None, points)
 
 
-# What is drawn
+# Solids of the picture
 
 
 @lru_cache(maxsize=8)

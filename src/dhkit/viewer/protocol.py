@@ -181,7 +181,7 @@ def encode_frames(visible: bool) -> bytes:
 
 
 def encode_state(name: str, data: object) -> bytes:
-    """Return a message with a panel's state, of what JSON can hold: it replaces the state of the same name."""
+    """Return a message with a panel's state, of values that JSON can hold: it replaces the state of the same name."""
     return _message(MessageType.STATE, _json({"name": name, "data": data}))
 
 

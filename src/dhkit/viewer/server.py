@@ -32,7 +32,7 @@ from dhkit.viewer.requests import Request
 from dhkit.viewer.session import OF_ONE_ARM, Session, Slot
 
 Answer: TypeAlias = Callable[[str, Mapping[str, object]], object]
-"""Answers a request, given its name and data, with what JSON can hold."""
+"""Answers a request, given its name and data, with a value that JSON can hold."""
 
 _LOG = logging.getLogger(__name__)
 _ADDRESS = "127.0.0.1"
@@ -105,8 +105,8 @@ class ViewerServer:
         The latest message of every slot.
     answer
         Answers requests of pages: it is called with a request's name and data in a thread of its own, one request after
-        the other, and returns what JSON can hold, or raises an error whose line the page shows. None for pages without
-        panels.
+        the other, and returns a value that JSON can hold, or raises an error whose line the page shows. None for
+        pages without panels.
     port, token
         Address of the page, for pages that are to find it again; by default any free port and a new token.
 
@@ -148,7 +148,7 @@ class ViewerServer:
         return f"{_ADDRESS}:{self.port}", f"localhost:{self.port}"
 
     def publish_state(self, name: str, data: object) -> None:
-        """Make a panel's state, of what JSON can hold, the latest of its name; see :meth:`publish`."""
+        """Make a panel's state, of values that JSON can hold, the latest of its name; see :meth:`publish`."""
         self.publish(self._panel_slot(name), encode_state(name, data))
 
     def append(self, samples: Samples) -> None:

@@ -174,7 +174,7 @@ class View(Exportable):
             self.show(self._q)
 
     def panel(self, name: str, data: object) -> None:
-        """Send the state of a panel, of what JSON can hold, to the pages, instead of the last state of this name."""
+        """Send the state of a panel, of values that JSON can hold, to the pages; it replaces the last of its name."""
         self._live().publish_state(name, data)
 
     def append(self, samples: Samples) -> None:
@@ -373,7 +373,7 @@ class View(Exportable):
         return repr_line("View", self._description.name, state)
 
     def snapshot(self) -> Snapshot:
-        """Return what the view shows now."""
+        """Return the present contents of the view."""
         with self._lock:
             return Snapshot(
                 self._description,

@@ -44,7 +44,7 @@ _MAX_SIZE = (9.5, 5.0)
 _LINK_PIECES = 24
 """Pieces of a link: straight in space, it is curved in a section about an axis."""
 _SPACE_MARGIN = 0.04
-"""Room around what is drawn, as a share of its size."""
+"""Room around the drawing, as a share of its size."""
 _ELLIPSOID_SHARE = 0.3
 """Length that the longest half axis of an ellipsoid is drawn with, as a share of the arm's size."""
 _MESH_LINES = 33
@@ -86,7 +86,7 @@ class _Pixels:
         return float(width), float(height)
 
     def draw(self, axes: Axes, most: float) -> Any:
-        """Draw the pixels and the border of what is reached; return the image."""
+        """Draw the pixels and the border of the reached set; return the image."""
         x, y = (self.corner[k] + self.edge * np.arange(self.best.shape[k] + 1) for k in range(2))
         pixels = np.ma.masked_invalid(self.best).T
         image = axes.pcolormesh(x, y, pixels, cmap=_COLORMAP, vmin=0, vmax=most or 1.0, rasterized=True)

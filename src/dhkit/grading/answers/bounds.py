@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Bounds:
-    """Largest sizes that are read; what exceeds one is refused with a message that names it, or is cut."""
+    """Largest sizes that are read; a larger one is refused with a message that names the bound, or is cut."""
 
     # Sheets and files.
     sheet_bytes: int = 4_000_000

@@ -88,7 +88,7 @@ class Given:
 def vocabulary_of(
     description: Description, sheet: AnswerSheet, sums: Sequence[Sequence[int]] = (), inverse: bool = False
 ) -> Vocabulary:
-    """Return what names mean on a sheet.
+    """Return the meanings of names on a sheet.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def given_quantity(
     shape
         Shape of the quantity: (n, n), (n,), () of a scalar.
     vocabulary
-        What names mean.
+        Meanings of names.
     names
         Which names stand in front of an answer: ``tau_1 = ...``.
     matrix_of

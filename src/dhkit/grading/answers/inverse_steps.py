@@ -118,7 +118,7 @@ class _Reading:
     joint
         The joint that the step finds, from 1.
     vocabulary
-        What names mean; definitions are added to it.
+        Meanings of names; definitions are added to it.
     earlier
         Names that earlier steps have defined: this one may define them anew.
     """

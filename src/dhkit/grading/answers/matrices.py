@@ -50,9 +50,9 @@ def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]
     Parameters
     ----------
     text
-        What a student typed; never evaluated.
+        The student's text; it is never evaluated.
     vocabulary
-        What names mean.
+        Meanings of names.
 
     Returns
     -------

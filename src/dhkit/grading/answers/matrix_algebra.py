@@ -99,9 +99,9 @@ def read_algebra(text: str, vocabulary: Vocabulary, matrix_of: MatrixOf = no_nam
     Parameters
     ----------
     text
-        What a student typed; never evaluated.
+        The student's text; it is never evaluated.
     vocabulary
-        What names mean.
+        Meanings of names.
     matrix_of
         Which names stand for matrices.
 

@@ -92,7 +92,7 @@ def entry_tree(value: object, vocabulary: Vocabulary) -> tuple[str, Tree]:
 
 
 def _text(value: object) -> str:
-    """Return what a value prints as.
+    """Return the printed text of a value.
 
     Raises
     ------

@@ -42,9 +42,9 @@ def read_answer(text: str, vocabulary: Vocabulary) -> Tree:
     Parameters
     ----------
     text
-        What a student typed; never evaluated.
+        The student's text; it is never evaluated.
     vocabulary
-        What names mean.
+        Meanings of names.
 
     Returns
     -------

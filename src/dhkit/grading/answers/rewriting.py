@@ -359,7 +359,7 @@ def _end_of_over_time(tokens: Sequence[Token], k: int, order: int) -> int:
 
 
 def _written_out(words: Sequence[str], at: int) -> list[Token]:
-    """Return the tokens of what a name stands for."""
+    """Return the tokens of the meaning of a name."""
     return [Token(_kind(word), word, at) for word in words]
 
 

@@ -89,7 +89,7 @@ def source_sheet(
     Parameters
     ----------
     file
-        What messages begin with.
+        Beginning of messages.
     n
         The number of joints.
     answers
@@ -139,7 +139,7 @@ def read_sheet(path: Path) -> AnswerSheet:
     Raises
     ------
     AnswerError
-        A file that cannot be read, or is not an answer sheet; with the file, the key, what was found and expected.
+        A file that cannot be read, or is not an answer sheet; with file, key, value found and value expected.
     """
     return _read(path, "an answer sheet", lambda data: sheet_of(data, str(path)))
 
@@ -150,7 +150,7 @@ def read_task(path: Path) -> AnswerSheet:
     Raises
     ------
     AnswerError
-        A file that cannot be read, or is not a task; with the file, the key, what was found and expected.
+        A file that cannot be read, or is not a task; with file, key, value found and value expected.
     """
     return _read(path, "a task", lambda data: _sheet(data, _Checker(str(path)), KEYS["task file"]))
 
@@ -187,7 +187,7 @@ def sheet_of(data: Mapping[str, object], file: str = "answers") -> AnswerSheet:
     Raises
     ------
     AnswerError
-        It is none; with the key, what was found and expected.
+        It is none; with the key, the value found and the value expected.
     """
     checker = _Checker(file)
     sheet = _sheet(data, checker, KEYS["sheet"])

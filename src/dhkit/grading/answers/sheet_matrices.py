@@ -25,7 +25,7 @@ class SheetMatrices:
     answers
         The sheet's answers by quantity.
     vocabulary
-        What names mean; a name that has a meaning of its own is not a matrix.
+        Meanings of names; a name that has a meaning of its own is not a matrix.
     names
         Which names stand for quantities.
     """

@@ -1,4 +1,4 @@
-"""Answer sheets as values: the answers of a student, what names mean, and what was asked for."""
+"""Answer sheets as values: the answers of a student, meanings of names, and requirements."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Refusal:
     reason
         Why it is not judged, with the line.
     advice
-        What the student may do; empty if the reason says it.
+        Advice to the student; empty if the reason says it.
     """
 
     reason: str

@@ -28,7 +28,7 @@ class SourceCode:
     line_name
         How messages name a line, which counts from 1.
     notes
-        What a reader should know.
+        Notes for the reader.
     """
 
     text: str

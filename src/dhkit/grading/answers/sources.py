@@ -61,7 +61,7 @@ def executed_source(
     description, names
         As for :func:`read_source`; the names may give the order of a state.
     isolation
-        What the program can see and reach.
+        Isolation of the program: files and resources that it can use.
 
     Raises
     ------

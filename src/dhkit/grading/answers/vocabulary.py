@@ -186,7 +186,7 @@ class Vocabulary:
         )
 
     def find(self, name: str) -> Meaning | None:
-        """Return what a name stands for, nothing if it is unknown: the student's own names first, then the file's."""
+        """Return the meaning of a name, None if it is unknown: the student's own names first, then the file's."""
         if name not in self._meanings:
             self._meanings[name] = self._look_up(name)
         return self._meanings[name]

@@ -25,7 +25,7 @@ class Case:
     passes
         Whether it has the points that it may have as far as the verdict says.
     lines
-        What is said of the entry.
+        Statement about the entry.
     diagnosis
         Mistakes that explain it.
     """

@@ -22,7 +22,7 @@ def json_report(report: GradeReport, marks: Marks, feedback: Feedback = "full") 
     Parameters
     ----------
     report, marks
-        What is to be shown, reduced already if ``feedback`` is not ``"full"``.
+        Report to be shown, reduced already if ``feedback`` is not ``"full"``.
     feedback
         How much of the report is shown; only ``"full"`` reports can be marked again.
     """
@@ -80,7 +80,7 @@ def _read_report(text: str, place: str) -> GradeReport:
 
 
 def _fault(error: Exception) -> str:
-    """Return in one line what is wrong with a report."""
+    """Return the fault of a report in one line."""
     if isinstance(error, ValidationError):
         first = error.errors()[0]
         place = ".".join(str(part)[:80] for part in first["loc"])

@@ -34,7 +34,7 @@ def points_of(mark: Mark | Marks) -> str:
 
 
 def with_feedback(report: GradeReport, level: Feedback) -> GradeReport:
-    """Return a report with only what a level of feedback shows.
+    """Return a report reduced to a level of feedback.
 
     ``"full"`` shows everything; ``"hint"`` shows verdicts and where to look, without differences, witnesses and names
     of mistakes; ``"verdict"`` shows verdicts alone. A reduced report cannot be marked again: marks come from full

@@ -1,4 +1,4 @@
-"""A chain of a URDF as a description, with notes on what was done and the residual against the file."""
+"""A chain of a URDF as a description, with notes on the extraction and the residual against the file."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Extraction:
     residual
         The differences of its tool, M and g from the file's, over random states.
     notes
-        Unusual elements of the file and what was done; also in ``description.notes``.
+        Unusual elements of the file and their treatment; also in ``description.notes``.
     changes
         Numbers that ``as_designed`` read differently from how they are written.
     decimals

@@ -44,7 +44,7 @@ def latex_answers(
     text
         The document.
     file
-        What messages begin with.
+        Beginning of messages.
     line_name
         How messages name a line, which counts from 1.
     description

@@ -67,7 +67,7 @@ def statement_of(line: int, sides: Sequence[str], names: Sequence[str], problem:
     line
         Line in which it begins, from 1.
     sides
-        What stands between the signs of equality.
+        Formulas between the signs of equality.
     names
         The name that each side is; empty where it is none.
     problem, text

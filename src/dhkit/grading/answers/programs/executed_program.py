@@ -80,7 +80,7 @@ def executed_answers(
     names
         The task's names of the joint variables and of a state.
     isolation
-        What the program can see and reach.
+        Isolation of the program: files and resources that it can use.
 
     Yields
     ------
@@ -136,7 +136,7 @@ class _ExecutedProgram:
     record
         What is known of the program.
     file
-        What messages begin with.
+        Beginning of messages.
     line_name
         How messages name a line, which counts from 1.
     names

@@ -207,7 +207,7 @@ def matlab_statements(text: str, file: str, line_name: Callable[[int], str]) -> 
     text
         The program.
     file
-        What messages begin with.
+        Beginning of messages.
     line_name
         How messages name a line, which counts from 1.
 

@@ -38,7 +38,7 @@ class Notebook:
     starts
         First line of each cell of code, from 1.
     notes
-        What a reader should know.
+        Notes for the reader.
     """
 
     code: str
@@ -60,7 +60,7 @@ def notebook_code(text: str, file: str) -> Notebook:
     text
         The notebook, as JSON.
     file
-        What messages begin with.
+        Beginning of messages.
 
     Raises
     ------

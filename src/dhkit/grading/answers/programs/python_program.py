@@ -90,7 +90,7 @@ class PythonProgram:
     text
         The program.
     file
-        What messages begin with.
+        Beginning of messages.
     line_name
         How messages name a line, which counts from 1.
     record
