@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
+from itertools import chain
 from typing import Any, TypeVar
 
 from dhkit.description.named import Named
@@ -50,4 +51,4 @@ def expressions_in(value: object) -> Iterator[Expression]:
 
 def names_in(value: object) -> frozenset[str]:
     """Return the names of the parameters in a value."""
-    return frozenset(name for expression in expressions_in(value) for name in expression.symbols)
+    return frozenset(chain.from_iterable(expression.symbols for expression in expressions_in(value)))

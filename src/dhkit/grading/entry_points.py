@@ -102,10 +102,14 @@ def _require_permission(path: Path, task: AnswerSheet | None) -> None:
 def _merge_names(own: Names, given: Names) -> Names:
     """Return a sheet's names, completed by those of the task."""
     parameters = {**given.parameters, **own.parameters}
-    q, qd, qdd = own.q or given.q, own.qd or given.qd, own.qdd or given.qdd
-    is_absolute = own.absolute or given.absolute
     return replace(
-        own, q=q, qd=qd, qdd=qdd, absolute=is_absolute, parameters=parameters, state=own.state or given.state
+        own,
+        q=own.q or given.q,
+        qd=own.qd or given.qd,
+        qdd=own.qdd or given.qdd,
+        absolute=own.absolute or given.absolute,
+        parameters=parameters,
+        state=own.state or given.state,
     )
 
 

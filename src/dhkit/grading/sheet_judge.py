@@ -91,11 +91,14 @@ def judge_sheet(
             AnswerError(f"{sheet.file}: answer: every entry is empty; expected at least one quantity"),
         )
     follows, agreement, diagnosis = _explain(truth, judged, digits) if explain else ({}, [], [])
-    entries = [entry for name, quantity in judged.items() for entry in _entries(truth, quantity, follows.get(name, {}))]
+    entries: list[Entry] = []
+    at_values: dict[str, float] = {}
+    for name, quantity in judged.items():
+        entries += _entries(truth, quantity, follows.get(name, {}))
+        at_values |= _numbers_in(truth, quantity)
     notes = [Note(NoteKind.PROGRAM, values=(text,)) for text in sheet.notes]
     notes += [*_notes(truth, judged, vocabulary), *agreement]
     entries += [Entry(name, (), Verdict.UNREADABLE, statement=str(error)) for name, error in refused.items()]
-    at_values = {p: value for quantity in judged.values() for p, value in _numbers_in(truth, quantity).items()}
     for other in others:
         at_values |= other.at_values
         entries += other.entries
@@ -273,7 +276,7 @@ class _SheetJudge:
             "ik",
             given_branches(self.sheet.branches, description.n, vocabulary),
             lambda trees: self._at_other_values(
-                [tree for branch in trees for tree in branch],
+                list(chain.from_iterable(trees)),
                 lambda arm, formula, explain: judge_inverse(
                     arm, [[formula(tree) for tree in branch] for branch in trees], seed=self.seed, explain=explain
                 ),
@@ -335,22 +338,26 @@ def _judge_rows(
 ) -> KinematicJudgement:
     """Judge rows of a table, or branches of inverse kinematics; all are unreadable if an entry cannot be read."""
     texts = [", ".join(entry.text for entry in row) for row in rows]
-    if all(entry.tree is not None for row in rows for entry in row):
-        trees = [[entry.tree for entry in row if entry.tree is not None] for row in rows]
+    trees = []
+    errors = []
+    for row in rows:
+        trees.append([entry.tree for entry in row if entry.tree is not None])
+        errors.append([entry.error for entry in row if entry.error])
+
+    if all(len(read) == len(row) for read, row in zip(trees, rows, strict=True)):
         judgement = judge(trees)
         entries = []
-        for entry, text, row in zip(judgement.entries, texts, trees, strict=True):
-            joints = [(Name(f"q{k + 1}", 0), tree) for k, tree in enumerate(row)]
+        for entry, text, formulas in zip(judgement.entries, texts, trees, strict=True):
+            joints = [(Name(f"q{k + 1}", 0), tree) for k, tree in enumerate(formulas)]
             read, latex = typeset_equations(joints) if name == "ik" else ("", "")
             entries.append(replace(entry, answer=text, read=read, latex=latex))
         return replace(judgement, entries=tuple(entries))
-    errors = [next((e.error for e in row if e.error), "not judged: another row cannot be read") for row in rows]
-    return KinematicJudgement(
-        tuple(
-            Entry(name, (i,), Verdict.UNREADABLE, text, statement=error)
-            for i, (text, error) in enumerate(zip(texts, errors, strict=True))
-        )
-    )
+
+    unreadable = []
+    for i, (text, of_row) in enumerate(zip(texts, errors, strict=True)):
+        statement = of_row[0] if of_row else "not judged: another row cannot be read"
+        unreadable.append(Entry(name, (i,), Verdict.UNREADABLE, text, statement=statement))
+    return KinematicJudgement(tuple(unreadable))
 
 
 def _explain(
@@ -430,7 +437,8 @@ def _factorization(truth: Truth, judged: JudgedQuantity) -> NoteKind | None:
     """
     if judged.wrong or any(entry.tree is None for entry in judged.given):
         return None
-    lag, coordinates = truth.lagrangian, truth.coordinates
+    lag = truth.lagrangian
+    coordinates = truth.coordinates
     C = np.empty((lag.n, lag.n), dtype=object)
     reader = RingReader(lag.arm.ring)
     for entry in judged.given:

@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 from dhkit.errors import AnswerError
@@ -108,7 +109,7 @@ def _in_folder(root: Path, passed_over: Collection[Path]) -> list[Sheet]:
             kinds = dict.fromkeys(path.suffix.lower() or path.name for path in paths)
             error = f"not read: {', '.join(_shorten(list(kinds)))}; expected {', '.join(sorted(SHEET_SUFFIXES))}"
             sheets[student] = [Sheet(paths[0], student, error)]
-    return sorted((sheet for own in sheets.values() for sheet in own), key=lambda sheet: sheet.path.parts)
+    return sorted(chain.from_iterable(sheets.values()), key=lambda sheet: sheet.path.parts)
 
 
 def _shorten(names: Sequence[str]) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, chain
 from typing import TypeAlias
 
 from dhkit.kernels.elementary import atan2, maximum, minimum, sincos
@@ -106,7 +106,7 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
         "define void @kernel(ptr %parameters, ptr %arrays, ptr %work, i64 %count) {",
         "entry:",
         *(line for k, name in enumerate((*inputs, *outputs)) for line in _array(k, name)),
-        *(line for k in range(graph.inputs[0].size) for line in _broadcast(k)),
+        *chain.from_iterable(map(_broadcast, range(graph.inputs[0].size))),
         "  %none = icmp sle i64 %count, 0",
         "  br i1 %none, label %end, label %block",
         "block:",
@@ -154,7 +154,7 @@ def _results(graph: Graph, layout: _Layout, body: Body, types: Sequence[str]) ->
     ]
     values = _node_values(graph, body, rows)
     missing: Vector | None = None  # 0, or NaN where an input is not finite
-    for x in (entry for row in rows for entry in row):
+    for x in chain.from_iterable(rows):
         missing = x - x if missing is None else missing + (x - x)
     lines = []
     for k, entries in enumerate(graph.results):

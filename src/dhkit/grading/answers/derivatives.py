@@ -56,7 +56,8 @@ def _derivative(tree: Tree) -> Tree | None:
                 raise AnswerError(f"a time derivative of an acceleration, {text}")
             return Name(f"{match[1]}d{match[2]}", at) if match else None
         case Sum(terms):
-            changing = [(added, change) for added, term in terms if (change := _derivative(term)) is not None]
+            changes = [(added, _derivative(term)) for added, term in terms]
+            changing = [(added, change) for added, change in changes if change is not None]
             return Sum(tuple(changing)) if changing else None
         case Product(factors):
             return _derivative_of_product(factors)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -423,7 +424,7 @@ def _from_one_text(
     found = f"found {len(rows)} rows of {len(rows[0]) if rows else 0}"
     if len(shape) == 2 and [len(row) for row in rows] != [shape[1]] * shape[0]:
         raise AnswerError(f"{name}: {found}; expected {shape[0]} of {shape[1]}")
-    entries = [entry for row in rows for entry in row]
+    entries = list(chain.from_iterable(rows))
     if len(entries) != len(places):
         expected = f"expected {len(places)} entries" if shape else "expected a number"
         raise AnswerError(f"{name}: {found if not shape else f'found {len(entries)} entries'}; {expected}")

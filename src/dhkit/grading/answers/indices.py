@@ -30,7 +30,9 @@ def first_index(texts: Iterable[str], vocabulary: Vocabulary) -> int | None:
                 return 0
             is_one = is_one or bool(from_one and (of_time or not from_zero))
         is_python = is_python or _FROM_ZERO.search(text) is not None
-    return 1 if is_one else 0 if is_python else None
+    if is_one:
+        return 1
+    return 0 if is_python else None
 
 
 def without_indices(tokens: Sequence[Token], vocabulary: Vocabulary, text: str) -> list[Token]:

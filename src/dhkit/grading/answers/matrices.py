@@ -6,7 +6,7 @@ import re
 import unicodedata
 from bisect import bisect_right
 from collections.abc import Sequence
-from itertools import accumulate, pairwise
+from itertools import accumulate, chain, pairwise
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Token, Tree
@@ -149,7 +149,9 @@ def _with_column_brackets(tokens: list[Token], text: str) -> list[Token]:
         return tokens
     first = tokens[start].at
     last = tokens[end].at
-    column = [token for row in _split(tokens[start + 1 : end], (",",), text) for token in (sign(";", first), *row)]
+    column: list[Token] = []
+    for entry in _split(tokens[start + 1 : end], (",",), text):
+        column += [sign(";", first), *entry]
     return [*tokens[:start], sign("[", first), *column[1:], sign("]", last), *tokens[end + 1 :]]
 
 
@@ -184,7 +186,10 @@ def _reshape(rows: int, columns: int, entries: Sequence[Token], text: str) -> li
     if len(pieces) != rows * columns:
         raise AnswerError(f"{quote(text)}: {len(pieces)} entries in a matrix of {rows} times {columns}")
     at = entries[0].at
-    matrix = [token for k, piece in enumerate(pieces) for token in (sign("," if k % columns else ";", at), *piece)]
+    matrix: list[Token] = []
+    for k, piece in enumerate(pieces):
+        separator = "," if k % columns else ";"
+        matrix += [sign(separator, at), *piece]
     return [sign("[", at), *matrix[1:], sign("]", entries[-1].at)]
 
 
@@ -197,7 +202,7 @@ def _with_diagonal(tokens: list[Token], text: str) -> list[Token]:
     end = closing_bracket(tokens, k + 1)
     inner = _strip(tokens[k + 2 : end])
     if inner and inner[0].text == "[" and inner[-1].text == "]":
-        entries = [entry for row in _rows(inner, text) for entry in row]
+        entries = list(chain.from_iterable(_rows(inner, text)))
     else:
         entries = _split(inner, (",",), text)
     if len(entries) > BOUNDS.diagonal_rows:

@@ -88,7 +88,10 @@ class _Block:
                 allowed &= set(rows)
         if not allowed:
             raise _LostError("a fraction's bar that is not on the line of what stands beside it")
-        free = {r for r, line in enumerate(self.lines) for c, x in enumerate(line) if x != " " and not taken[c]}
+        free = set()
+        for row, line in enumerate(self.lines):
+            if any(x != " " and not is_taken for x, is_taken in zip(line, taken, strict=False)):
+                free.add(row)
         # The line of the formula: powers alone stand above it, and nothing below.
         base = max(free & allowed, default=min(allowed))
         if any(row > base for row in free):

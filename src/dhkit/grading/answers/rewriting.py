@@ -366,7 +366,9 @@ def _written_out(words: Sequence[str], at: int) -> list[Token]:
 def _kind(word: str) -> str:
     if word[0] in "0123456789.":
         return "number"
-    return "function" if word in CALLED else "name" if word[0].isalpha() else "sign"
+    if word in CALLED:
+        return "function"
+    return "name" if word[0].isalpha() else "sign"
 
 
 def _with_product_signs(tokens: Sequence[Token]) -> list[Token]:

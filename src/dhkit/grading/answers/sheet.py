@@ -228,7 +228,10 @@ class _Checker:
 
     def error(self, key: str, value: object, expected: str) -> AnswerError:
         text = str(value) if isinstance(value, Decimal) else repr(value)
-        text = "a table" if isinstance(value, Mapping) else text if len(text) <= 60 else text[:57] + "..."
+        if isinstance(value, Mapping):
+            text = "a table"
+        elif len(text) > 60:
+            text = text[:57] + "..."
         return AnswerError(f"{self.file}: {key}: found {text}; expected {expected}")
 
     def keys(self, table: Mapping[str, object], known: Sequence[str], prefix: str) -> None:

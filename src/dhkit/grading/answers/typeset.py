@@ -116,7 +116,10 @@ def _plain_product(factors: Sequence[tuple[bool, str]]) -> str:
     for multiplied, factor in factors:
         is_product = re.search(r"[*/]", re.sub(r"\([^()]*\)", "", factor)) is not None
         divisor = f"({factor})" if is_product else factor
-        text += (f"*{factor}" if text else factor) if multiplied else f"/{divisor}"
+        if not multiplied:
+            text += f"/{divisor}"
+        else:
+            text += f"*{factor}" if text else factor
     return text
 
 

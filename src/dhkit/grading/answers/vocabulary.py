@@ -6,7 +6,7 @@ import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import TypeAlias
 
 from dhkit.description import Description
@@ -181,8 +181,9 @@ class Vocabulary:
 
     def _is_variable(self, name: str, kinds: Sequence[str]) -> bool:
         meaning = self.find(name) if name else None
-        return meaning is not None and meaning in (
-            self._own_variable(kind, i + 1) for kind in kinds for i in range(len(self.kinds))
+        joints = range(1, len(self.kinds) + 1)
+        return meaning is not None and any(
+            meaning == self._own_variable(kind, joint) for kind, joint in product(kinds, joints)
         )
 
     def find(self, name: str) -> Meaning | None:
@@ -292,12 +293,11 @@ class Vocabulary:
             return None
         fewest: dict[int, list[list[str]]] = {len(name): [[]]}
         for start in reversed(range(len(name))):
-            ways = [
-                [name[start:end], *rest]
-                for end in range(start + 1, len(name) + 1)
-                if end in fewest and self._is_factor(name[start:end])
-                for rest in fewest[end]
-            ]
+            ways: list[list[str]] = []
+            for end in range(start + 1, len(name) + 1):
+                factor = name[start:end]
+                if end in fewest and self._is_factor(factor):
+                    ways += [[factor, *rest] for rest in fewest[end]]
             if ways:
                 shortest = min(map(len, ways))
                 fewest[start] = [way for way in ways if len(way) == shortest][:4]

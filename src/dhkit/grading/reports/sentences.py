@@ -135,5 +135,7 @@ def own_robot_warnings(reports: Sequence[GradeReport]) -> Iterator[str]:
 
 def mistake_counts(reports: Iterable[GradeReport]) -> list[tuple[str, int]]:
     """Return every mistake with the number of sheets that have it, the most frequent first."""
-    count = Counter(name for report in reports for name in {one.mistake for one in report.diagnosis if one.mistake})
+    count = Counter[str]()
+    for report in reports:
+        count.update({one.mistake for one in report.diagnosis if one.mistake})
     return sorted(count.items(), key=lambda item: (-item[1], item[0]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import chain
 
 from dhkit.description import Description
 from dhkit.errors import AnswerError
@@ -160,8 +161,9 @@ class _DocumentAnswers:
 
     def _with_definitions(self, formulas: tuple[str, ...], outer: set[str]) -> str | EqualFormulas | Refusal:
         """Return formulas whose names are all defined, or why they cannot be."""
-        if problem := next((why for formula in formulas if (why := self._define_names_in(formula, outer))), ""):
-            return _refused(problem)
+        for formula in formulas:
+            if problem := self._define_names_in(formula, outer):
+                return _refused(problem)
         return formulas[0] if len(formulas) == 1 else EqualFormulas(formulas)
 
     def _note_relations(self, statement: Statement) -> None:
@@ -200,7 +202,7 @@ class _DocumentAnswers:
         if rows is None:
             return None
         shape = self.quantities.shape(quantity)
-        flat = [entry for row in rows for entry in row]
+        flat = list(chain.from_iterable(rows))
         named = [self._entry_name(entry) for entry in flat]
         marks = marked_places(rows) if quantity == "M" else set()
         if not any(named) and not marks:
@@ -254,11 +256,15 @@ class _DocumentAnswers:
         """Whether a name is rather a height or a transform that an energy is made of than an entry of h, T, J or A."""
         if target.quantity in ("M", "C", "g", "tau"):
             return False
-        energies = [s for key in self.by_name if self.quantities.quantity(key) in ("K", "V") for s in self.by_name[key]]
-        is_used = any(name in self._names_in(formula) for s in energies for formula in s.formulas)
-        if is_used:
-            self.notes.append(f"{self._line(self.by_name[name][0])}: {name} is read as a name of the document's own")
-        return is_used
+        for key, statements in self.by_name.items():
+            if self.quantities.quantity(key) not in ("K", "V"):
+                continue
+            for formula in chain.from_iterable(statement.formulas for statement in statements):
+                if name in self._names_in(formula):
+                    line = self._line(self.by_name[name][0])
+                    self.notes.append(f"{line}: {name} is read as a name of the document's own")
+                    return True
+        return False
 
     def _entry(self, name: str) -> str | EqualFormulas | Refusal:
         self._used.add(name)

@@ -102,7 +102,9 @@ def rows_of(text: str, line: int) -> Iterator[Row]:
         if len(pieces) <= BOUNDS.blank_pieces and not columns and not "".join(pieces).strip():
             start = line
         at = mark.end()
-        word, begins, ends = mark[0], mark["begin"], mark["end"]
+        word = mark[0]
+        begins = mark["begin"]
+        ends = mark["end"]
         if begins and (begins not in ROWS or matrices):
             matrices.append(begins)
             pieces.append(word)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import chain
 
 from dhkit.grading.answers.programs.scope import Scope
 from dhkit.grading.answers.programs.values import (
@@ -121,7 +122,7 @@ def flat(value: Value) -> Value:
     if isinstance(value, Matrix) and not value.is_flat:
         if 1 not in value.shape:
             raise UnreadError("a matrix made flat is not read")
-        return vector_of([x for row in value.rows for x in row], multiplies_entries=value.multiplies_entries)
+        return vector_of(list(chain.from_iterable(value.rows)), multiplies_entries=value.multiplies_entries)
     return unchanged(value)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate
+from itertools import accumulate, chain
 
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.bounds import BOUNDS
@@ -470,7 +470,7 @@ class MatlabProgram:
         """Read ``[M, C] = dynamics(q, qd)`` and ``[a, b] = deal(1, 2)``."""
         if not right:
             raise self._refuse(statement, "found nothing after '='")
-        targets = [entry for row in split_rows(left[1:-1]) for entry in row]
+        targets = list(chain.from_iterable(split_rows(left[1:-1])))
         names = [entry[0].text if len(entry) == 1 else "" for entry in targets]
         values: Sequence[Value] = ()
         try:
@@ -706,7 +706,8 @@ class _Expression:
             heights = {len(block) for block in blocks}
             if len(heights) != 1:
                 raise UnreadError("the rows of a matrix differ in length, or are not read")
-            rows += [[x for block in blocks for x in block[k]] for k in range(heights.pop())]
+            # Row k of the joined blocks is row k of each, one after the other.
+            rows += [list(chain(*parts)) for parts in zip(*blocks, strict=True)]
         if not rows or len({len(row) for row in rows}) != 1:
             raise UnreadError("the rows of a matrix differ in length, or are not read")
         return matrix_of(rows)
@@ -826,7 +827,11 @@ class _Expression:
         value = self.scope.value(match[1])
         if isinstance(value, Given) and value.is_constant:
             raise UnreadError(f"diff({text[:40]}): {match[1]} is a symbol and no function of t: its derivative is 0")
-        name = value.name if isinstance(value, Given) else value.text if isinstance(value, Scalar) else ""
+        name = ""
+        if isinstance(value, Given):
+            name = value.name
+        elif isinstance(value, Scalar):
+            name = value.text
         vocabulary = self.program.record.robot.vocabulary
         plain = plain_name(name)
         order = 2 if match[2] else 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, chain
 from typing import TypeAlias
 
 from dhkit.errors import AnswerError
@@ -145,7 +145,7 @@ def _names_assigned_before(tokens: Tokens, end: int) -> set[str]:
     for k in range(end - 1, -1, -1):
         depth -= tokens[k].nesting
         if is_list and (depth == 0 or k == 0):
-            entries = [entry for row in split_rows(tokens[k + 1 : end - 1]) for entry in row]
+            entries = list(chain.from_iterable(split_rows(tokens[k + 1 : end - 1])))
             return {entry[0].text for entry in entries if entry[0].kind == "name"}
         if not is_list and depth < 0:
             return set()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Protocol
 
 from dhkit.errors import AnswerError
@@ -116,7 +117,9 @@ class _ProgramAnswers:
 
     def sheet(self, file: str) -> AnswerSheet:
         main = self.program.main
-        candidates = [one for name in list(main.names) for one in self._given_by(main, name, name)]
+        candidates: list[_Candidate] = []
+        for name in list(main.names):
+            candidates += self._given_by(main, name, name)
         candidates += self._given_by_functions({one.target.quantity for one in candidates})
         candidates = self._without_aliases(self._without_calls(candidates))
         answers: dict[str, str | Entries | Refusal] = {}
@@ -372,7 +375,7 @@ class _ProgramAnswers:
     def _all_scalars(value: Value) -> list[Scalar]:
         """Return the scalars of what a function returns."""
         values = value.values if isinstance(value, Several) else (value,)
-        return [x for one in values for x in _scalars(one)]
+        return list(chain.from_iterable(map(_scalars, values)))
 
     def _all_uses(self, uses: frozenset[str]) -> set[str]:
         """Return the keys that formulas are made of, those not to be relied on included."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import chain
 
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.programs.library import UNCHANGED
@@ -264,9 +265,9 @@ class Changes:
                     waiting += inside
                 case Several(values, inside):
                     waiting += [name for name in inside if name]
-                    waiting += [x for value in values for x in _names_of(value)]
+                    waiting += list(chain.from_iterable(map(_names_of, values)))
                 case Structure(fields):
-                    waiting += [x for value in fields.values() for x in _names_of(value)]
+                    waiting += list(chain.from_iterable(map(_names_of, fields.values())))
         return found
 
 
@@ -331,7 +332,7 @@ class _Piece:
                 for target in targets:
                     self._bind(target, self.shared(value))
                 if len(targets) > 1:
-                    names = [name for target in targets for name in names_in(target)]
+                    names = list(chain.from_iterable(map(names_in, targets)))
                     self._bind(targets[0], set(names))
             case ast.AnnAssign(target, _, ast.expr() as value) | ast.NamedExpr(target, value):
                 self._bind(target, self.shared(value))

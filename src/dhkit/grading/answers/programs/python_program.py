@@ -7,6 +7,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.bounds import BOUNDS
@@ -204,7 +205,7 @@ class PythonProgram:
                 self._leave(statement, scope, line)
                 return
         pieces = _executed(statement)
-        for node in (x for piece in pieces for x in ast.walk(piece)):
+        for node in chain.from_iterable(map(ast.walk, pieces)):
             if isinstance(node, ast.NamedExpr):
                 for one in names_in(node.target):
                     scope.change(ascii_name(one), f"{one[:40]} is changed by := in {line}", only_matrices=False)
@@ -301,7 +302,7 @@ class PythonProgram:
     def _assign_several(self, targets: Sequence[ast.expr], value: ast.expr, scope: Scope, line: str) -> None:
         names = [target.id for target in targets if isinstance(target, ast.Name)]
         if len(names) != len(targets):
-            for name in dict.fromkeys(x for target in targets for x in assigned_names(target)):
+            for name in dict.fromkeys(chain.from_iterable(map(assigned_names, targets))):
                 scope.change(ascii_name(name), f"{name[:40]} is changed by an unpacking in {line}", only_matrices=False)
             return
         if isinstance(value, ast.Tuple | ast.List) and len(value.elts) == len(names):
@@ -316,7 +317,7 @@ class PythonProgram:
             case Several(values) if len(values) == count:
                 return list(values)
             case Matrix() if len(value.rows) * len(value.rows[0]) == count:
-                return [x for row in value.rows for x in row]
+                return list(chain.from_iterable(value.rows))
             case Given(vector) if not self.record.robot.vocabulary.knows(vector) or count > 1:
                 try:
                     return [scope.entry(value, (k,)) for k in range(count)]
@@ -420,7 +421,7 @@ class PythonProgram:
             self.functions.append(function)
         scope.bind(ascii_name(name), function, line)
         pieces: Sequence[ast.AST] = [body] if isinstance(body, ast.expr) else body
-        for node in (x for piece in pieces for x in ast.walk(piece)):
+        for node in chain.from_iterable(map(ast.walk, pieces)):
             if isinstance(node, ast.Global | ast.Nonlocal):
                 for one in node.names:
                     reason = f"{one[:40]} is changed by 'global' in a function, in {line}"
@@ -698,7 +699,7 @@ class PythonProgram:
                 chosen = [[value.entries[(a, b)] for b in j] for a in i]
                 if isinstance(rows, ast.Slice) and isinstance(columns, ast.Slice):
                     return matrix_of(chosen, multiplies_entries=value.multiplies_entries)
-                entries = [x for row in chosen for x in row]
+                entries = list(chain.from_iterable(chosen))
                 if value.multiplies_entries:
                     return vector_of(entries, multiplies_entries=True)
                 return matrix_of(chosen)
@@ -795,19 +796,17 @@ class PythonProgram:
             case [Scalar() as m, Scalar() as n, Matrix() as entries] if m.text.isdecimal() and n.text.isdecimal():
                 row_count = int(m.text[:6])
                 columns = int(n.text[:6])
-                flat_entries = [x for row in entries.rows for x in row]
+                flat_entries = list(chain.from_iterable(entries.rows))
                 if row_count * columns != len(flat_entries):
                     raise UnreadError("a matrix whose entries do not fit its size is not read")
                 return matrix_of([flat_entries[k * columns : (k + 1) * columns] for k in range(row_count)])
             case [Matrix() as entries]:
                 return as_matrix(entries, of_numpy)
             case [Several(values)] if values and all(isinstance(x, Matrix) for x in values):
-                rows = [
-                    row
-                    for x in values
-                    if isinstance(x, Matrix)
-                    for row in ([list(x.entries.values())] if x.is_flat else x.rows)
-                ]
+                rows = []
+                for x in values:
+                    if isinstance(x, Matrix):
+                        rows += [list(x.entries.values())] if x.is_flat else x.rows
                 return matrix_of(rows, multiplies_entries=of_numpy)
             case [Several(values)] if not of_numpy and values and all(isinstance(x, Given) for x in values):
                 return matrix_of([[scope.scalar(x)] for x in values])
@@ -968,13 +967,11 @@ class PythonProgram:
         if isinstance(value, Given) and value.is_constant:
             reason = f"{value.name} is a symbol and no function of t, so that its derivative is 0"
             raise UnreadError(f"{self._quote(node)}: {reason}")
-        name = (
-            value.name
-            if isinstance(value, Given)
-            else value.text
-            if isinstance(value, Scalar) and value.is_name
-            else ""
-        )
+        name = ""
+        if isinstance(value, Given):
+            name = value.name
+        elif isinstance(value, Scalar) and value.is_name:
+            name = value.text
         if not name:
             raise UnreadError(f"{self._quote(node)} is not read")
         vocabulary = self.record.robot.vocabulary
@@ -1156,7 +1153,7 @@ def _last(node: ast.expr) -> str:
 
 def _entry_counted(matrix: Matrix, k: int) -> Scalar:
     """Return an entry of a matrix whose entries are counted by rows."""
-    entries = [x for row in matrix.rows for x in row]
+    entries = list(chain.from_iterable(matrix.rows))
     if k >= len(entries):
         raise UnreadError("an index is read that the matrix does not have")
     return entries[k]

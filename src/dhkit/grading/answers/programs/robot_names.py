@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import chain
 
 from dhkit.description import Description
 from dhkit.grading.answers.programs.values import Given, Matrix, Scalar, UnreadError, Value
@@ -98,7 +99,7 @@ class RobotNames:
                     raise UnreadError(f"{name} is set to {value.text[:40]}; the robot's file has {file_value}")
                 return True
             case Matrix() if self.is_vector(name):
-                entries = [entry for row in value.rows for entry in row]
+                entries = list(chain.from_iterable(value.rows))
                 vector = plain_name(name)
                 return len(entries) == self.n and all(
                     entry.is_name and self.is_same(f"{vector}{k}", entry.text) for k, entry in enumerate(entries, 1)

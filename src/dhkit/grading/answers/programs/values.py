@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
+from itertools import chain
 from typing import Any, TypeAlias
 
 from dhkit.grading.answers.bounds import BOUNDS
@@ -397,7 +398,7 @@ def product(left: Matrix, right: Matrix, power: str = "^") -> Matrix | Scalar:
     if left.is_flat and right.is_flat:
         return rows[0][0]
     if left.is_flat or right.is_flat:
-        return vector_of([x for row in rows for x in row], multiplies_entries=left.multiplies_entries)
+        return vector_of(list(chain.from_iterable(rows)), multiplies_entries=left.multiplies_entries)
     return matrix_of(rows, multiplies_entries=left.multiplies_entries or right.multiplies_entries)
 
 
@@ -407,7 +408,12 @@ def _dot(row: Sequence[Scalar], column: Sequence[Scalar], power: str) -> Scalar:
     for a, b in zip(row, column, strict=True):
         if a.is_zero or b.is_zero:
             continue
-        term = b if a.number == 1 else a if b.number == 1 else joined(a, "*", b, power)
+        if a.number == 1:
+            term = b
+        elif b.number == 1:
+            term = a
+        else:
+            term = joined(a, "*", b, power)
         total = term if total is None else joined(total, "+", term, power)
     return ZERO if total is None else total
 
