@@ -174,12 +174,13 @@ def _facts(arm: Arm) -> dict[str, Any]:
     description = arm.description
     numbers = arm.description.numbers
     fit = classify(description).fit
-    joints = [
-        {"name": joint.name, "type": joint.type.value, "assumed": list(joint.assumed)}
-        | {key: float(getattr(numbers, column)[i]) for column, key in _number_keys(joint).items()}
-        | {"bodies": _bodies(joint, arm)}
-        for i, joint in enumerate(description.joints)
-    ]
+    joints = []
+    for i, joint in enumerate(description.joints):
+        facts: dict[str, Any] = {"name": joint.name, "type": joint.type.value, "assumed": list(joint.assumed)}
+        for column, key in _number_keys(joint).items():
+            facts[key] = float(getattr(numbers, column)[i])
+        facts["bodies"] = _bodies(joint, arm)
+        joints.append(facts)
     return {
         "name": arm.name,
         "n": arm.n,

@@ -246,15 +246,15 @@ def _facts(reached: ReachedPose) -> dict[str, Any]:
     solutions = reached.solutions
     nearest = reached.nearest
     xyz, angles = pose_parts(reached.T, order=reached.order, degrees=reached.degrees)
-    branches = [
-        {
+    branches = []
+    for k in reached.shown:
+        branch = {
             "name": solutions.branches[k],
             **joint_entry(reached.arm, "q", reached.q[k], degrees=reached.degrees),
             "within_limits": bool(solutions.allowed[k]),
             "flags": [flag.name for flag in REPORTED_FLAGS if solutions.flags[k] & flag],
         }
-        for k in reached.shown
-    ]
+        branches.append(branch)
     return {
         "robot": reached.arm.name,
         "inverse_kinematics": str(reached.arm.family),

@@ -211,7 +211,8 @@ def number_symbols_from_one() -> None:
     def sym(name: str, *size: Any) -> Any:
         """Return a symbol, a vector of numbered ones, or a matrix of those with two numbers."""
         first = size[0] if size else 1
-        shape = first.shape if hasattr(first, "shape") else first if isinstance(first, tuple) else size
+        stated = first if isinstance(first, tuple) else size
+        shape = first.shape if hasattr(first, "shape") else stated
         m, n = (*shape, 1, 1)[:2]
         if (m, n) == (1, 1) or len(shape) > 2:
             return of_casadi(name, *size)

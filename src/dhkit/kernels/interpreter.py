@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Mapping, Sequence
+from itertools import chain
 from math import nan
 from typing import TYPE_CHECKING, Any
 
@@ -88,11 +89,13 @@ def _function(graph: Graph, types: Sequence[str]) -> casadi.Function:
     inputs = [casadi.SX.sym(variable.name, variable.size) for variable in graph.inputs]
     entries = [casadi.vertsplit(x) if x.numel() else [] for x in inputs]
     values = _values(graph, entries, zero, alike=SMALL_INTEGER in types)
-    missing = sum((x * zero for row in entries[1:] for x in row), casadi.SX(0))
-    results = [
-        casadi.vertcat(*(values[k] + missing if kind == FLOAT else values[k] for k in places))
-        for places, kind in zip(graph.results, types, strict=True)
-    ]
+
+    # 0 times each input is 0, or NaN where the input is not finite: added to a float, it makes that NaN too.
+    missing = sum((x * zero for x in chain.from_iterable(entries[1:])), casadi.SX(0))
+    results = []
+    for places, kind in zip(graph.results, types, strict=True):
+        entries_of_result = [values[k] + missing if kind == FLOAT else values[k] for k in places]
+        results.append(casadi.vertcat(*entries_of_result))
     return casadi.Function(graph.name, [zero, *inputs], [casadi.densify(casadi.SX(x)) for x in results])
 
 

@@ -105,7 +105,7 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
         *(f"declare {VECTOR} @llvm.{name}.v{WIDTH}f64({VECTOR})" for name in ("fabs", "sqrt", "floor")),
         "define void @kernel(ptr %parameters, ptr %arrays, ptr %work, i64 %count) {",
         "entry:",
-        *(line for k, name in enumerate((*inputs, *outputs)) for line in _array(k, name)),
+        *chain.from_iterable(_array(k, name) for k, name in enumerate((*inputs, *outputs))),
         *chain.from_iterable(map(_broadcast, range(graph.inputs[0].size))),
         "  %none = icmp sle i64 %count, 0",
         "  br i1 %none, label %end, label %block",
@@ -148,10 +148,9 @@ def llvm_source(graph: Graph, types: Sequence[str]) -> str:
 
 def _results(graph: Graph, layout: _Layout, body: Body, types: Sequence[str]) -> list[str]:
     """Write the program's operations into ``body`` and return the lines that store its results."""
-    rows = [
-        [_loaded(body, start + entry) for entry in range(variable.size)]
-        for start, variable in zip(layout.inputs, graph.inputs[1:], strict=False)
-    ]
+    rows = []
+    for start, variable in zip(layout.inputs, graph.inputs[1:], strict=False):
+        rows.append([_loaded(body, start + entry) for entry in range(variable.size)])
     values = _node_values(graph, body, rows)
     missing: Vector | None = None  # 0, or NaN where an input is not finite
     for x in chain.from_iterable(rows):

@@ -315,7 +315,8 @@ class IKSolutions:
         return [value + math.tau * k for k in range(first, last + 1)]
 
     def _reason(self, place: tuple[int, ...], count: int) -> str:
-        where = f"pose {place[0] if len(place) == 1 else place}" if place else "the pose"
+        index = place[0] if len(place) == 1 else place
+        where = f"pose {index}" if place else "the pose"
         others = f" (and {count - 1} more)" if count > 1 else ""
         status = IKStatus(int(self.status_code[place]))
         if status is IKStatus.not_a_pose:

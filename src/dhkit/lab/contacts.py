@@ -63,7 +63,9 @@ def touching_links(arm: Arm, q: Array) -> list[list[int]]:
         pairs = [None if f else arm.distance(x, self_collision=True).pair for f, x in zip(free, q, strict=True)]
     except DhkitError:
         return [[] for _ in q]
-    # Distances name links "the base" or "link 3".
-    return [
-        [] if pair is None else [0 if x == "the base" else int(x.removeprefix("link ")) for x in pair] for pair in pairs
-    ]
+    return [[] if pair is None else [_link_number(name) for name in pair] for pair in pairs]
+
+
+def _link_number(name: str) -> int:
+    """Return the number of a link that distances name "the base" or "link 3"."""
+    return 0 if name == "the base" else int(name.removeprefix("link "))

@@ -66,18 +66,12 @@ class TaskPanel(Panel):
             self.desk.view.panel("task", None if self.assignment is None else self._state(self.assignment))
 
     def _state(self, assignment: Assignment) -> dict[str, object]:
-        steps = [
-            {
-                "title": step.title,
-                "text": step.text,
-                "panel": step.panel,
-                "goals": [
-                    {"text": goal.text, "points": goal.points, "met": (i, j) in self._reached}
-                    for j, goal in enumerate(step.goals)
-                ],
-            }
-            for i, step in enumerate(assignment.steps)
-        ]
+        steps = []
+        for i, step in enumerate(assignment.steps):
+            goals = []
+            for j, goal in enumerate(step.goals):
+                goals.append({"text": goal.text, "points": goal.points, "met": (i, j) in self._reached})
+            steps.append({"title": step.title, "text": step.text, "panel": step.panel, "goals": goals})
         return {
             "title": assignment.title,
             "panels": None if assignment.panels is None else list(assignment.panels),

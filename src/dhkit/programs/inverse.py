@@ -134,7 +134,11 @@ class _PoseJudge:
             self._unsolved += solutions is not None
             return _SolvedPose(False, missing=tuple(names))
         errors = [self._pose_error(q, T) for q in solutions]
-        found = [any(self._difference(q, row).max() < _SAME_SOLUTION for q in solutions) for row in true_q]
+
+        def is_found(row: Array) -> bool:
+            return any(self._difference(q, row).max() < _SAME_SOLUTION for q in solutions)
+
+        found = [is_found(row) for row in true_q]
         if max(errors) >= POSE_TOLERANCE:
             worst = solutions[int(np.argmax(errors))]
             self._errors[self._diagnosis(worst, T, true_q)] += 1

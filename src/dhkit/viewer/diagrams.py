@@ -95,12 +95,11 @@ def draw_diagram(axes: Axes, diagram: Diagram, times: Array) -> None:
     distance = _MAX_LIMIT_DISTANCE * span
     lowest = diagram.values.min(axis=0) - distance
     highest = diagram.values.max(axis=0) + distance
-    near = [
-        (float(limits[k]), i)
-        for limits in (diagram.lower, diagram.upper)
-        for k, i in enumerate(diagram.joints)
-        if lowest[k] <= limits[k] <= highest[k]
-    ]
+    near = []
+    for limits in (diagram.lower, diagram.upper):
+        for k, i in enumerate(diagram.joints):
+            if lowest[k] <= limits[k] <= highest[k]:
+                near.append((float(limits[k]), i))
     shared = [limit for limit, _ in near]
     for limit, i in near:
         axes.axhline(limit, color=SHARED_COLOR if shared.count(limit) > 1 else joint_color(i), **LIMIT_STYLE)

@@ -53,14 +53,14 @@ def arm_state(description: Description, *, assumed_bodies: bool = False) -> dict
     numbers = description.numbers
     fit = classify(description)
     configurations = {"zero": np.zeros(description.n)} | dict(numbers.configurations)
+    joints = []
+    for i, joint in enumerate(description.joints):
+        state = {"name": joint.name, "unit": "rad" if joint.is_revolute else "m"}
+        joints.append(state | {name: values[i] for name, values in limits.items()})
     return {
         "name": description.name,
         "n": description.n,
-        "joints": [
-            {"name": joint.name, "unit": "rad" if joint.is_revolute else "m"}
-            | {name: values[i] for name, values in limits.items()}
-            for i, joint in enumerate(description.joints)
-        ],
+        "joints": joints,
         "configurations": [*configurations, *([] if "random" in configurations else ["random"])],
         "named": {name: q.tolist() for name, q in configurations.items()},
         "family": fit.words,
@@ -101,11 +101,10 @@ def interactive_data(
     """
     numbers = description.numbers
     limits = limits_state(description)
-    rows = [
-        {"kind": "R" if joint.is_revolute else "P", "lower": limits["lower"][i], "upper": limits["upper"][i]}
-        | {name: float(getattr(numbers, name)[i]) for name in COLUMNS}
-        for i, joint in enumerate(description.joints)
-    ]
+    rows = []
+    for i, joint in enumerate(description.joints):
+        row = {"kind": "R" if joint.is_revolute else "P", "lower": limits["lower"][i], "upper": limits["upper"][i]}
+        rows.append(row | {name: float(getattr(numbers, name)[i]) for name in COLUMNS})
     return {
         "arm": arm_state(description),
         "q": np.asarray(q, dtype=float).tolist(),

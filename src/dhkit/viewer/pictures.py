@@ -7,7 +7,7 @@ import operator
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product, zip_longest
+from itertools import chain, product, zip_longest
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -226,7 +226,7 @@ def _extent(
         high = solid.corners.max(axis=(0, 1))
         box = np.array(list(product(*zip(low, high, strict=True))))
         nodes = [transforms[:, solid.link], *(ghost.transforms[None, solid.link] for ghost in ghosts)]
-        extent += [(box @ T[:3, :3].T + T[:3, 3]) for node in nodes for T in node]
+        extent += [box @ T[:3, :3].T + T[:3, 3] for T in chain.from_iterable(nodes)]
     if frames:
         length = PICTURE_TRIAD_SHARE * scene_size(description)
         tips = transforms[..., :3, 3, None] + length * transforms[..., :3, :3]

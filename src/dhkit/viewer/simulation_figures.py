@@ -254,10 +254,10 @@ def _extreme_rows(values: Array) -> NDArray[np.intp]:
     if count <= 2 * _INTERVALS:
         return np.arange(count)
     edges = np.linspace(0, count, _INTERVALS + 1).astype(int)
-    extremes = [
-        [begin + part.argmin(axis=0), begin + part.argmax(axis=0)]
-        for begin, part in ((begin, values[begin:end]) for begin, end in pairwise(edges))
-    ]
+    extremes = []
+    for begin, end in pairwise(edges):
+        part = values[begin:end]
+        extremes += [begin + part.argmin(axis=0), begin + part.argmax(axis=0)]
     return np.unique(np.append(np.ravel(extremes), [0, count - 1]))
 
 

@@ -24,11 +24,11 @@ def contenders() -> tuple[Contender, ...]:
         (_NEW_ARRAYS, Mode.BATCH, _into_new_arrays),
         (SINGLE, Mode.SINGLE, _single),
     )
-    return tuple(
-        Contender(name, quantity, mode, setup(quantity), own=True)
-        for quantity in QUANTITIES
-        for name, mode, setup in setups
-    )
+    found = []
+    for quantity in QUANTITIES:
+        for name, mode, setup in setups:
+            found.append(Contender(name, quantity, mode, setup(quantity), own=True))
+    return tuple(found)
 
 
 def method(arm: Arm, quantity: str) -> Callable[..., Any]:

@@ -185,11 +185,14 @@ def _robot_name(chain: Chain) -> str:
 
 def _shapes(chain: Chain, meshes: MeshFinder, notes: list[str]) -> tuple[tuple[tuple[Shape, Array], ...], ...]:
     """Return the shapes of each group of links with their poses in the base; unreadable meshes are noted."""
-    has_visuals = any(chain.tree.links[link].visuals for group in chain.groups for link in group)
+    links = [chain.tree.links[link] for group in chain.groups for link in group]
+    has_visuals = any(link.visuals for link in links)
     left_out: list[str] = []
     groups = []
     for group in chain.groups:
-        shapes = [shape for link in group for shape in _link_shapes(chain, link, meshes, left_out, has_visuals)]
+        shapes: list[tuple[Shape, Array]] = []
+        for link in group:
+            shapes += _link_shapes(chain, link, meshes, left_out, has_visuals)
         if len(shapes) > ROBOT_BOUNDS.shapes:
             notes.append(
                 f"link {group[0]!r}: shape {ROBOT_BOUNDS.shapes + 1} of {len(shapes)} and all after it{SHAPE_LEFT_OUT}"
