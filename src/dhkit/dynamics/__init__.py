@@ -1,4 +1,4 @@
-"""How an arm moves under forces: inverse and forward dynamics, their terms, energies and friction, on batches."""
+"""Dynamics of an arm: inverse and forward dynamics, their terms, energies and friction, on batches."""
 
 from dhkit.dynamics.energy import kinetic_energy, potential_energy, power
 from dhkit.dynamics.equations import bias, coriolis_matrix, gravity_torque, inverse_dynamics, mass_matrix

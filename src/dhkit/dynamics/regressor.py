@@ -55,7 +55,8 @@ def regressor(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayL
     a = np.broadcast_to(-description.numbers.gravity, omega.shape)
     Y = np.zeros((*q.shape, 10 * n))
     for i in range(n):
-        axis, at = carriers[i][..., :3, 2], carriers[i][..., :3, 3]
+        axis = carriers[i][..., :3, 2]
+        at = carriers[i][..., :3, 3]
         lever = frames[i + 1][..., :3, 3] - frames[i][..., :3, 3]
         v, dv = (x[..., i, None] for x in (qd, qdd))
         if prismatic[i]:
@@ -68,7 +69,9 @@ def regressor(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayL
             a = a + _relative_acceleration(omega, rate, frames[i + 1][..., :3, 3] - at)
         force, moment = _force_and_moment(frames[i + 1][..., :3, :3], omega, rate, a)
         for j in range(i + 1):
-            z, p = carriers[j][..., :3, 2], carriers[j][..., :3, 3]
+            # Joint j feels z . f if prismatic, z . (moment + (o_i - p) x f) if revolute, o_i the link's origin.
+            z = carriers[j][..., :3, 2]
+            p = carriers[j][..., :3, 3]
             effort = force
             if not prismatic[j]:
                 arm = frames[i + 1][..., :3, 3] - p
@@ -85,6 +88,8 @@ def _relative_acceleration(omega: Array, rate: Array, lever: Array) -> Array:
 
 def _force_and_moment(R: Array, omega: Array, rate: Array, a: Array) -> tuple[Array, Array]:
     """Return a link's force and moment about its frame's origin, world axes, as matrices (..., 3, 10)."""
+    # In the link's axes, with mass m, first moment h = m c and second moments I about the origin:
+    #     f = m a + ([w'] + [w]^2) h,    n = -[a] h + I w' + [w] I w.
     w, dw, acceleration = (np.einsum("...ji,...j->...i", R, x) for x in (omega, rate, a))
     force, moment = np.zeros((2, *w.shape, 10))
     W = _cross_matrix(w)

@@ -57,9 +57,12 @@ def torque_derivative_bounds(description: Description, motion: Array) -> Array:
     is_standard = description.convention is Convention.STANDARD
     spin = np.zeros((orders, K))  # jet of the angular velocity of the link
     fixed = _fixed_in(spin)
-    axes, spans, coms = [], [], []
+    axes = []
+    spans = []
+    coms = []
     positions = np.zeros((orders + 1, K))  # jet of the sum of vectors from the base to the link's frame
-    forces, moments = [], []
+    forces = []
+    moments = []
     for i in range(n):
         before = fixed
         axes.append(before)
@@ -97,13 +100,17 @@ def torque_derivative_bounds(description: Description, motion: Array) -> Array:
 
 
 def _product(u: Array, v: Array) -> Array:
-    """Return the jet of a product, shape (m, K), from two of them."""
-    orders = len(u)
-    return np.stack([sum(comb(m, j) * u[j] * v[m - j] for j in range(m + 1)) for m in range(orders)])
+    """Return the jet of a product, shape (m, K), from two of them: (u v)^(m) = sum_j C(m, j) u^(j) v^(m - j)."""
+
+    def derivative(m: int) -> Array:
+        return np.asarray(sum(comb(m, j) * u[j] * v[m - j] for j in range(m + 1)))
+
+    return np.stack([derivative(m) for m in range(len(u))])
 
 
 def _fixed_in(spin: Array) -> Array:
     """Return the jet of a unit vector fixed in a body, one order longer, from that of the angular velocity."""
+    # e' = w x e, so |e^(m + 1)| <= sum_j C(m, j) |w^(j)| |e^(m - j)|.
     jet = [np.ones(spin.shape[1])]
     for m in range(len(spin)):
         jet.append(sum(comb(m, j) * spin[j] * jet[m - j] for j in range(m + 1)))
@@ -116,6 +123,8 @@ def _rotating_inertia(inertia: Array, spin: Array) -> Array:
     I = c 1 + D with c the mean of the extreme eigenvalues: c 1 does not change, and D' = [w] D - D [w].
     """
     low, *_, high = np.linalg.eigvalsh(inertia)
+
+    # |D^(m + 1)| <= 2 sum_j C(m, j) |w^(j)| |D^(m - j)|, from |D| = (high - low) / 2.
     jet = [np.full(spin.shape[1], (high - low) / 2)]
     for m in range(len(spin) - 1):
         jet.append(2 * sum(comb(m, j) * spin[j] * jet[m - j] for j in range(m + 1)))
@@ -138,11 +147,13 @@ def dry_friction_bounds(numbers: Numbers, width: float, least_speed: Array, moti
     motion
         Upper bounds of |q|, |q'| ... |q^(5)| at least, shape (6, K, n).
     """
+    # |f^(k)(v)| <= size F_k / (width^k r^(k + 2)) with r = sqrt(1 + (v / width)^2).
     forwards, backwards = numbers.coulomb.T
     size = np.abs(forwards - backwards) / 2 + np.abs(forwards + backwards)
     r = np.hypot(1.0, least_speed / width)
     f1, f2, f3, f4 = (size * _FRICTION_FACTORS[k - 1] / (width**k * r ** (k + 2)) for k in (1, 2, 3, 4))
     v1, v2, v3, v4 = motion[2:6]
+
     # d^4 f(v(t)) / dt^4 (Faa di Bruno).
     bounds: Array = f4 * v1**4 + 6 * f3 * v1**2 * v2 + f2 * (3 * v2**2 + 4 * v1 * v3) + f1 * v4
     return bounds

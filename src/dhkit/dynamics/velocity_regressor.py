@@ -136,7 +136,14 @@ def parameter_grouping(description: Description) -> ParameterGrouping:
     rng = np.random.default_rng(0)
     states = rng.uniform(-np.pi, np.pi, (3, _STATES_PER_JOINT * n, n))
     A = regressor(description, *states).reshape(-1, 10 * n)
-    order = [10 * i + k for i in reversed(range(n)) for k in range(1, 10)] + [10 * i for i in reversed(range(n))]
+
+    # Order of the columns: moments from the last link to the first, then masses.
+    links = list(reversed(range(n)))
+    moments = [10 * i + k for i in links for k in range(1, 10)]
+    masses = [10 * i for i in links]
+    order = moments + masses
+
+    # Gram-Schmidt: a column is kept if a part of it is perpendicular to the columns kept before.
     basis = np.zeros((len(A), 0))
     kept = []
     floor = _DEPENDENT * np.linalg.norm(A, axis=0).max()

@@ -81,12 +81,12 @@ def save_trajectory(trajectory: Trajectory, path: str | Path, rate: float | None
         arrays = {"breaks": trajectory.breaks, "coefficients": trajectory.coefficients} | _load_numbers(trajectory)
         write_atomically(path, archive_bytes(suffix, TRAJECTORY.archived(trajectory.description, arrays)))
         return path
-    comments = tuple(
-        f"{name}: {' '.join(f'{x:.17g}' for x in numbers.tolist())}"
-        for name, numbers in _load_numbers(trajectory).items()
-    )
+    comments = []
+    for name, numbers in _load_numbers(trajectory).items():
+        texts = [f"{x:.17g}" for x in numbers.tolist()]
+        comments.append(f"{name}: {' '.join(texts)}")
     times = trajectory.sample_times(_DEFAULT_RATE if rate is None else rate)
-    text = (_csv if suffix == ".csv" else _yaml)(trajectory, times, comments)
+    text = (_csv if suffix == ".csv" else _yaml)(trajectory, times, tuple(comments))
     write_atomically(path, TRAJECTORY.labelled(trajectory.description, text))
     return path
 
@@ -328,7 +328,8 @@ def _require_continuous(motion: Trajectory) -> None:
     """
     inner = motion.breaks[1:-1]
     for what, values in (("value", motion.q), ("speed", motion.qd)):
-        before, after = values(inner, "left"), values(inner, "right")
+        before = values(inner, "left")
+        after = values(inner, "right")
         if not len(inner):
             return
         jumps = np.abs(after - before) / (1 + np.abs(before))
@@ -373,7 +374,8 @@ def _message_samples(text: str, description: Description) -> _FileSamples:
     message = parse_message(text)
     if unknown := next((key for key in message if key not in MESSAGE), None):
         raise DescriptionError(f"unknown key {unknown[:40]!r}; expected {', '.join(MESSAGE)}")
-    names, points = message.get("joint_names"), message.get("points")
+    names = message.get("joint_names")
+    points = message.get("points")
     own = [joint.name for joint in description.joints]
     if not isinstance(names, list) or not isinstance(points, list) or not points:
         raise DescriptionError("no joint_names and points in it; expected a trajectory_msgs/JointTrajectory")
@@ -382,7 +384,8 @@ def _message_samples(text: str, description: Description) -> _FileSamples:
             f"joint_names: found {', '.join(map(str, names))[:120]}; expected {', '.join(own)}, in any order"
         )
     order = [names.index(name) for name in own]
-    times, columns = [], []
+    times = []
+    columns = []
     for k, point in enumerate(points):
         if not isinstance(point, dict):
             raise DescriptionError(f"points[{k}]: expected positions and time_from_start")

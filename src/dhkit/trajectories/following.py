@@ -26,9 +26,12 @@ _CHECKED_POINTS = 9
 """Number of points between two knots at which the deviation is checked."""
 _KNOT_ERROR = 1e-12
 """Largest error at a knot, rad and shares of the reach; rounding leaves 1e-15."""
-_NEWTON_STEPS, _DAMPING = 8, 1e-13
-_FIRST_STEP, _MIN_STEP = 1 / 16, 1e-9
-"""First and smallest step of s along the path."""
+_NEWTON_STEPS = 8
+_DAMPING = 1e-13
+_FIRST_STEP = 1 / 16
+"""First step of s along the path, and the largest."""
+_MIN_STEP = 1e-9
+"""Smallest step of s along the path."""
 _MAX_SECOND_ORDER = 0.25
 """Largest share of a step's second-order part, or of its error, in the step: near a singularity, where another branch
 is close, this share grows, and steps become short enough to stay on the branch."""
@@ -189,15 +192,16 @@ class _Follower:
             qs, qss = self.derivatives(here, at)
             there = min(s[-1] + step, 1.0)
             h = there - s[-1]
+
+            # Taylor's series q(s + h) = q + h q' + h^2/2 q'', corrected on the path; a step whose second-order part or
+            # correction is too large is halved.
             first = (h * qs)[0]
             second = (h**2 / 2 * qss)[0]
             if self._largest(second) <= _MAX_SECOND_ORDER * self._largest(first):
                 expected = at + first + second
                 found, closed = self.closed(np.array([there]), expected)
-                if (
-                    closed[0]
-                    and self._largest(found - expected) <= _MAX_SECOND_ORDER * self._largest(first) + _KNOT_ERROR
-                ):
+                largest_correction = _MAX_SECOND_ORDER * self._largest(first) + _KNOT_ERROR
+                if closed[0] and self._largest(found - expected) <= largest_correction:
                     s = [*s, there]
                     q = [*q, found[0]]
                     step = min(2 * step, _FIRST_STEP)
@@ -281,7 +285,8 @@ def _require_inside(path: JointPath, limits: Limits) -> None:
     farthest = farthest_outside(limits, path.pieces)
     if farthest.excess <= _LIMIT_SLACK:
         return
-    i, q = farthest.joint, farthest.value
+    i = farthest.joint
+    q = farthest.value
     limit = limits.lower[i] if farthest.is_below else limits.upper[i]
     name = path.description.joints[i].name
     slides = bool(path.description.numbers.prismatic[i])

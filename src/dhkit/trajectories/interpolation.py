@@ -70,28 +70,25 @@ def cubic_hermite(times: Array, q: Array, qd: Array) -> Array:
     q, qd
         Values and derivatives at these times, shape (K+1, m).
     """
+    # With s = (q1 - q0) / h:  c2 = (3 s - 2 v0 - v1) / h,  c3 = (v0 + v1 - 2 s) / h^2.
     h = np.diff(times)[:, None]
     slope = np.diff(q, axis=0) / h
-    return np.stack(
-        [q[:-1], qd[:-1], (3 * slope - 2 * qd[:-1] - qd[1:]) / h, (qd[:-1] + qd[1:] - 2 * slope) / h**2], axis=1
-    )
+    c2 = (3 * slope - 2 * qd[:-1] - qd[1:]) / h
+    c3 = (qd[:-1] + qd[1:] - 2 * slope) / h**2
+    return np.stack([q[:-1], qd[:-1], c2, c3], axis=1)
 
 
 def quintic_hermite(times: Array, q: Array, qd: Array, qdd: Array) -> Array:
     """Return coefficients (K, 6, m) as :func:`cubic_hermite`, from second derivatives too."""
+    # Differences at the end from the parabola at the beginning, in units of the interval:
+    #     g = q1 - q0 - h v0 - h^2 a0 / 2,    r = h (v1 - v0 - h a0),    b = h^2 (a1 - a0).
     h = np.diff(times)[:, None]
-    # Differences at the end from the parabola at the beginning, in units of the interval.
     gap = np.diff(q, axis=0) - h * qd[:-1] - h**2 * qdd[:-1] / 2
     rate = h * (qd[1:] - qd[:-1] - h * qdd[:-1])
     bend = h**2 * (qdd[1:] - qdd[:-1])
-    return np.stack(
-        [
-            q[:-1],
-            qd[:-1],
-            qdd[:-1] / 2,
-            (10 * gap - 4 * rate + bend / 2) / h**3,
-            (-15 * gap + 7 * rate - bend) / h**4,
-            (6 * gap - 3 * rate + bend / 2) / h**5,
-        ],
-        axis=1,
-    )
+
+    # c3 h^3 + c4 h^4 + c5 h^5 = g, and its first and second derivatives, times h and h^2, r and b.
+    c3 = (10 * gap - 4 * rate + bend / 2) / h**3
+    c4 = (-15 * gap + 7 * rate - bend) / h**4
+    c5 = (6 * gap - 3 * rate + bend / 2) / h**5
+    return np.stack([q[:-1], qd[:-1], qdd[:-1] / 2, c3, c4, c5], axis=1)

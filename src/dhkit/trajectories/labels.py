@@ -37,7 +37,7 @@ class FileKind:
     optional: tuple[str, ...] = ()
     """Names of further arrays that an archive may have."""
     otherwise: str = ""
-    """For messages: how to read a table that does not name its robot."""
+    """Advice in messages for reading a table that does not name its robot."""
 
     @property
     def title(self) -> str:

@@ -73,7 +73,8 @@ def _chosen(
     """
     lower = {name.lower(): name for name in variables} | {name: name for name in variables}
     candidates: dict[str, list[str]] = {"t": list(TIMES)}
-    candidates |= {prefixes[0]: [name for name in prefixes if name in variables] for prefixes in PREFIXES}
+    for prefixes in PREFIXES:
+        candidates[prefixes[0]] = [name for name in prefixes if name in variables]
     for order, ours in enumerate(MATRICES):
         candidates |= {f"{ours}{i}": names for i, names in enumerate(joint_columns(description, order), start=1)}
     chosen: dict[str, MatVariable] = {}

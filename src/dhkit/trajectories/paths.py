@@ -127,6 +127,7 @@ class JointPath:
 
     def _merged_breaks(self, law: Pieces) -> Array:
         """Return the law's breaks together with the times at which s passes breaks of the path."""
+        # s(t) never falls, so that each break is passed once: its time is found by bisection.
         low = np.zeros(len(self.breaks) - 2)
         high = np.full(len(self.breaks) - 2, law.end)
         for _ in range(_BISECTIONS):
@@ -170,9 +171,12 @@ def _compose(outer: Array, inner: Array) -> Array:
     inner
         Shape (K, r+1).
     """
-    power, step = outer.shape[1] - 1, inner.shape[1] - 1
+    power = outer.shape[1] - 1
+    step = inner.shape[1] - 1
     result = np.zeros((len(outer), power * step + 1, outer.shape[2]))
     result[:, 0] = outer[:, power]
+
+    # result <- inner * result + outer_j, whose degree in u grows by r each time.
     for j in range(power - 1, -1, -1):
         degree = (power - 1 - j) * step
         product = np.zeros_like(result)

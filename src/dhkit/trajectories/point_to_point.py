@@ -14,8 +14,12 @@ from dhkit.trajectories.trajectory import Trajectory
 
 _MIN_BLEND = 0.01
 """Smallest share of the duration for a blend: accelerations grow without bound as it goes to 0."""
-_GRID, _FINER_GRID, _REFINEMENTS = 50, 15, 4
-"""Number of blends tried first, then between the neighbours of the best one, and how often: to 2e-6 of the duration."""
+_GRID = 50
+"""Number of blends that are tried first."""
+_FINER_GRID = 15
+"""Number of blends that are tried between the neighbours of the best one."""
+_REFINEMENTS = 4
+"""Number of such refinements: the blend is found to 2e-6 of the duration."""
 
 
 @takes_robot
@@ -164,9 +168,12 @@ def _unit(duration: float | None, ends: tuple[ArrayLike | None, ...]) -> float:
 
 
 def _blended(description: Description, q0: Array, q1: Array, blend: float) -> Trajectory:
-    """Return the motion over one second."""
+    """Return the trapezoidal motion over one second, with blends b at both ends.
+
+    The area under the trapezoid of rates is the way: v (1 - b) = q1 - q0, and the acceleration is v / b.
+    """
     way = q1 - q0
-    rate = (q1 - q0) / (1 - blend)
+    rate = way / (1 - blend)
     speed_up = np.stack([q0, np.zeros_like(way), rate / (2 * blend)])
     cruise = np.stack([q0 + rate * blend / 2, rate, np.zeros_like(way)])
     brake = np.stack([q1 - rate * blend / 2, rate, -rate / (2 * blend)])

@@ -52,10 +52,9 @@ class Samples:
         units = ["m" if slides else "rad" for slides in self.description.numbers.prismatic]
         joints = zip(self.description.joints, units, strict=True)
         headings = ("t [s]", *(f"{joint.name} [{unit}]" for joint, unit in joints))
-        rows = [
-            (f"{t:.4g}", *(f"{x:.4f}" for x in q))
-            for t, q in zip(self.times[:_SHOWN_TIMES], self.q[:_SHOWN_TIMES], strict=True)
-        ]
+        rows = []
+        for t, q in zip(self.times[:_SHOWN_TIMES], self.q[:_SHOWN_TIMES], strict=True):
+            rows.append((f"{t:.4g}", *(f"{x:.4f}" for x in q)))
         caption = f"Samples of {self.description.name}: q, {self._summary}; qd, qdd and tau beside it"
         return html_table(headings, rows, caption, align="r", count=len(self.times))
 

@@ -29,8 +29,10 @@ _PROVED = 1e-12
 """Distance of a derivative's proved bound from values that are reached, as a share of its size."""
 _LIMIT_SLACK = 1e-9
 """Distance by which rounding may exceed joint limits, rad and m."""
-_REFINEMENTS, _TIGHTEST_SAMPLES = 2, 3
-"""How often the neighbourhoods of each joint's tightest samples are sampled more finely, and number of such samples."""
+_REFINEMENTS = 2
+"""Number of passes in which the neighbourhoods of critical samples are sampled more finely."""
+_TIGHTEST_SAMPLES = 3
+"""Number of critical samples per joint that each pass refines."""
 _ACCEPTED_TORQUE = 1e-7
 """Share by which a torque may exceed its limit."""
 _MAX_ROUNDS = 20
@@ -165,7 +167,8 @@ def require_inside(trajectory: Trajectory, limits: Limits) -> None:
     farthest = farthest_outside(limits, trajectory.pieces)
     if farthest.excess <= _LIMIT_SLACK:
         return
-    i, q = farthest.joint, farthest.value
+    i = farthest.joint
+    q = farthest.value
     side, limit = ("lower", limits.lower[i]) if farthest.is_below else ("upper", limits.upper[i])
     slides = bool(trajectory.description.numbers.prismatic[i])
     bound = joint_text(limit, slides=slides)
@@ -248,16 +251,14 @@ class _SamplePoints:
     def states(self, trajectories: Sequence[Trajectory]) -> tuple[Array, Array, Array]:
         """Return q, qd and qdd, shape (N, n) each."""
         parts = np.split(np.arange(len(self.u)), np.searchsorted(self.owner, np.arange(1, len(trajectories))))
-        q, qd, qdd = (
-            np.concatenate(
-                [
-                    trajectory.pieces.differentiated(order).on(self.piece[rows], self.u[rows])
-                    for trajectory, rows in zip(trajectories, parts, strict=True)
-                ]
-            )
-            for order in range(3)
-        )
-        return q, qd, qdd
+
+        def derivative(order: int) -> Array:
+            values = []
+            for trajectory, rows in zip(trajectories, parts, strict=True):
+                values.append(trajectory.pieces.differentiated(order).on(self.piece[rows], self.u[rows]))
+            return np.concatenate(values)
+
+        return derivative(0), derivative(1), derivative(2)
 
 
 def _by_torques(trajectories: Sequence[Trajectory], limits: Limits, torques: Torques | None, points: int) -> Array:
@@ -273,6 +274,10 @@ def _by_torques(trajectories: Sequence[Trajectory], limits: Limits, torques: Tor
         else:
             tau = torques(q, qd, qdd)
             g = torques(q, 0 * q, 0 * q)
+
+        # Slowed down c times, the torque is g + (tau - g) / c^2: it keeps its limit on the side to which it moves if
+        #     c^2 >= |tau - g| / (limit - g),
+        # and no slowdown helps where g itself exceeds the limit. room is 1 / c^2.
         moves = np.abs(tau - g) > _TORQUE_NOISE * np.abs(tau).max()
         spare = limits.torque - np.where(moves, np.sign(tau - g), np.sign(g)) * g
         falls = (np.abs(g) > limits.torque) | (moves & (spare <= 0))

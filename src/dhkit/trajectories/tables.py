@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from dhkit.trajectories.bounds import BOUNDS
 TIMES = ("t", "time", "time_s", "time [s]", "t [s]", "timestamp", "tout")
 """Names of a column of times; the last is Simulink's."""
 PREFIXES = (("q", "pos", "position"), ("qd", "dq", "vel", "velocity"), ("qdd", "ddq", "acc", "acceleration"))
-"""What columns of values, rates and accelerations begin with, before a joint's number, or end with, behind its name."""
+"""Prefixes of columns of values, rates and accelerations, before a joint's number; suffixes after a joint's name."""
 
 _NO_HEADER = "no header: the first line has numbers; expected the names of the columns in it, such as t,q1,q2"
 Table = tuple[tuple[str, ...], Array]
@@ -90,11 +91,14 @@ def check_columns(
         No mapping of texts to texts.
     """
     given: Any = {} if columns is None else columns
-    if not isinstance(given, Mapping) or not all(isinstance(name, str) for item in given.items() for name in item):
+    is_mapping = isinstance(given, Mapping)
+    if not is_mapping or not all(isinstance(name, str) for name in chain(given, given.values())):
         raise TypeError(f"columns is {columns!r:.60}; expected a mapping of our names to those of the file")
     joints = [joint.name for joint in description.joints]
     own = {name: f"q{i}" for i, name in enumerate(joints, start=1)}
-    own |= {f"{prefixes[0]}{i}": f"{prefixes[0]}{i}" for prefixes in PREFIXES for i in range(1, len(joints) + 1)}
+    for i in range(1, len(joints) + 1):
+        for symbol, *_ in PREFIXES:
+            own[f"{symbol}{i}"] = f"{symbol}{i}"
     own |= {name: name for name in ("t", *matrices)}
     checked: dict[str, str] = {}
     for ours, theirs in given.items():
@@ -137,17 +141,14 @@ def select_columns(
     names = {name.lower(): k for k, name in reversed(list(enumerate(table[0])))}
     names |= {name: k for k, name in enumerate(table[0])}
     names |= {ours: table[0].index(place_of_name(theirs, table[0])) for ours, theirs in (columns or {}).items()}
-    time = next((names[name] for name in TIMES if name in names), None)
+    time = _first_known(TIMES, names)
     if time is None and all(is_plain_number(name) for name in table[0]):
         raise DescriptionError(_NO_HEADER)
     if time is None:
         raise DescriptionError(f"no column of times: found {', '.join(table[0])[:80]}; expected t or time")
     chosen: list[Array] = []
     for order, prefixes in enumerate(PREFIXES):
-        places = [
-            next((names[name] for name in candidates if name in names), None)
-            for candidates in joint_columns(description, order)
-        ]
+        places = [_first_known(candidates, names) for candidates in joint_columns(description, order)]
         known = [place is not None for place in places]
         if not any(known) and order:
             break
@@ -159,12 +160,19 @@ def select_columns(
     return table[1][:, time], chosen
 
 
+def _first_known(candidates: Iterable[str], places: Mapping[str, int]) -> int | None:
+    """Return the place of the first name that is known; None if none is."""
+    return next((places[name] for name in candidates if name in places), None)
+
+
 def joint_columns(description: Description, order: int) -> list[list[str]]:
     """Return for each joint the names that a column of its values (order 0), rates or accelerations may have."""
     found = []
     for i, joint in enumerate(description.joints, start=1):
         name = joint.name.lower()
-        candidates = [f"{prefix}{joiner}{i}" for prefix in PREFIXES[order] for joiner in ("", "_")]
+        candidates = []
+        for prefix in PREFIXES[order]:
+            candidates += [f"{prefix}{i}", f"{prefix}_{i}"]
         candidates += [f"{name}_{prefix}" for prefix in PREFIXES[order]]
         found.append(candidates + ([name] if not order else []))
     return found

@@ -51,7 +51,8 @@ class ToolLine:
         return np.zeros((len(s), 6))
 
     def __repr__(self) -> str:
-        length, angle = np.linalg.norm(self.way), np.linalg.norm(self.turn)
+        length = np.linalg.norm(self.way)
+        angle = np.linalg.norm(self.turn)
         return repr_line("ToolLine", summary=f"{length:.4g} m, turned by {angle:.4g} rad")
 
 
@@ -109,7 +110,8 @@ def tool_line(T0: ArrayLike, T1: ArrayLike) -> ToolLine:
     """
     from scipy.spatial.transform import Rotation
 
-    start, goal = one_pose(T0, "T0"), one_pose(T1, "T1")
+    start = one_pose(T0, "T0")
+    goal = one_pose(T1, "T1")
     turn = Rotation.from_matrix(goal[:3, :3] @ start[:3, :3].T).as_rotvec()
     return ToolLine(start, goal[:3, 3] - start[:3, 3], turn)
 
@@ -138,7 +140,8 @@ def tool_circle(
         Other shapes, no pose, values that are not finite, an axis of length 0, or a position on the axis.
     """
     start = one_pose(T0, "T0")
-    point, direction = _vector(centre, "centre"), _vector(axis, "axis")
+    point = _vector(centre, "centre")
+    direction = _vector(axis, "axis")
     length = float(np.linalg.norm(direction))
     if not length:
         raise ValueError("axis has length 0; expected a direction")

@@ -103,12 +103,15 @@ def torque_peaks(
             tau = inverse_dynamics(description, q, qd, qdd)
             if friction is not None:
                 tau = tau + numbers.viscous * qd
+
+        # The largest torques over their limits, forwards and backwards, of the cubics between samples.
         above, at_above = _largest((tau + most_dry[rows, None]) / limit)
         below, at_below = _largest(-(tau + least_dry[rows, None]) / limit)
 
         least = np.maximum(tau + least_dry[rows, None], -tau - most_dry[rows, None]) / limit
         seen[rows] = np.maximum(seen[rows], least.max(axis=1))
 
+        # Error of a cubic between samples h apart, for |d^4 tau / dt^4| <= D:  h^4 / 4! D.
         h = width[rows, None] / (samples - 1)
         error = h**ORDER / factorial(ORDER) * fourth[rows]
         highest[rows] = np.maximum(above, below) + error
@@ -116,6 +119,7 @@ def torque_peaks(
         proved[rows] = (highest[rows] <= 1) | ((error <= _TOLERANCE) & is_dry_constant[rows])
 
     measure(np.arange(count), _FIRST_SAMPLES)
+
     # First with an error of half of what is left to the limit, which decides most cells, then with the tolerance.
     for is_last in (False, True):
         wanted = np.full_like(seen, _TOLERANCE) if is_last else np.maximum((1 - seen) / 2, _TOLERANCE)
@@ -194,6 +198,7 @@ def cubic_peaks(y: Array) -> tuple[Array, Array]:
     """
     pieces = y.shape[1] - 3
     y0, y1, y2, y3 = (y[:, k : k + pieces] for k in range(4))
+
     # Cubic through (-1, y0), (0, y1), (1, y2) and (2, y3): y1 + c1 x + c2 x^2 + c3 x^3.
     c1 = -y0 / 3 - y1 / 2 + y2 - y3 / 6
     c2 = (y0 + y2) / 2 - y1
@@ -202,6 +207,7 @@ def cubic_peaks(y: Array) -> tuple[Array, Array]:
     high = np.ones((pieces, 1))
     low[0] = -1.0
     high[-1] = 2.0
+
     # Extremes, c1 + 2 c2 x + 3 c3 x^2 = 0, by the formula that does not cancel (Press et al. 2007, eq. 5.6.4).
     root = np.sqrt(np.maximum(c2**2 - 3 * c3 * c1, 0.0))
     half = -(c2 + np.where(c2 < 0, -root, root))

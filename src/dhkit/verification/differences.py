@@ -45,7 +45,9 @@ def _screws(description: Description) -> Array:
     frames = list(world_to_frames(description, np.zeros(description.n)))
     screws = []
     for T, slides in zip(carrying(description.convention, frames), description.numbers.prismatic, strict=True):
-        z, p = T[:3, 2], T[:3, 3]
+        # (z; 0) for a prismatic joint, (p x z; z) for a revolute one.
+        z = T[:3, 2]
+        p = T[:3, 3]
         screws.append(np.concatenate([z, np.zeros(3)] if slides else [np.cross(p, z), z]))
     return np.array(screws)
 
@@ -68,7 +70,8 @@ def _axes(
 ) -> Iterator[str]:
     """Yield the difference of the first differing axis, or the zero position that explains all differing axes."""
     name = f"joint {first + 1} ({description.joints[first].name})"
-    a, b = ours[first], theirs[first]
+    a = ours[first]
+    b = theirs[first]
     direction = slice(0, 3) if description.numbers.prismatic[first] else slice(3, 6)
     cosine = float(np.clip(a[direction] @ b[direction], -1.0, 1.0))
     if _distance(a, -b, reach) <= least:
@@ -108,6 +111,8 @@ def _rotate_screws(axis: Array, screws: Array, angle: float) -> Array:
     """Return screws, shape (k, 6), rotated about a revolute axis by an angle, rad."""
     from scipy.spatial.transform import Rotation
 
+    # The axis (p x z; z) passes through p = z x (p x z). About it x goes to R x + p - R p, and a screw (v; w) to
+    #     (R v + (p - R p) x R w;  R w).
     z = axis[3:]
     point = np.cross(z, axis[:3])
     R = Rotation.from_rotvec(angle * z).as_matrix()

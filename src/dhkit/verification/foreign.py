@@ -25,9 +25,11 @@ _SAME_POSE = 1e-12
 """Differences of positions, m, and rotation entries up to this are rounding."""
 _ROUNDING_STATES = 100
 """Number of states at which a URDF is compared with itself, read as designed."""
-_TOOL_SHARE, _DYNAMICS_SHARE = 2.0, 10.0
-"""How often the tool's difference from that reading is allowed, between tools and between M, g and tau: a table whose
-axes were made parallel is nearer to either reading than they are to each other."""
+_TOOL_SHARE = 2.0
+"""Multiple of the file's own rounding that is added to the tolerance of the tool: a table whose axes were made parallel
+is nearer to either reading of the file, as written and as designed, than they are to each other."""
+_DYNAMICS_SHARE = 10.0
+"""Multiple of the file's own rounding that is added to the tolerance of M, g and tau."""
 _CONSTANT = 1e-6
 """Two tools differ by a constant transform if it varies by less than this between states, m and rotation entries."""
 

@@ -63,8 +63,10 @@ class Floors:
     def of(cls, description: Description, M: Array, qd: Array, qdd: Array, tau: Array) -> Floors:
         """Return the sizes for states with mass matrices (N, n, n), rates, accelerations and torques (N, n)."""
         numbers = description.numbers
+        # Units of torque: the weight of all bodies at the arm's reach, and the largest entries of M, qd and qdd.
         weight = float(np.sum(numbers.mass) * np.linalg.norm(numbers.gravity)) * max(1.0, description.reach)
-        inertia, rate = _largest(M), _largest(qd)
+        inertia = _largest(M)
+        rate = _largest(qd)
         g = np.full(len(M), weight)
         C = inertia * rate
         h = inertia * rate**2

@@ -26,7 +26,7 @@ class PinocchioResults:
 
     @property
     def notes(self) -> list[str]:
-        """What was added to Pinocchio's results, a sentence each."""
+        """Terms that were added to Pinocchio's results, a sentence each."""
         return ["the inertia of coupled drives was added to Pinocchio's M"] if self.coupling.any() else []
 
     def frames(self, names: Sequence[str]) -> Array:
@@ -123,18 +123,25 @@ class PinocchioResults:
 
         pin.framesForwardKinematics(self.model, self._data, pin.neutral(self.model))
         T = self._data.oMi[i + 1].inverse() * self._data.oMf[self.model.getFrameId(f"dh{i + 1}")]
-        R, p = T.rotation, T.translation
+        R = T.rotation
+        p = T.translation
+
+        # Mass m, first moment h and inertia I about the frame's origin, seen from the frame (R, p):
+        #     h' = R h + m p,
+        #     I' = R I R^T + 2 (p . R h) 1 - p (R h)^T - (R h) p^T + m (p^2 1 - p p^T).
+        # They are linear in the parameters, so the columns of the matrix are the images of unit vectors.
         matrix = np.zeros((10, 10))
         for k, unit in enumerate(np.eye(10)):
             m = unit[0]
-            h = unit[1:4]
-            second = np.zeros((3, 3))
+            Rh = R @ unit[1:4]
+            inertia = np.zeros((3, 3))
             for value, (a, b) in zip(unit[4:], INERTIA_PLACES.values(), strict=True):
-                second[a, b] = second[b, a] = value
-            turned = R @ h
-            lever = 2 * (p @ turned) * np.eye(3) - np.outer(p, turned) - np.outer(turned, p)
-            second = R @ second @ R.T + lever + m * (p @ p * np.eye(3) - np.outer(p, p))
-            matrix[:, k] = [m, *(turned + m * p), *(second[place] for place in _PINOCCHIO_ORDER)]
+                inertia[a, b] = value
+                inertia[b, a] = value
+            of_first_moment = 2 * (p @ Rh) * np.eye(3) - np.outer(p, Rh) - np.outer(Rh, p)
+            of_mass = m * (p @ p * np.eye(3) - np.outer(p, p))
+            seen = R @ inertia @ R.T + of_first_moment + of_mass
+            matrix[:, k] = [m, *(Rh + m * p), *(seen[place] for place in _PINOCCHIO_ORDER)]
         return matrix
 
     @property

@@ -10,8 +10,10 @@ from dhkit.description import Array, Description, takes_robot
 from dhkit.display import counted, repr_line
 from dhkit.kernels import check_whole
 
-_DEFAULT_SPEED, _ACCELERATION = 3.0, 10.0
-"""Largest speed of a joint without speed limit, rad/s or m/s, and largest acceleration, rad/s^2 or m/s^2."""
+_DEFAULT_SPEED = 3.0
+"""Largest speed of a joint without speed limit, rad/s or m/s."""
+_ACCELERATION = 10.0
+"""Largest acceleration, rad/s^2 or m/s^2."""
 
 
 class JointStates(NamedTuple):
