@@ -243,7 +243,7 @@ class _SheetJudge:
         from dhkit.grading.judging.tables import judge_table
 
         description = self.truth.description
-        (convention, rows) = self.sheet.table or ("", ())
+        convention, rows = self.sheet.table or ("", ())
         return _judge_rows(
             "dh",
             given_rows(rows, description.n, self.vocabulary),

@@ -50,7 +50,7 @@ class AngleFactor:
         """Return the joint positions where the factor vanishes, in words."""
         first, second = (_degrees(value) for value in self.values)
         name = f"q{self.joint + 1}"
-        (at_zero, at_pi) = self.descriptions
+        at_zero, at_pi = self.descriptions
         if at_zero == at_pi:
             return f"{name} = {first} or {second}: {at_zero}"
         return f"{name} = {first} ({at_zero}) or {second} ({at_pi})"

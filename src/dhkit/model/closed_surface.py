@@ -249,7 +249,7 @@ def _shell_notes(shells: Shells) -> list[str]:
     if cavities := int((shells.volume < 0).sum()):
         notes.append(f"{cavities} cavit{'y' if cavities == 1 else 'ies'} inside")
     doubled = shells.doubled()
-    (twice, reaching) = shells.shared()
+    twice, reaching = shells.shared()
     share = f" ({100 * twice / float(shells.volume.sum()):.2g} % of the volume)" if twice else ""
     if doubled or twice:
         which = f"{doubled} of {shells.count}" if doubled else "some"

@@ -265,7 +265,7 @@ def _own_joint_solids(link: _Link, joint: _Joint, tube: float) -> Iterator[Solid
             yield _cylinder(T_start, tube, 0.0, link.d)
         return
     T = link.T_corner @ _about_z(-joint.theta)
-    (low, high) = joint.stroke
+    low, high = joint.stroke
     wide = joint.radius
     if joint.is_rod:
         yield _box(

@@ -145,7 +145,7 @@ def _table_part(where: str, cells: Sequence[str], factors: Mapping[str, float], 
     numbers = [factors[name] * _plain_number(row[name], f"{where}: {name}") for name in COLUMNS[1:]]
     mass = numbers[0]
     com = numbers[1:4]
-    (xx, yy, zz) = numbers[4:7]
+    xx, yy, zz = numbers[4:7]
     products = numbers[7:]
     if any(products) and sign is None:
         raise ModelError(

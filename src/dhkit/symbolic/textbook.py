@@ -156,7 +156,8 @@ class TextbookDerivation:
     @cached_property
     def tau(self) -> Elements:
         """The Euler-Lagrange equation d/dt dL/dqd - dL/dq, shape (n,), N m and N."""
-        ring, n = self.arm.ring, self.arm.n
+        ring = self.arm.ring
+        n = self.arm.n
         inertial = [ring.sum(p.by_rate(j) * ring.acceleration(j) for j in range(n)) for p in self.momenta]
         return np.array(inertial, dtype=object) + self.h + self.g
 
@@ -180,10 +181,12 @@ def velocity_torques(
     mistakes
         Mistakes to make; those of other steps have no effect.
     """
-    of_rate, of_gradient = Fraction(1), Fraction(1)
+    of_rate = Fraction(1)
+    of_gradient = Fraction(1)
     for name, (rate, gradient) in STEP_FACTORS.items():
         if MadeAt(name) in mistakes:
-            of_rate, of_gradient = of_rate * rate, of_gradient * gradient
+            of_rate = of_rate * rate
+            of_gradient = of_gradient * gradient
     torques = []
     for i, momentum in enumerate(momenta):
         rates = ring.sum(momentum.by_position(k) * ring.rate(k) for k in range(ring.n))
@@ -252,7 +255,7 @@ def _motion(arm: ExactArm, i: int, body: ExactBody, mistakes: frozenset[str]) ->
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Where a link's frame is."""
+    """Place of a link's frame."""
 
     R_alone: Elements
     """The frame's rotation if the joints before it stood still: those of parallel axes, or all where there are none."""
@@ -434,8 +437,9 @@ class _MovingBody:
 def _transform(arm: ExactArm, row: ExactRow) -> tuple[Elements, Elements]:
     """Return rotation and translation of A_i."""
     zero = arm.ring.zero
-    (c, s) = row.theta
-    (ca, sa) = row.alpha
+    c, s = row.theta
+    ca, sa = row.alpha
+    # A_i = Rz(theta) Tz(d) Tx(a) Rx(alpha), or Rx(alpha) Tx(a) Rz(theta) Tz(d) with the modified table.
     if arm.is_standard:
         R = [[c, -s * ca, s * sa], [s, c * ca, -c * sa], [zero, sa, ca]]
         return np.array(R, dtype=object), np.array([row.a * c, row.a * s, row.d], dtype=object)

@@ -210,7 +210,8 @@ class TextbookKinematics:
         row = self._lengths(i, self._angles(i, self.arm.rows[i]))
         Rz = rotation(ring, 0, 1, row.theta)
         Rx = rotation(ring, 1, 2, row.alpha)
-        Tz, Tx = translation(ring, 2, row.d), translation(ring, 0, row.a)
+        Tz = translation(ring, 2, row.d)
+        Tx = translation(ring, 0, row.a)
         first, last = (Rz, Rx) if self._standard else (Rx, Rz)
         if self._has("rotations_first", i):
             A = first @ last @ Tx @ Tz
@@ -227,7 +228,8 @@ class TextbookKinematics:
     def _lengths(self, i: int, row: ExactRow) -> ExactRow:
         """Return the row with the mistakes in a and d."""
         ring = self.arm.ring
-        (a, d) = (row.a, row.d)
+        a = row.a
+        d = row.d
         if ring.kinds[i] != "R" and self._has("variable_forgotten", i):
             d = d - ring.position(i)
         if self._has("a_forgotten", i):
@@ -239,9 +241,11 @@ class TextbookKinematics:
     def _angles(self, i: int, row: ExactRow) -> ExactRow:
         """Return the row with the mistakes in theta and alpha."""
         ring = self.arm.ring
-        (ca, sa), theta = row.alpha, row.theta
+        (ca, sa) = row.alpha
+        theta = row.theta
         if self._has("alpha_forgotten", i):
-            ca, sa = ring.one, ring.zero
+            ca = ring.one
+            sa = ring.zero
         if self._has("alpha_sign", i):
             sa = -sa
         if self._has("alpha_sin_cos", i):
@@ -409,8 +413,8 @@ def _product(first: Elements, second: Elements, unrotated: bool) -> Elements:
 
 def _sum(first: Direction, second: Direction) -> Direction:
     """Return cosine and sine of the sum of two angles."""
-    (c, s) = first
-    (x, y) = second
+    c, s = first
+    x, y = second
     return c * x - s * y, s * x + c * y
 
 

@@ -45,7 +45,8 @@ def composite_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX)
     entries: list[list[Scalar]] = [[0.0] * table.n for _ in frames]
     rates = _VelocityMoments.none()
     for j, composite in _composites(frames):
-        frame, (w, v) = frames[j], velocities[j]
+        frame = frames[j]
+        (w, v) = velocities[j]
         rates = rates.joined(_VelocityMoments.of_link(frame.moments, w, v))
         column = _column_rate(frame, composite, rates, w, v)
         for i, (force, moment) in _wrench_at_each_joint(frames, j, column):
@@ -125,7 +126,8 @@ def _column_rate(frame: EquationFrame, body: Moments, rates: _VelocityMoments, w
         return times(body.mass, axis_rate), cross(body.first, axis_rate)
     # z x (V - v) + (w x z) x r
     slip = (v[1], -v[0], 0.0)
-    p, G = rates.momentum, rates.G
+    p = rates.momentum
+    G = rates.G
     force = plus((-p[1], p[0], 0.0), plus(times(body.mass, slip), cross(axis_rate, body.first)))
     moment = plus((-G[2][0], -G[2][1], G[0][0] + G[1][1]), cross(body.first, slip))
     return force, plus(moment, _inertia_times(body, axis_rate))

@@ -20,6 +20,8 @@ def kinetic_energy(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.
     """
     import casadi
 
+    # Each link adds to 2 K:  m v^2 + w . (J w) + 2 v . (w x m c); stored are second moments, so that
+    #     J = trace(S) 1 - S  and  w . (J w) = (S_yy + S_zz) w_x^2 + ... - 2 (S_xy w_x w_y + ...).
     frames = equation_frames(table, q)
     twice: Scalar = casadi.SX(0)
     for i, (frame, (w, v)) in enumerate(zip(frames, link_velocities(frames, qd), strict=True)):

@@ -104,7 +104,8 @@ def link_velocities(frames: list[EquationFrame], qd: casadi.SX) -> list[tuple[Ve
             v = v[0], v[1], v[2] + qd[i]
         else:
             w = w[0], w[1], w[2] + qd[i]
-        w, v = frame.from_twisted(w), frame.from_twisted(v)
+        w = frame.from_twisted(w)
+        v = frame.from_twisted(v)
         velocities.append((w, v))
     return velocities
 
@@ -113,7 +114,8 @@ def _summed_angles(row: JointRow, angles: tuple[Scalar, Scalar, Scalar], q: Scal
     """Return a link's angle in its twisted axes: the angle before, reversed for opposed axes, plus the joint's own."""
     angle, c, s = angles
     if is_zero(row.sin_alpha) and float(row.cos_alpha) < 0:
-        angle, s = -angle, -s
+        angle = -angle
+        s = -s
     c, s = c * row.cos_theta - s * row.sin_theta, s * row.cos_theta + c * row.sin_theta
     return (angle if row.prismatic else q + angle), c, s
 

@@ -82,6 +82,9 @@ def friction_torque(qd: casadi.SX, parameters: casadi.SX, *, smooth: bool) -> ca
     for i in range(n):
         speed = qd[i]
         width = parameters[3 * n]
+
+        # Direction s from -1 to 1. Dry friction is c_pos for s = 1, c_neg for s = -1 and 0 for s = 0:
+        #     (c_pos - c_neg) / 2 s + (c_pos + c_neg) / 2 s^2.
         s = speed / casadi.sqrt(speed * speed + width * width) if smooth else casadi.sign(speed)
         positive = parameters[n + 2 * i]
         negative = parameters[n + 2 * i + 1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import combinations
+from itertools import chain, combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -145,7 +145,7 @@ def _numbers(description: Description) -> Array:
     energy = -(gravity @ np.array(base.first, dtype=float)) - float(mass) * (
         numbers.gravity @ numbers.T_world_base[:3, 3]
     )
-    joints = [entry for row in rows for entry in row.entries]
+    joints = list(chain.from_iterable(row.entries for row in rows))
     coupling = numbers.coupling[np.triu_indices(description.n, 1)]
     moments = [float(entry) for link in links for entry in link.entries]
     return np.array([*joints, *moments, *numbers.armature, *gravity, energy, *coupling], dtype=float)

@@ -1,4 +1,4 @@
-"""Which numbers of an arm are constants of an expression (0, 1, -1), and which are symbols that arms give values."""
+"""Pattern of an arm's numbers: constants of an expression (0, 1, -1), and symbols that arms give values."""
 
 from __future__ import annotations
 

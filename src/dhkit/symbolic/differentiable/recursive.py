@@ -37,8 +37,12 @@ class _AngularMotion:
     @cached_property
     def U(self) -> tuple[Vector3, Vector3, Vector3]:
         """The matrix U, row by row, 1/s^2."""
+        # [wd]x + [w]x [w]x has w_i w_j off its diagonal, and -w_j^2 - w_k^2 on it. Of the latter and of U_zy the
+        # differences to stored entries are used: U_xx = U_zz + w_x^2 - w_z^2 and U_zy = 2 w_y w_z - U_yz.
         x, y, z = self.w
-        xy, xx, zz = x * y, x * x, z * z
+        xy = x * y
+        xx = x * x
+        zz = z * z
         U_xz, U_yz, U_zz = self.column
         return (
             (U_zz + (xx - zz), xy - self.wd_z, U_xz),
@@ -53,7 +57,8 @@ class _AngularMotion:
 
     def in_twisted_axes(self, frame: EquationFrame) -> _AngularMotion:
         """Return the same motion in the twisted axes of the next joint."""
-        c, s = frame.cos_alpha, frame.sin_alpha
+        c = frame.cos_alpha
+        s = frame.sin_alpha
         axis = self.times((0.0, -s, c))
         return _AngularMotion(frame.to_twisted(self.w), c * self.wd_z - s * self.wd_y, frame.to_twisted(axis))
 
@@ -67,7 +72,11 @@ class _AngularMotion:
 
     def moment(self, link: Moments) -> Vector3:
         """Return the integral of r x U r over a link's mass, N m: the moment that its rotation needs."""
-        (U_xx, U_xy, U_xz), (U_yx, U_yy, U_yz), (U_zx, U_zy, U_zz) = self.U
+        # With second moments S = integral of r r^T:  integral of (r x U r)_x = sum_k S_yk U_zk - S_zk U_yk, and so on.
+        # Where a difference of diagonal entries of U occurs, it is written by w.
+        U_xx, U_xy, U_xz = self.U[0]
+        U_yx, U_yy, U_yz = self.U[1]
+        U_zx, U_zy, U_zz = self.U[2]
         x, y, z = self.w
         S = link
         return (
@@ -87,6 +96,8 @@ def recursive_inverse_dynamics(
     """
     import casadi
 
+    # Outwards: angular motion and acceleration of each link, and the force and moment that it needs,
+    #     f = m a + U h,    n = integral of r x U r + h x a,    h = m c.
     frames = equation_frames(table, q)
     motion = _AngularMotion((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))
     a = times(-1.0, table.gravity)  # gravity acts like an acceleration of the base upwards
@@ -102,20 +113,24 @@ def recursive_inverse_dynamics(
         a = frame.from_twisted(a)
         motion = motion.in_link_axes(frame)
         own = frame.moments
-        wrenches.append(
-            (plus(times(own.mass, a), motion.times(own.first)), plus(motion.moment(own), cross(own.first, a)))
-        )
+        force = plus(times(own.mass, a), motion.times(own.first))
+        moment = plus(motion.moment(own), cross(own.first, a))
+        wrenches.append((force, moment))
+
+    # Inwards: each joint carries its link and all links after it, tau_i = n_z if revolute, f_z if prismatic.
     f: Vector3 = (0.0, 0.0, 0.0)
     n: Vector3 = (0.0, 0.0, 0.0)
     tau = [0.0] * table.n
     for i in reversed(range(table.n)):
         frame = frames[i]
-        f, n = plus(wrenches[i][0], f), plus(wrenches[i][1], n)
+        f = plus(wrenches[i][0], f)
+        n = plus(wrenches[i][1], n)
         tau[i] = (f if frame.prismatic else n)[2] + table.armature[i] * qdd[i]
-        f, n = frame.to_previous(f), frame.to_previous(n)
-        n = plus(n, cross(frame.lever, f))
+        f = frame.to_previous(f)
+        n = plus(frame.to_previous(n), cross(frame.lever, f))
     for i, j, inertia in table.couplings:
-        tau[i], tau[j] = tau[i] + inertia * qdd[j], tau[j] + inertia * qdd[i]
+        tau[i] = tau[i] + inertia * qdd[j]
+        tau[j] = tau[j] + inertia * qdd[i]
     return casadi.SX(casadi.vertcat(*tau))
 
 

@@ -145,7 +145,8 @@ class _FrameStep:
 
     def carried_column(self, column: tuple[Vector3, Vector3]) -> tuple[Vector3, Vector3]:
         """Return an earlier joint's column, given for the previous frame, for this frame."""
-        v, w = self.to_own_axes(column[0]), self.to_own_axes(column[1])
+        v = self.to_own_axes(column[0])
+        w = self.to_own_axes(column[1])
         return plus(v, cross(w, self.lever)), w
 
     def carried(self, before: _BilinearMotion, v: Scalar, v_r: Scalar, dv_r: Scalar) -> _BilinearMotion:

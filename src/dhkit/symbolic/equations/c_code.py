@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -78,7 +79,7 @@ def _function(text: FunctionSet, function: Function) -> Iterator[str]:
     if is_scalar:
         yield f"    double {name} = 0.0;"
     shape = quantity.elements.shape
-    written = {place for entry in function.entries for place in entry.places}
+    written = set(chain.from_iterable(entry.places for entry in function.entries))
     for k, place in enumerate(np.ndindex(shape)):
         if place not in written and not is_scalar:
             yield f"    {name}[{k}] = 0.0;"

@@ -118,7 +118,9 @@ def _order(ring: Ring) -> _Order:
         g = ring.generators[place]
         if g.kind == "constant":
             derived = g.meaning is not None and g.meaning.text not in g.meaning.symbols
-            return (2 if derived else 0 if _INERTIAL.match(g.text) else 1), (), place
+            if derived:
+                return 2, (), place
+            return (0 if _INERTIAL.match(g.text) else 1), (), place
         if g.kind in ("sine", "cosine"):
             return 4, g.joints, int(g.kind == "sine")
         return {"position": 3, "acceleration": 5, "rate": 6}[g.kind], (g.joint,), place

@@ -14,9 +14,14 @@ from dhkit.symbolic.inverse.derivation import InverseDerivation, Values
 from dhkit.symbolic.inverse.forms import Circle, Form
 from dhkit.symbolic.inverse.steps import DerivationStep, View
 
-_WIDTH, _HEIGHT, _MARGIN = 340, 250, 46
-"""Of a figure, in pixels."""
-_FIRST, _SECOND, _PLAIN, _FAINT = "#0b5cad", "#c2570c", "#1b1f24", "#8c959f"
+_WIDTH = 340
+_HEIGHT = 250
+_MARGIN = 46
+"""Width, height and margin of a figure, px."""
+_FIRST = "#0b5cad"
+_SECOND = "#c2570c"
+_PLAIN = "#1b1f24"
+_FAINT = "#8c959f"
 """Colours of the two solutions, of points, and of helping lines."""
 _LETTER = 6.8
 """Mean width of a letter, in pixels."""
@@ -83,7 +88,7 @@ class _Drawing:
                 width = 1.2 if text == "dashed" else 3
                 parts.append(f'<path d="M{x1} {y1}L{x2} {y2}" stroke="{colour}" stroke-width="{width}"{dash}/>')
             elif kind == "circle":
-                (x, y) = places[0]
+                x, y = places[0]
                 radius = round(float(points[1][0]) * scale, 1)
                 parts.append(
                     f'<circle cx="{x}" cy="{y}" r="{radius}" fill="none" stroke="{colour}" stroke-dasharray="3 3"/>'
@@ -254,11 +259,14 @@ def _text(at: _Pixel, text: str, colour: str, lines: Sequence[Sequence[_Pixel]])
 
 def _beside(a: _Pixel, b: _Pixel, text: str, colour: str) -> str:
     """Return a text beside the middle of a line, on its right where it rises and on its left where it falls."""
-    (x1, y1) = a
-    (x2, y2) = b
-    x, y = (x1 + x2) / 2, (y1 + y2) / 2
+    x1, y1 = a
+    x2, y2 = b
+    x = (x1 + x2) / 2
+    y = (y1 + y2) / 2
     length = max(float(np.hypot(x2 - x1, y2 - y1)), 1.0)
     nx = 12 * (y2 - y1) / length
     ny = -12 * (x2 - x1) / length
-    anchor = "start" if nx > 4 else "end" if nx < -4 else "middle"
+    anchor = "middle"
+    if abs(nx) > 4:
+        anchor = "start" if nx > 0 else "end"
     return f'<text x="{x + nx:.1f}" y="{y + ny + 4:.1f}" text-anchor="{anchor}" fill="{colour}">{escape(text)}</text>'

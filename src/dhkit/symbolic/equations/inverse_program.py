@@ -78,7 +78,7 @@ ABOUT = (
     "Branches that do not reach the pose have status 0, the others 1; all have 0 where T is not a pose.",
     "At singular poses, where solutions coincide or are not unique, one of them is returned.",
 )
-"""What the generated functions' comments say."""
+"""Comments of the generated functions."""
 
 
 class _CodeWriter:
@@ -143,7 +143,8 @@ class _Statements:
         self.root = 0
 
     def program(self) -> InverseProgram:
-        derivation, chain = self.derivation, self.chain
+        derivation = self.derivation
+        chain = self.chain
         pose = {chain.names[name]: name for name in POSE}
         entries = [(self.names[own], *_entry(name)) for own, name in pose.items() if own in self.names]
         constants = [(self.names[name], value) for name, value in chain.lengths.items() if name in self.names]

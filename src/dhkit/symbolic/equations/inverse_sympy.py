@@ -65,7 +65,8 @@ def inverse_sympy(derivation: InverseDerivation) -> dict[str, Any]:
 
 def _solutions(sympy: Any, form: Form, known: dict[str, Any]) -> list[Any]:
     """Return the solutions of a form, its letters given."""
-    atan2, sqrt = sympy.atan2, sympy.sqrt
+    atan2 = sympy.atan2
+    sqrt = sympy.sqrt
     if isinstance(form, Remainder):
         return [sympy.Add(*(sign * sympy.Symbol(name) for name, sign in form.terms))]
     if isinstance(form, Sliding):

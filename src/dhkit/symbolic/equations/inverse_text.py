@@ -49,7 +49,8 @@ def inverse_table(derivation: InverseDerivation) -> str:
         if step.form is not None:
             solution = write.solution(step.form)
             solved = f"{solution.unknown} = {' or '.join(solution.alternatives)}"
-            lines += [("", text) for left, right in write.equations(step) if (text := f"{left} = {right}") != solved]
+            equations = [f"{left} = {right}" for left, right in write.equations(step)]
+            lines += [("", text) for text in equations if text != solved]
             lines += [*(("", f"{letter} = {value}") for letter, value in solution.letters), (solved, "")]
         for k, (solved, line) in enumerate(lines):
             rows.append([_title(write, step) if k == 0 else "", line, solved])

@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import chain
 
 import numpy as np
 
@@ -209,7 +210,7 @@ class _Code:
 
     def _parts(self, element: Element, short: Mapping[str, str]) -> Iterator[str]:
         printer = Printer(element.ring.generators, self, lambda generator: short[generator.text])
-        products = [piece for product in collected(element) for piece in _split(product)]
+        products = list(chain.from_iterable(map(_split, collected(element))))
         for k in range(0, len(products), _MAX_TERMS):
             yield printer.sum(products[k : k + _MAX_TERMS])
 

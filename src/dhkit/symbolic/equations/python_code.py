@@ -68,7 +68,8 @@ def _head(text: FunctionSet) -> Iterator[str]:
 
 
 def _function(text: FunctionSet, function: Function) -> Iterator[str]:
-    quantity, inputs = function.quantity, function.inputs
+    quantity = function.quantity
+    inputs = function.inputs
     shape = "".join(f", {length}" for length in quantity.elements.shape)
     arguments = ", ".join([*inputs, *(["p=PARAMETERS"] if text.parameters else [])])
     yield f"\n\ndef {FUNCTION_NAMES.get(quantity.name, quantity.name)}({arguments}):"

@@ -51,7 +51,8 @@ class TextWriter:
             factors = [decimal, *numerator]
             divisors = list(denominator)
         else:
-            over, under = coefficient.numerator, coefficient.denominator
+            over = coefficient.numerator
+            under = coefficient.denominator
             factors = [*([str(over)] if over != 1 or not numerator else []), *numerator]
             divisors = [*([str(under)] if under != 1 else []), *denominator]
         return "*".join(factors) + "".join(f"/{divisor}" for divisor in divisors)

@@ -122,18 +122,18 @@ _Places = tuple[int, int]
 
 def _add(terms: dict[Monomial, Fraction], a: _Places, b: _Places, total: _Places) -> bool:
     """Write cos a cos b - sin a sin b as cos(a + b), and sin a cos b + cos a sin b as sin(a + b)."""
-    (sa, ca) = a
-    (sb, cb) = b
-    (s, c) = total
+    sa, ca = a
+    sb, cb = b
+    s, c = total
     one = _paired(terms, (ca, cb), (sa, sb), c, -1)
     return _paired(terms, (sa, cb), (ca, sb), s, 1) or one
 
 
 def _subtract(terms: dict[Monomial, Fraction], a: _Places, b: _Places, difference: _Places) -> bool:
     """Write cos a cos b + sin a sin b as cos(a - b), and sin a cos b - cos a sin b as sin(a - b)."""
-    (sa, ca) = a
-    (sb, cb) = b
-    (s, c) = difference
+    sa, ca = a
+    sb, cb = b
+    s, c = difference
     one = _paired(terms, (ca, cb), (sa, sb), c, 1)
     return _paired(terms, (sa, cb), (ca, sb), s, -1) or one
 

@@ -29,9 +29,9 @@ class JointTransform:
 
     @classmethod
     def of(cls, ring: Ring, a: Element, alpha: tuple[Element, Element], row: ExactRow) -> JointTransform:
-        """Return Tx(a) Rx(alpha) Rz(theta) Tz(d)."""
-        (ca, sa) = alpha
-        (c, s) = row.theta
+        """Return Tx(a) Rx(alpha) Rz(theta) Tz(d) (Craig 2005, eq. 3.6)."""
+        ca, sa = alpha
+        c, s = row.theta
         R = np.array([[c, -s, ring.zero], [s * ca, c * ca, -sa], [s * sa, c * sa, ca]], dtype=object)
         return cls(R, np.array([a, -(sa * row.d), ca * row.d], dtype=object))
 
@@ -51,6 +51,8 @@ class RigidBody:
 
     def moved(self, step: JointTransform) -> RigidBody:
         """Return the body in the frame before, by Steiner's theorem in first moments."""
+        # h' = R h + m p  and, with h for R h,
+        # J' = R J R^T + (2 p . h + m p^2) 1 - (p h^T + h p^T + m p p^T).
         p = step.p
         m = self.mass
         h = step.R @ self.moment
@@ -66,7 +68,10 @@ class RigidBody:
 
 def mass_matrix(arm: ExactArm, bodies: Sequence[RigidBody] | None = None) -> Elements:
     """Return M, shape (n, n), with reflected rotor inertia; ``bodies`` in joint frames replace the arm's own."""
-    n, ring = arm.n, arm.ring
+    n = arm.n
+    ring = arm.ring
+    # Composite rigid bodies (Featherstone 2008, section 6.2): column j of M is the momentum that joint j's unit rate
+    # gives to all links after it, taken about and along the axes of joints i <= j.
     steps = joint_steps(arm)
     bodies = bodies or joint_bodies(arm)
     M = np.empty((n, n), dtype=object)
@@ -132,7 +137,7 @@ def joint_bodies(arm: ExactArm) -> list[RigidBody]:
 
 def _behind(ring: Ring, row: ExactRow) -> JointTransform:
     """Return Tx(a) Rx(alpha): DH frame i in joint i's frame, for a standard row."""
-    (ca, sa) = row.alpha
+    ca, sa = row.alpha
     zero = ring.zero
     one = ring.one
     R = np.array([[one, zero, zero], [zero, ca, -sa], [zero, sa, ca]], dtype=object)

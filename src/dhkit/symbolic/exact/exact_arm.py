@@ -248,8 +248,10 @@ def _symbols(constants: Constants) -> list[str]:
 
 def _row(ring: Ring, i: int, link: LinkNumbers) -> ExactRow:
     """Return row i, counted from 0, with the joint variable added to theta or d."""
-    a, d = ring.read(link.row[0]), ring.read(link.row[1])
-    alpha, theta = ring.direction(link.row[2]), ring.direction(link.row[3])
+    a = ring.read(link.row[0])
+    d = ring.read(link.row[1])
+    alpha = ring.direction(link.row[2])
+    theta = ring.direction(link.row[3])
     if ring.kinds[i] != "R":
         return ExactRow(a, d + ring.position(i), alpha, theta)
     c = ring.cosine(i)
@@ -283,7 +285,8 @@ def _symmetric_matrix(entries: Sequence[Element]) -> Elements:
 
 def _rotation(ring: Ring, rpy: Sequence[Expression]) -> Elements:
     """Return Rz(yaw) Ry(pitch) Rx(roll)."""
-    one, zero = ring.one, ring.zero
+    one = ring.one
+    zero = ring.zero
     (cr, sr), (cp, sp), (cy, sy) = (ring.direction(angle) for angle in rpy)
     z = np.array([[cy, -sy, zero], [sy, cy, zero], [zero, zero, one]], dtype=object)
     y = np.array([[cp, zero, sp], [zero, one, zero], [-sp, zero, cp]], dtype=object)

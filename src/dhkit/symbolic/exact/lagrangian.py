@@ -115,7 +115,7 @@ class Lagrangian:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Which numbers are symbols because they cannot be written exactly."""
+        """Numbers that are symbols because they cannot be written exactly."""
         return self.arm.notes
 
     @property

@@ -1,4 +1,4 @@
-"""Which of a description's numbers become symbols, and the symbols' names."""
+"""Choice of a description's numbers that become symbols, and the symbols' names."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dhkit.description.parameters import resolved
 from dhkit.expressions import Expression, exact, exact_angle, substitute
 
 Symbols: TypeAlias = Literal["none", "file", "inertial"]
-"""Which numbers are symbols: none, the file's parameters, or every inertial parameter with lengths and gravity."""
+"""Numbers that are symbols: none, the file's parameters, or every inertial parameter with lengths and gravity."""
 
 _ONE = exact(1)
 
@@ -24,7 +24,7 @@ class BodyNumbers:
     mass: Expression
     com: tuple[Expression, ...]
     inertia: tuple[Expression, ...] | None
-    """In the order of ``INERTIA_PLACES``, about the centre of mass; None where ``second`` is given."""
+    """Inertia about the centre of mass, in the order of ``INERTIA_PLACES``; None if ``second`` is given."""
     second: tuple[Expression, ...] | None
 
 
@@ -104,7 +104,8 @@ class Naming:
             exact_angle(self.known(joint.theta)),
         )
         drive = joint.drive or Drive()
-        gear, rotor = self.known(drive.gear), self.known(drive.rotor_inertia)
+        gear = self.known(drive.gear)
+        rotor = self.known(drive.rotor_inertia)
         if self.symbols != "inertial":
             return LinkNumbers(row, tuple(self._body(body) for body in bodies), gear, rotor)
         m, x, y, z, *second = map(exact, self.description.numbers.inertial_parameters[i].tolist())

@@ -15,7 +15,7 @@ def identity(ring: Ring) -> Elements:
 def rotation(ring: Ring, first: int, second: int, direction: Direction) -> Elements:
     """Return the rotation by an angle (its cosine and sine) from one axis to another, shape (4, 4)."""
     T = identity(ring)
-    (c, s) = direction
+    c, s = direction
     T[first, first] = c
     T[first, second] = -s
     T[second, first] = s

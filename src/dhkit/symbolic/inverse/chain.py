@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 
@@ -98,17 +99,17 @@ class ExactChain:
         fixed = [[naming.known(x) for x in end.xyz] for end in ends]
         turned = [[exact_angle(naming.known(x)) for x in end.rpy] for end in ends]
         constants = Constants.of(
-            [*(x for row in lengths for x in row), *(x for xyz in fixed for x in xyz)],
-            [*(x for row in angles for x in row), *(x for rpy in turned for x in rpy)],
+            [*chain.from_iterable(lengths), *chain.from_iterable(fixed)],
+            [*chain.from_iterable(angles), *chain.from_iterable(turned)],
         )
-        taken = {name for constant in constants.found.values() for name in constant.symbols}
+        taken = set(chain.from_iterable(constant.symbols for constant in constants.found.values()))
         names = distinct([*POSE, *_DEFINED], taken)
         # The pose and defined quantities come first, so that they are written first.
         ring = Ring(description.kinds, [*map(Constant, names.values()), *constants.found.values()])
-        base, tool = (
-            _placed(ring, [ring.read(x) for x in xyz], [ring.direction(x) for x in rpy])
-            for xyz, rpy in zip(fixed, turned, strict=True)
-        )
+        placed = []
+        for xyz, rpy in zip(fixed, turned, strict=True):
+            placed.append(_placed(ring, [ring.read(x) for x in xyz], [ring.direction(x) for x in rpy]))
+        base, tool = placed
         a = [ring.read(row[0]) for row in lengths]
         alpha = [ring.direction(row[0]) for row in angles]
         outer = 0 if not is_standard else len(joints) - 1

@@ -27,7 +27,8 @@ from dhkit.symbolic.ring import Element
 from dhkit.symbolic.ring.elements import element_array
 
 _LANGUAGES = ("c", "python", "matlab")
-_CLOSES, _FOUND = 1e-9, 1e-6
+_CLOSES = 1e-9
+_FOUND = 1e-6
 """Largest error, rad and share of the reach, with which a branch closes forward kinematics, and with which joint values
 are those that a pose was computed from: near singular poses joints are less certain than poses."""
 IN_PLANE = 1e-9
@@ -38,7 +39,7 @@ _SAMPLES = 200
 
 @dataclass(frozen=True, eq=False)
 class InverseProof:
-    """What is proved of a derivation, and what was only sampled.
+    """Proved statements of a derivation, and those that were only sampled.
 
     Attributes
     ----------
@@ -65,7 +66,7 @@ class InverseProof:
 
     @property
     def statement(self) -> str:
-        """What is proved, and what is sampled."""
+        """Proved statements, and sampled ones."""
         proved = f"{len(self.identities)} identities and {len(self.lemmas)} lemmas"
         failed = [proof.statement for proof in (*self.identities, *self.lemmas) if not proof]
         sampled = (
@@ -136,7 +137,7 @@ class InverseDerivation:
 
     @property
     def geometry(self) -> str:
-        """How the arm's axes lie, in words."""
+        """Arrangement of the arm's axes, in words."""
         kinds = self.description.kinds
         if self.family.name != "parallel_chain":
             return self.family.geometry

@@ -101,4 +101,4 @@ FAMILIES = (
     ),
     Derivable("slider", ("PR",), "a revolute axis at right angles to a slide", slider_fits, slider),
 )
-"""In the order in which they are tried."""
+"""Families in the order in which they are tried."""

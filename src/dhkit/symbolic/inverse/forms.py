@@ -25,7 +25,7 @@ ZERO_RADICAND = 1e-12
 
 @dataclass(frozen=True)
 class Unknown:
-    """What a step solves for.
+    """Unknown of a step.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Form(ABC):
     code: ClassVar[str]
     """The same as code, where <s> is 1 or -1, and root(x) the square root of x, or 0 if x is negative."""
     guard: ClassVar[tuple[str, str]] = ("", "")
-    """What must not be negative, and what its size is compared with, as code; empty without a root."""
+    """Radicand, which must not be negative, and the length that it is compared with, as code; empty without a root."""
 
     @property
     def derived(self) -> dict[str, tuple[str, Element]]:
@@ -196,7 +196,11 @@ class Direction(Form):
     def derived(self) -> dict[str, tuple[str, Element]]:
         """The products with k, without a k of 1 or -1."""
         k = self.letters["k"]
-        words = "" if k == 1 else "-" if k == -1 else "k*"
+        words = "k*"
+        if k == 1:
+            words = ""
+        elif k == -1:
+            words = "-"
         return {f"k{letter}": (f"{words}{letter}", k * self.letters[letter]) for letter in "XY"}
 
     @property
@@ -304,8 +308,8 @@ class Turned(Form):
     @property
     def equations(self) -> tuple[tuple[Element, Element], ...]:
         """The two equations."""
-        (c, s) = self.unknown.symbols
-        (U, V, X, Y) = (self.letters[k] for k in "UVXY")
+        c, s = self.unknown.symbols
+        U, V, X, Y = (self.letters[k] for k in "UVXY")
         return (U * c - V * s, X), (U * s + V * c, Y)
 
     def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
@@ -349,7 +353,8 @@ class Square(Form):
 
     def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
         """Return the value and the radicand."""
-        M, S = letters["M"], letters["S"]
+        M = letters["M"]
+        S = letters["S"]
         return -M + sign * np.sqrt(np.maximum(S, 0.0)), S / np.maximum(letters["Q"], np.finfo(float).tiny)
 
     @staticmethod
@@ -442,7 +447,7 @@ def _ring(names: str, roots: Mapping[str, str], angle: str) -> Ring:
 def _along(names: Sequence[str]) -> Elements:
     """Return what is zero if X sin x = Y cos x makes (X, Y) a multiple of (cos x, sin x)."""
     ring = _ring(" ".join(names), {}, "X")
-    (X, Y) = (ring.constant(name) for name in names)
+    X, Y = (ring.constant(name) for name in names)
     c = ring.cosine(0)
     s = ring.sine(0)
     along = X * c + Y * s

@@ -86,7 +86,8 @@ def parallel_chain(bench: Workbench) -> None:
         cosine, sine = chain.named(("cphi", "sphi"))
         still = first @ middle
         behind = rotation(chain.ring, 0, 1, (cosine, sine))[:2, :2] @ still[:2, :2] @ origin(end)[:2]
-        x, y = x - behind[0], y - behind[1]
+        x = x - behind[0]
+        y = y - behind[1]
         last = middle
     definitions, (x, y) = bench.define_all(x=x, y=y)
     who = TOOL if len(turning) == 2 else f"axis {turning[2]}"
@@ -136,7 +137,10 @@ def _chain_rotation(
     turned = whole[:2, :2] @ still[:2, :2].T
     phi = bench.phi(turned[0, 0], turned[1, 0], _chain_senses(chain, turning))
     at_zero = (before @ still @ end)[:3, :3]
-    sizes = [sum(number(chain, at_zero[i, k]) ** 2 for i in range(2)) for k in range(3)]
+
+    # The tool's axis that has the longest projection onto the plane, at q = 0 and at every q.
+    numbers = np.array([[number(chain, entry) for entry in row] for row in at_zero[:2]])
+    sizes = (numbers**2).sum(axis=0)
     column = int(np.argmax(np.round(sizes, 12)))
     own = still[:2, :2] @ end[:2, column]
     seen = before[:2, :2].T @ bench.T[:2, column]

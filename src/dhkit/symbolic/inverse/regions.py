@@ -15,12 +15,12 @@ from dhkit.symbolic.ring import Element, Elements
 from dhkit.symbolic.ring.elements import element_array
 
 UPRIGHT = 1e-9
-"""Of entries of the vertical's direction, as in ``dhkit.kinematics.closed_form``."""
+"""Tolerance of entries of the vertical's direction, as in ``dhkit.kinematics.closed_form``."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """What is known once joint 1 is: coordinates in the frame of axis 2, whose z axis is axis 2.
+    """Known quantities once joint 1 is known: coordinates in the frame of axis 2, whose z axis is axis 2.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ def turn_the_plane(bench: Workbench, point: Elements, inside: Elements, who: str
     """
     chain = bench.chain
     unknown = bench.unknown(1)
-    (c, s) = chain.cosine_and_sine(1)
+    c, s = chain.cosine_and_sine(1)
     tilt = chain.alpha[0][1]
     px, py, pz = point
     beside = inside[2]
@@ -184,8 +184,8 @@ def turn_into_place(
     who: str,
 ) -> None:
     """Add the step that turns a known vector (u, v) into a known place (x, y)."""
-    (u, v) = vector
-    (x, y) = place
+    u, v = vector
+    x, y = place
     bench.add(
         DerivationStep(
             f"theta{i}",
@@ -199,7 +199,7 @@ def turn_into_place(
 
 
 def reach_with_slide(bench: Workbench, i: int, vector: Elements, place: tuple[Element, Element], who: str) -> None:
-    """Add the steps for a slide behind a turning joint i, from 1, that put a point in place."""
+    """Add the steps for a prismatic joint after a revolute joint i, from 1, that put a point in place."""
     x, y = place
     unknown = bench.unknown(i + 1)
     square = vector[0] * vector[0] + vector[1] * vector[1]

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dhkit.symbolic.inverse.chain import ExactChain
 from dhkit.symbolic.ring import Element, Elements
 
-CENTRE, TOOL = "the wrist centre", "the tool"
+CENTRE = "the wrist centre"
+TOOL = "the tool"
 IN_THE_PLANE = "The arm moves in a plane: the pose has to lie in it."
 
 

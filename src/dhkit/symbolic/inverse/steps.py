@@ -14,7 +14,7 @@ from dhkit.symbolic.ring.ring import translated
 
 
 class View(Enum):
-    """What the figure of a step shows."""
+    """Subject of the figure of a step."""
 
     TOP = "top"
     """The arm's plane seen along axis 1."""
@@ -110,7 +110,7 @@ class DerivationStep:
 
     @property
     def unknown(self) -> Unknown | None:
-        """What the step solves for."""
+        """Unknown that the step solves for."""
         return None if self.form is None else self.form.unknown
 
     @property
@@ -150,7 +150,7 @@ class Workbench:
     steps: list[DerivationStep] = field(default_factory=list)
     conditions: list[Condition] = field(default_factory=list)
     meanings: dict[str, Element] = field(default_factory=dict)
-    """What the names of the pose and of defined quantities are if the pose is that of the arm."""
+    """Values of the names of the pose and of defined quantities if the pose is that of the arm."""
 
     sum: tuple[tuple[int, int], ...] = ()
     """The joints whose angles add up to phi, from 1, each with 1 or -1; empty without phi."""

@@ -1,4 +1,4 @@
-"""Steps for the last three joints of six: a spherical wrist, and the wrist behind three parallel axes."""
+"""Steps for the last three joints of six: a spherical wrist, and the wrist after three parallel axes."""
 
 from __future__ import annotations
 
@@ -20,8 +20,10 @@ def turn_spherical_wrist(bench: Workbench, R: Elements) -> None:
         The axes of axis 4's frame before joint 4 turns, in those before joint 1, shape (3, 3), in known joints.
     """
     chain = bench.chain
-    s_alpha4, s_alpha5 = chain.alpha[3][1], chain.alpha[4][1]
-    (c4, s4), (_, s5) = chain.cosine_and_sine(4), chain.cosine_and_sine(5)
+    s_alpha4 = chain.alpha[3][1]
+    s_alpha5 = chain.alpha[4][1]
+    c4, s4 = chain.cosine_and_sine(4)
+    _, s5 = chain.cosine_and_sine(5)
     tool = R.T @ bench.T[:3, :3]
     definitions, (ax, ay, az) = bench.define_all(ax=tool[0, 2], ay=tool[1, 2], az=tool[2, 2])
     k = s_alpha5 * s5
@@ -67,7 +69,7 @@ def turn_spherical_wrist(bench: Workbench, R: Elements) -> None:
 
 
 def turn_parallel_wrist(bench: Workbench, sense: Element) -> tuple[tuple[Definition, ...], Element, Element]:
-    """Add the steps for joints 5 and 6 behind the parallel axes 2, 3 and 4.
+    """Add the steps for joints 5 and 6 after the parallel axes 2, 3 and 4.
 
     Parameters
     ----------
@@ -80,7 +82,8 @@ def turn_parallel_wrist(bench: Workbench, sense: Element) -> tuple[tuple[Definit
         Definitions for the step that finds phi, the sum of the angles of joints 2, 3 and 4, and its cosine and sine.
     """
     chain = bench.chain
-    s_alpha4, s_alpha5 = chain.alpha[3][1], chain.alpha[4][1]
+    s_alpha4 = chain.alpha[3][1]
+    s_alpha5 = chain.alpha[4][1]
     s5 = chain.cosine_and_sine(5)[1]
     n, o, a = (into_axis_2(bench, bench.T[:3, k]) for k in range(3))
     definitions, (ax, ay, az) = bench.define_all(ax=a[0], ay=a[1], az=a[2])

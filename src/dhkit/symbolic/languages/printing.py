@@ -118,7 +118,8 @@ def matlab_lines(statement: Statement, indent: str) -> list[str]:
             ]
             lines = []
             for k, part in enumerate(parts):
-                before = "" if not k else f"{first} " if part.startswith("-") else f"{first} + "
+                sum_so_far = f"{first} " if part.startswith("-") else f"{first} + "
+                before = sum_so_far if k else ""
                 lines.append(wrapped(part, f"{indent}{first} = {before}", f"{indent}    ", ending=" ...") + ";")
             return [*lines, *(f"{indent}{other} = {first};" for other in others)]
         case Guard(expression, least):

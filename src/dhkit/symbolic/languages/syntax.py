@@ -1,4 +1,4 @@
-"""How programming languages write entries of arrays, calls of functions and numbers: shared by all code generators."""
+"""Syntax of programming languages for entries of arrays, calls of functions and numbers, for all code generators."""
 
 from __future__ import annotations
 
@@ -44,4 +44,6 @@ class Syntax:
         """Return a literal that is read as the same double."""
         if math.isfinite(value):
             return repr(value)
-        return self.nan if math.isnan(value) else self.infinity if value > 0 else f"-{self.infinity}"
+        if math.isnan(value):
+            return self.nan
+        return self.infinity if value > 0 else f"-{self.infinity}"

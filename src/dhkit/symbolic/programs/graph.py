@@ -135,7 +135,7 @@ class Graph:
     outputs: tuple[Variable, ...]
     nodes: tuple[Node, ...]
     results: tuple[tuple[int, ...], ...]
-    """For each output, the nodes of its entries, row by row."""
+    """Nodes of the entries of each output, row by row."""
 
     @classmethod
     def of(

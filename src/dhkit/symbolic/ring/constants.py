@@ -37,7 +37,8 @@ class Constants:
     @classmethod
     def of(cls, expressions: Iterable[Expression], angles: Iterable[Expression]) -> Constants:
         """Return the constants of expressions, and of the cosines and sines of angles."""
-        expressions, angles = list(expressions), list(angles)
+        expressions = list(expressions)
+        angles = list(angles)
         constants = cls()
         constants._units = _common_angles(expressions, angles)
         for angle in angles:

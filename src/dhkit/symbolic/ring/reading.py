@@ -58,11 +58,13 @@ class ExpressionReader:
         RingError
             As for :meth:`expression`.
         """
-        c, s = self.ring.one, self.ring.zero
+        c = self.ring.one
+        s = self.ring.zero
         for monomial, coefficient in angle.terms:
             if is_exact(monomial, coefficient):
                 exact = PI * coefficient
-                cosine, sine = self.expression(cos(exact)), self.expression(sin(exact))
+                cosine = self.expression(cos(exact))
+                sine = self.expression(sin(exact))
             else:
                 cosine, sine = self._multiple(monomial, coefficient)
             c, s = c * cosine - s * sine, s * cosine + c * sine
@@ -75,7 +77,8 @@ class ExpressionReader:
         angle = Expression(((monomial, unit),))
         cosine = self.ring.constant(f"cos({angle.text})")
         sine = self.ring.constant(f"sin({angle.text})")
-        c, s = self.ring.one, self.ring.zero
+        c = self.ring.one
+        s = self.ring.zero
         for _ in range(int(abs(coefficient) / unit)):
             c, s = c * cosine - s * sine, s * cosine + c * sine
         return (c, s) if coefficient > 0 else (c, -s)

@@ -186,13 +186,17 @@ def _sum_of_angles(
     ring: Ring, joints: tuple[int, ...], single: Mapping[tuple[int, ...], tuple[Element, Element]]
 ) -> tuple[Element, Element]:
     """Return sine and cosine of a sum of joint angles, from those of the ring's angles and of their differences."""
-    s, c = ring.zero, ring.one
+    s = ring.zero
+    c = ring.one
     for i in joints:
         own = ring.angles[i]
         s_own, c_own = single[own]
         if len(own) > 1:
+            # The ring's angle is a sum q1 + ... + qi: qi is its difference from the sum without qi.
             s_less, c_less = _sum_of_angles(ring, own[:-1], single)
             s_own, c_own = s_own * c_less - c_own * s_less, c_own * c_less + s_own * s_less
+
+        # sin(a + b) = sin a cos b + cos a sin b,  cos(a + b) = cos a cos b - sin a sin b.
         s, c = s * c_own + c * s_own, c * c_own - s * s_own
     return s, c
 
