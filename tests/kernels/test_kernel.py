@@ -215,7 +215,7 @@ def test_tiers_agree_and_give_nan_for_the_same_states(name, monkeypatch):
         one, other = both(monkeypatch, partial(getattr(arm, quantity), *arguments))
         assert np.array_equal(np.isnan(one), np.isnan(other)), quantity
         scale = np.abs(np.delete(one, 6, axis=0)[9:]).max()
-        rows = ~np.isin(np.arange(300), 6)  # 1e300 of a sliding joint overflows in one of them
+        rows = ~np.isin(np.arange(300), 6)  # 1e300 of a prismatic joint overflows in one of them
         assert np.nanmax(np.abs(one[rows] - other[rows])[9:]) <= 10 * TIERS * max(1.0, scale), quantity
 
 

@@ -72,7 +72,7 @@ def test_a_boundary_has_one_side_that_is_reached(name):
             T = np.tile(np.eye(4), (len(points), 1, 1))
             T[:, :3, 3] = points + step * normals
             solutions = inverse_kinematics(arm, T @ inverse_pose(to_wrist))
-            # Limits of turning joints do not count, those of slides do.
+            # Limits of revolute joints do not count, those of slides do.
             slides = arm.numbers.prismatic
             outside = (solutions.q < arm.numbers.lower) | (solutions.q > arm.numbers.upper)
             reached.append((solutions.valid & ~(outside & slides).any(axis=-1)).any(axis=-1))

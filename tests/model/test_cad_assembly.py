@@ -38,7 +38,7 @@ def planar():
 
 
 def random_table(rng, n):
-    """An arm of turning and sliding joints with any twists, in either convention."""
+    """An arm of turning and prismatic joints with any twists, in either convention."""
     rows = np.column_stack(
         [rng.uniform(-3, 3, n), *rng.uniform(-0.5, 0.5, (2, n)), rng.choice([0, np.pi / 2, -1.1], n)]
     )

@@ -114,7 +114,7 @@ def changed(name, mistake):
 
 @pytest.mark.parametrize("mistake", KINEMATIC_MISTAKES)
 def test_every_mistake_changes_something(mistake):
-    """On an arm with a sliding joint, offsets and lengths, or on a modified one."""
+    """On an arm with a prismatic joint, offsets and lengths, or on a modified one."""
     found = changed("stanford", mistake) | changed("polar_rp", mistake) | changed("al5d", mistake)
     assert "J" in found or mistake in ("theta_sin_cos", "pose_inverted")
     assert ("T" in found) == (mistake not in JACOBIAN_MISTAKES)

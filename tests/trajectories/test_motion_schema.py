@@ -68,7 +68,7 @@ def test_the_schema_is_one_and_tells_what_every_key_means():
 
 @pytest.mark.parametrize("name", ["planar2r", "puma560", "stanford"])
 def test_what_is_written_fits(name, tmp_path):
-    """Numbers as small as 1e-300, and a sliding joint among the Stanford arm's."""
+    """Numbers as small as 1e-300, and a prismatic joint among the Stanford arm's."""
     arm = library_robot(name)
     motion = Trajectory(arm, [0, 0.1], np.outer([0.1, 1e-300, -3.0, 1e-9], np.ones(arm.n))[None])
     for rate in (None, 3.0):

@@ -17,6 +17,7 @@ from dhkit.bench.peers.sympy_mechanics import lagranges_equations
 from dhkit.description import write_robot
 from dhkit.display import value_line
 from dhkit.dynamics import dynamics_graph
+from dhkit.errors import DhkitError
 from dhkit.symbolic import CasadiFunctions, derive, lagrangian, operation_count
 from dhkit.symbolic.exact.exact_arm import exact_arm
 
@@ -109,7 +110,7 @@ def derivations(arm: Arm, limit: float) -> list[Derivation]:
     def proofs() -> None:
         lag = lagrangian(description, "inertial")
         if not (lag.prove_euler_lagrange(derive(description, symbols="inertial")) and lag.prove_skew_symmetry()):
-            raise AssertionError("the two derivations differ")
+            raise DhkitError("the two derivations differ")
 
     own = ((CASADI, casadi), (_EXACT, exact("none")), (_INERTIAL, exact("inertial")), (PROOFS, proofs))
     timed = [Derivation(arm.name, what, _seconds(run), limit) for what, run in own]

@@ -87,7 +87,7 @@ def joint_values(
     words
         The expressions, or one name.
     degrees
-        Whether bare numbers of turning joints are in degrees.
+        Whether bare numbers of revolute joints are in degrees.
     what
         Name of the values, for messages.
     outside

@@ -69,8 +69,8 @@ TABLE = _catalogue(
         },
         (Subject.TABLE, ROW): {
             "rows_exchanged": "two rows are exchanged",
-            "variable_column": "the joint's variable stands in the wrong column: a turning joint's adds to theta, a "
-            "sliding joint's to d",
+            "variable_column": "the joint's variable stands in the wrong column: a revolute joint's adds to theta, a "
+            "prismatic joint's to d",
             "variable_of_another_joint": "the variable is that of another joint",
             "length_sign": "a length has the wrong sign",
             "wrong_length": "a length is wrong",
@@ -205,7 +205,7 @@ _EQUATION = _catalogue(
         (Subject.ENERGY, "Look again at the squares in the kinetic energy."): {
             "square_of_sum": "the square of a sum lacks its mixed term: (a + b)^2 = a^2 + 2 a b + b^2",
             "exponent_dropped": "the exponent is missing: x stands where x^2 belongs",
-            "slide_forgotten": "the variable of a sliding joint is missing in the position of a link",
+            "slide_forgotten": "the variable of a prismatic joint is missing in the position of a link",
         },
         (Subject.EQUATION, "Look again at the formulas for sines and cosines of sums."): {
             "sum_of_angles_split": "sines and cosines of a sum of angles are split up: cos(a + b) is not cos(a) + "

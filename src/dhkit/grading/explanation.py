@@ -155,8 +155,8 @@ class _Solution:
         )
         yield self._step(
             f"{name}: its velocities",
-            "The time derivative of p, and the sum of the turning joints' axes times their rates, both resolved in the "
-            "link's own axes.",
+            "The time derivative of p, and the sum of the revolute joints' axes times their rates, both resolved in "
+            "the link's own axes.",
             [(f"v{number}", body.velocity), (f"w{number}", body.omega)],
         )
         yield self._step(

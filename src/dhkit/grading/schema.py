@@ -32,7 +32,7 @@ _ENTRY: Schema = {"type": ["string", "number"]}
 """A formula as text, or a number."""
 _ANSWER = {"$ref": "#/$defs/Answer"}
 _MEANINGS = {
-    "M": "Mass matrix M(q), n rows of n: kg m^2 of revolute joints, kg of sliding ones.",
+    "M": "Mass matrix M(q), n rows of n: kg m^2 of revolute joints, kg of prismatic ones.",
     "C": "Matrix C(q, qd) of Coriolis and centrifugal terms, n rows of n; it is judged by C qd.",
     "h": "Coriolis and centrifugal torques C(q, qd) qd, n entries: N m and N.",
     "g": "Gravity torques g(q), n entries: N m and N.",

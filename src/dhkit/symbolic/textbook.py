@@ -291,7 +291,7 @@ def _places(arm: ExactArm) -> tuple[_Place, ...]:
 
 
 def _joints_before(arm: ExactArm, i: int) -> list[int]:
-    """Return the turning joints before joint i, from 0, whose axes are parallel to its own; all where none is."""
+    """Return the revolute joints before joint i, from 0, whose axes are parallel to its own; all where none is."""
     run = next((run for run in parallel_runs(arm) if i in run), ())
     turning = [j for j in range(i) if arm.ring.kinds[j] == "R"]
     return [j for j in turning if j in run] or turning

@@ -108,9 +108,9 @@ JACOBIAN_MISTAKES: Mapping[str, Mistake] = catalogue(
         axis_unturned="every axis is taken as (0, 0, 1): the joints before do not turn it",
         angular_axes_unturned="every axis in the angular half is taken as (0, 0, 1): the joints before do not turn it",
         cross_product_order="the cross product is lever x axis instead of axis x lever: the linear rows change sign",
-        prismatic_as_revolute="a sliding joint's column is that of a turning one: it should be (axis; 0)",
-        prismatic_angular="a sliding joint turns the tool: the lower half of its column should be 0",
-        revolute_as_prismatic="a turning joint's column is that of a sliding one: it should be (axis x lever; axis)",
+        prismatic_as_revolute="a prismatic joint's column is that of a revolute one: it should be (axis; 0)",
+        prismatic_angular="a prismatic joint turns the tool: the lower half of its column should be 0",
+        revolute_as_prismatic="a revolute joint's column is that of a prismatic one: it should be (axis x lever; axis)",
     ),
 )
 """Mistakes in the Jacobian alone."""

@@ -125,7 +125,7 @@ class VerificationReport:
 
     def json(self) -> dict[str, object]:
         """Return everything as plain data for JSON."""
-        units = {"q": "q_rad", "qd": "qd_rad_s", "qdd": "qdd_rad_s2"}  # of sliding joints m, m/s, m/s^2
+        units = {"q": "q_rad", "qd": "qd_rad_s", "qdd": "qdd_rad_s2"}  # of prismatic joints m, m/s, m/s^2
         agreements = [
             {units.get(key, key): value for key, value in vars(agreement).items()} | {"ok": agreement.ok}
             for agreement in self.agreements

@@ -54,7 +54,7 @@ class Diagram:
 
 
 def joint_kinds(description: Description) -> list[tuple[NDArray[np.intp], float, str, str]]:
-    """Return the turning and the sliding joints of an arm, each kind only if there are such joints.
+    """Return the revolute and the prismatic joints of an arm, each kind only if there are such joints.
 
     Returns
     -------

@@ -106,7 +106,7 @@ def plot_workspace(workspace: Workspace) -> Figure:
 
     An arm in space is seen in a section, as distance from the first joint's axis and height along it, and along that
     axis; an arm with a sliding first joint is seen along y and z. A tool that stays in a plane is seen in it. Thin
-    lines are the boundaries of the workspace without limits of turning joints, where they have a closed form
+    lines are the boundaries of the workspace without limits of revolute joints, where they have a closed form
     (:func:`dhkit.kinematics.boundaries.boundaries`).
     """
     description = workspace.description

@@ -39,7 +39,7 @@ def placements(draw):
 
 @st.composite
 def degenerate_arms(draw, least=2, most=7) -> Description:
-    """Draw an arm with axes that are often parallel, coincident or intersecting, and with sliding joints inside."""
+    """Draw an arm with axes that are often parallel, coincident or intersecting, and with prismatic joints inside."""
     rows = draw(st.lists(st.tuples(turn, length, length, turn), min_size=least, max_size=most))
     arm = from_dh(
         rows,

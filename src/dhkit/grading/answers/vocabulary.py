@@ -35,7 +35,7 @@ FUNCTION_NAMES = {spelling: name for name, spellings in _SPELLINGS.items() for s
 
 _ANGLES = ("q", "th", "theta", "Theta", "vartheta", "t", "phi", "varphi")
 _SLIDES = ("d", "r", "x", "s", "rho")
-"""Letters for the variable of a sliding joint, beside those of all joints."""
+"""Letters for the variable of a prismatic joint, beside those of all joints."""
 
 
 _RATES = re.compile(r"(?:omega|Omega)(\d+)", re.ASCII)

@@ -119,7 +119,7 @@ def _shoulders(point: Vector, offset: SX, scale: SX, reach: SX, free: Pair) -> t
     point
         The point's coordinates with joint 1 at zero, m.
     offset
-        Its coordinate v across the plane after turning joint 1, m.
+        Its coordinate v across the plane after revolute joint 1, m.
     scale, reach
         Lengths that rounding and nearness to the singularity are shares of, m.
     free

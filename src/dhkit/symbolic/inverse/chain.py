@@ -50,7 +50,7 @@ class ExactChain:
     description
         The robot.
     ring
-        Of all elements: sines and cosines of theta_i, values of sliding joints, lengths, the pose's entries, and the
+        Of all elements: sines and cosines of theta_i, values of prismatic joints, lengths, the pose's entries, and the
         quantities that steps define.
     names
         The names of the pose's entries and of defined quantities in the ring: their own, unless the robot file has
@@ -62,7 +62,7 @@ class ExactChain:
     d
         Lengths of the joints, m; with the joint's value where it slides.
     offsets
-        Offset of each joint: theta_i minus the joint value; of a sliding joint, its constant angle.
+        Offset of each joint: theta_i minus the joint value; of a prismatic joint, its constant angle.
     values
         Values of the ring's constants that are not entries of poses and not defined by steps.
     lengths
@@ -147,7 +147,7 @@ class ExactChain:
         return self.ring.constant(self.names[name])
 
     def cosine_and_sine(self, i: int) -> Direction:
-        """Return cosine and sine of theta_i, i from 1; of a sliding joint those of its constant angle."""
+        """Return cosine and sine of theta_i, i from 1; of a prismatic joint those of its constant angle."""
         offset = self.ring.direction(self.offsets[i - 1])
         if self.description.kinds[i - 1] != "R":
             return offset

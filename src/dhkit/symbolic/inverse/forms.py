@@ -30,11 +30,11 @@ class Unknown:
     Attributes
     ----------
     name
-        theta3, q3 of a sliding joint, or phi.
+        theta3, q3 of a prismatic joint, or phi.
     joint
         The joint, from 0; None for phi, a sum of joint angles.
     symbols
-        Cosine and sine of an angle, or the value of a sliding joint.
+        Cosine and sine of an angle, or the value of a prismatic joint.
     """
 
     name: str
@@ -332,7 +332,7 @@ class Turned(Form):
 
 
 class Square(Form):
-    """(z + M)^2 = S for a sliding joint's value z; Q is the squared length that S is small or large against."""
+    """(z + M)^2 = S for a prismatic joint's value z; Q is the squared length that S is small or large against."""
 
     has_two_roots = True
     statement = "(z + M)^2 = S holds for z = -M +- sqrt(S), and for no other number"
@@ -366,7 +366,7 @@ class Square(Form):
 
 
 class Sliding(Form):
-    """z = Z for a sliding joint's value."""
+    """z = Z for a prismatic joint's value."""
 
     statement = "z = Z gives z"
     text = ("<Z>",)

@@ -70,7 +70,7 @@ def parallel_chain(bench: Workbench) -> None:
     turning = _revolute(chain)
     a, b = turning[:2]
     before = chain.part(1, a - 1)
-    # In the frame of the first turning joint, whose height a slide before it changes alone.
+    # In the frame of the first revolute joint, whose height a slide before it changes alone.
     R = before[:2, :2]
     point = R.T @ (origin(bench.T)[:2] - origin(before)[:2])
     first = _between(chain, a, b)
