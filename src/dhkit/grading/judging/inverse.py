@@ -209,10 +209,12 @@ def _witness(branch: Branch, joint: int | None) -> Witness:
     valued = branch.failing & np.all(np.isfinite(branch.q), axis=1)
     s = int(np.argmax(valued if np.any(valued) else branch.failing))
     one = Branch(branch.poses.at([s]), branch.trees)
-    joint = joint if joint is not None else branch.order[min(int(one.agreement[0][0]), branch.n - 1)]
+    if joint is None:
+        rank = min(int(one.agreement.first_wrong[0]), branch.n - 1)
+        joint = branch.order[rank]
     pose = {name: float(np.asarray(one.poses.values[name])[0]) for name in POSE_NAMES}
     answer = float(one.q[0, joint])
-    truth = float(one.poses.truths[0, one.agreement[1][0], joint])
+    truth = float(one.poses.truths[0, one.agreement.nearest[0], joint])
     return Witness(pose, answer if np.isfinite(answer) else None, truth)
 
 

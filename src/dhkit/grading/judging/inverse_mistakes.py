@@ -227,7 +227,7 @@ def _count_of_closed(explanation: Explanation) -> int:
 
 def _wrong(branch: Branch, joint: int) -> Mask:
     """Return at which poses a joint is the first wrong one, shape (S,)."""
-    wrong: Mask = branch.failing & (branch.agreement[0] == branch.rank(joint))
+    wrong: Mask = branch.failing & (branch.agreement.first_wrong == branch.rank(joint))
     return wrong
 
 
