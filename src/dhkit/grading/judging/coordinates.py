@@ -125,8 +125,8 @@ class Coordinates:
         for kind in ("q", "qd", "qdd"):
             names = [f"{kind}{i + 1}" for i in range(len(self.sums))]
             if any(name in state for name in names):
-                values = [sum(state.get(names[i], 0.0) for i in joints) for joints in self.sums]
-                own |= dict(zip(names, values, strict=True))
+                for name, joints in zip(names, self.sums, strict=True):
+                    own[name] = sum(state.get(names[i], 0.0) for i in joints)
         return own | {name: value for name, value in state.items() if not _VARIABLE.fullmatch(name)}
 
     def by_position(self, element: Element, i: int) -> Element:

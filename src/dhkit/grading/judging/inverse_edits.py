@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
-from itertools import chain, combinations, islice, permutations
+from itertools import chain, combinations, islice, permutations, product
 
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 from dhkit.expressions.trees import names_of, operands, parts_of, with_operands
@@ -191,8 +191,8 @@ def _exchanged(angle: frozenset[str], call: Call) -> Tree:
 def renamings(trees: Sequence[Tree], lengths: Lengths) -> Iterator[tuple[str, dict[str, Tree]]]:
     """Yield replacements of names in formulas: another component, another length, a component less an offset."""
     names = set().union(*map(names_of, trees))
-    if any(f"r{i}{j}" in names for i in "123" for j in "123" if i != j):
-        yield "rotation_matrix_transposed", {f"r{i}{j}": Name(f"r{j}{i}", 0) for i in "123" for j in "123"}
+    if names & {"r12", "r13", "r21", "r23", "r31", "r32"}:
+        yield "rotation_matrix_transposed", {f"r{i}{j}": Name(f"r{j}{i}", 0) for i, j in product("123", repeat=2)}
     for a, b in combinations(_POSITIONS, 2):
         if names & {a, b}:
             yield "axis_exchanged", {a: Name(b, 0), b: Name(a, 0)}
@@ -455,7 +455,8 @@ def _number_changes(number: Number, lengths: Lengths, in_law: bool) -> Iterator[
 
 def _name_changes(text: str, lengths: Lengths) -> Iterator[tuple[str, Tree]]:
     if text in _ROTATIONS:
-        row, column = text[1], text[2]
+        row = text[1]
+        column = text[2]
         yield "rotation_matrix_transposed", Name(f"r{column}{row}", 0)
 
     # Another name of the same kind.

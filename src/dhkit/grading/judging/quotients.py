@@ -348,7 +348,9 @@ class RingReader(Algebra[Quotient]):
 
     def _direction(self, angle: Tree) -> Direction:
         """Return cosine and sine of a sum of whole multiples of joint variables and constant angles."""
-        symbols = {name for constant in self.ring.given for name in constant.symbols}
+        symbols: set[str] = set()
+        for constant in self.ring.given:
+            symbols |= constant.symbols
         try:
             with Budget():
                 expression = exact_angle(value_of(angle, [*symbols, *self._names]))

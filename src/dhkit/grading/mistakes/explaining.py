@@ -145,12 +145,12 @@ def _single(
         if differences:
             whole = tables_of(truth, quantity).whole(name, differences)
             candidates[name] = [variant for variant in whole if not _contradicted(truth, judged, variant)]
-    ranked = _fewest(candidates)
-    return {
-        names: diagnosis_of(variants, [wrong[name] for name in names])
-        for names, variants in ranked.items()
-        if allowed(names, variants[0].rarity)
-    }
+
+    diagnoses: dict[tuple[str, ...], Diagnosis] = {}
+    for names, variants in _fewest(candidates).items():
+        if allowed(names, variants[0].rarity):
+            diagnoses[names] = diagnosis_of(variants, [wrong[name] for name in names])
+    return diagnoses
 
 
 def _contradicted(truth: Truth, judged: Mapping[str, JudgedQuantity], variant: Variant) -> bool:

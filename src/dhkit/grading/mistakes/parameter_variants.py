@@ -115,11 +115,12 @@ def _kinds(description: Description) -> dict[str, str]:
         note("length", joint.a, joint.d)
     note("rotor", *(coupling.inertia for coupling in description.couplings))
     note("length", *description.tool.placement.xyz)
-    bodies = [body for joint in description.joints for body in joint.bodies]
-    for body in bodies:
-        note("length", *body.com)
-    for body in bodies:
-        note("inertia", *(getattr(body.inertia, key) for key in INERTIA_PLACES))
+    for joint in description.joints:
+        for body in joint.bodies:
+            note("length", *body.com)
+    for joint in description.joints:
+        for body in joint.bodies:
+            note("inertia", *(getattr(body.inertia, key) for key in INERTIA_PLACES))
     return kinds
 
 
