@@ -475,7 +475,7 @@ def endless(q):
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no processes of their own")
 @pytest.mark.parametrize("function", [hangs, exits, leaves, starts, endless])
 def test_a_function_that_hangs_or_exits_ends_itself_alone(function, monkeypatch):
-    monkeypatch.setattr(functions, "LIMITS", functions.Limits(0.25, functions.LIMITS.memory))
+    monkeypatch.setattr(functions, "LIMITS", functions.WorkerLimits(0.25, functions.LIMITS.memory))
     with pytest.raises(Exception, match="the function"):
         ARM.grade(V=function)
     assert ARM.grade(V=V)

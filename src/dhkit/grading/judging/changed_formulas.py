@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from typing import TypeGuard
 
 from dhkit.expressions.syntax import Call, Name, Number, Power, Product, Sum, Tree
 from dhkit.expressions.trees import names_of, operands, parts_of, with_operands
@@ -13,7 +14,7 @@ from dhkit.grading.answers.given import POSE_NAMES
 _MIN_LAW_TERMS = 3
 """Smallest number of terms of the numerator in a law of cosines: two squared links, and a squared distance."""
 _MIN_LAW_SQUARES = 2
-"""Smallest number of squares among them; a mistake may have removed one."""
+"""Smallest number of squares among the terms of the numerator; a mistake may have removed one of the three."""
 
 
 def renamed(tree: Tree, change: Mapping[str, Tree]) -> Tree:
@@ -49,6 +50,11 @@ def minus(tree: Tree) -> Tree:
     return Sum(((False, tree),))
 
 
+def with_term(tree: Tree, added: bool, term: Tree) -> Tree:
+    """Return a formula with one more term, added or subtracted."""
+    return Sum(((True, tree), (added, term)))
+
+
 def exchange_arguments(call: Call) -> Tree:
     """Return a call with its arguments in reverse order."""
     return replace(call, arguments=call.arguments[::-1])
@@ -57,17 +63,15 @@ def exchange_arguments(call: Call) -> Tree:
 def with_quadrant(call: Call) -> Call:
     """Return atan2(y, x) for atan(y/x); a call without a quotient as it is."""
     (argument,) = call.arguments
-    if not isinstance(argument, Product) or all(is_factor for is_factor, _ in argument.factors):
+    if not _is_quotient(argument):
         return call
-    y, x = (
-        product_of([(True, part) for is_factor, part in argument.factors if is_factor is wanted])
-        for wanted in (True, False)
-    )
+    y = product_of([(True, part) for is_factor, part in argument.factors if is_factor])
+    x = product_of([(True, part) for is_factor, part in argument.factors if not is_factor])
     return Call("atan2", (y, x), 0)
 
 
 def product_of(factors: Sequence[tuple[bool, Tree]]) -> Tree:
-    """Return a product; 1 without factors."""
+    """Return a product of factors (True) and divisors (False); 1 if there are none."""
     return Product(tuple(factors)) if factors else Number(Fraction(1), "1", 0)
 
 
@@ -87,21 +91,38 @@ def applied(function: str, argument: Tree) -> Tree:
 
 
 def is_constant(tree: Tree) -> bool:
-    """Whether a formula contains no entry of the pose and no joint."""
+    """Whether a formula contains no entry of the pose and no joint value."""
     return not any(name in POSE_NAMES or is_joint(name) for name in names_of(tree))
 
 
 def is_law(tree: Tree) -> bool:
-    """Whether a part looks like a law of cosines: a sum of three terms or more, with squares, over a product."""
-    if not isinstance(tree, Product) or all(is_factor for is_factor, _ in tree.factors):
+    """Whether a part looks like a law of cosines: a quotient whose numerator is a sum of three or more terms.
+
+    cos q = (d^2 - a^2 - b^2) / (2 a b), with the links a and b beside joint q, and the distance d of their ends.
+    """
+    if not _is_quotient(tree):
         return False
-    sums = [_terms(part) for is_factor, part in tree.factors if is_factor]
-    return any(len(terms) >= _MIN_LAW_TERMS and sum(map(_is_square, terms)) >= _MIN_LAW_SQUARES for terms in sums)
+    for is_factor, part in tree.factors:
+        terms = _terms(part) if is_factor else []
+        squares = sum(map(_is_square, terms))
+        if len(terms) >= _MIN_LAW_TERMS and squares >= _MIN_LAW_SQUARES:
+            return True
+    return False
+
+
+def _is_quotient(tree: Tree) -> TypeGuard[Product]:
+    """Whether a formula is a product in which something is divided by."""
+    return isinstance(tree, Product) and not all(is_factor for is_factor, _ in tree.factors)
 
 
 def _terms(tree: Tree) -> list[Tree]:
-    """Return the terms of a sum, with those of sums in it."""
-    return [part for _, term in tree.terms for part in _terms(term)] if isinstance(tree, Sum) else [tree]
+    """Return the terms of a sum, with those of the sums in it; a formula that is not a sum is its own term."""
+    if not isinstance(tree, Sum):
+        return [tree]
+    terms: list[Tree] = []
+    for _, term in tree.terms:
+        terms += _terms(term)
+    return terms
 
 
 def _is_square(tree: Tree) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,23 +35,25 @@ class Consistency:
         judged = self.judged[quantity]
         if quantity not in _ROUTES:
             return {}
-        sources = _ROUTES[quantity][0]
+        sources = _ROUTES[quantity].sources
         wrong = [name for name in sources if name in self.judged and self.judged[name].wrong]
         expected = self.derived(quantity) if wrong else None
         if expected is None:
             return {}
-        answers = {index: judged.findings[index].answer for index in judged.wrong_indices}
-        return {
-            index: ", ".join(wrong)
-            for index, answer in answers.items()
-            if answer is not None and answer.numerator_of_difference(expected[place_of(quantity, index)]).is_zero
-        }
+
+        follows: dict[Index, str] = {}
+        for index in judged.wrong_indices:
+            answer = judged.findings[index].answer
+            derived = expected[place_of(quantity, index)]
+            if answer is not None and answer.numerator_of_difference(derived).is_zero:
+                follows[index] = ", ".join(wrong)
+        return follows
 
     def notes(self) -> list[Note]:
-        """Return notes on which quantities agree with each other, right or wrong, if one of them is wrong."""
+        """Return notes on the quantities that agree with each other, or do not, if one of them is wrong."""
         notes = []
-        for quantity, (sources, _) in _ROUTES.items():
-            given = tuple(name for name in sources if name in self.judged)
+        for quantity, route in _ROUTES.items():
+            given = tuple(name for name in route.sources if name in self.judged)
             if quantity not in self.judged or not given:
                 continue
             if not any(self.judged[name].wrong for name in (quantity, *given)):
@@ -66,7 +69,7 @@ class Consistency:
     def own(self, quantity: str) -> Elements | None:
         """Return a quantity of the sheet, or the truth if it is not on the sheet; None if it is outside the ring.
 
-        C and h stand for C qd.
+        The value of C, as of h, is C qd.
         """
         name = quantity
         if quantity == "h" and "h" not in self.judged and "C" in self.judged:
@@ -85,16 +88,17 @@ class Consistency:
 
     def derived(self, quantity: str) -> Elements | None:
         """Return a quantity as it follows from those that the sheet has; None if one of them is outside the ring."""
-        sources, derive = _ROUTES[quantity]
+        route = _ROUTES[quantity]
         values = []
-        for name in sources:
-            if name == "C" or name not in quantity_names(self.n):  # own("h") is C qd where C alone is given
+        for name in route.sources:
+            # A source C is left out: own("h") is C qd where C alone is given.
+            if name == "C" or name not in quantity_names(self.n):
                 continue
             value = self.own(name)
             if value is None:
                 return None
             values.append(value)
-        return derive(self, *values)
+        return route.derive(self, *values)
 
     @property
     def n(self) -> int:
@@ -107,49 +111,60 @@ class Consistency:
         return self.truth.coordinates.rates(element_array([generator(ring, i) for i in range(self.n)]))
 
 
-_Route = Callable[..., Elements]
-"""Derives a quantity from the sheet's others, which follow its first argument, a :class:`Consistency`."""
+class _Route(NamedTuple):
+    """Derivation of a quantity from others."""
+
+    sources: tuple[str, ...]
+    """Names of the quantities from which it is derived."""
+    derive: Callable[..., Elements]
+    """Function of a :class:`Consistency` and the values of these quantities."""
 
 
 def _gradient(parts: Consistency, V: Elements) -> Elements:
-    """Return dV/dq."""
+    """Return g = dV/dq, shape (n,)."""
     by = parts.truth.coordinates.by_position
     energy: Element = V.item()
     return np.array([by(energy, i) for i in range(parts.n)], dtype=object)
 
 
 def _hessian(parts: Consistency, K: Elements) -> Elements:
-    """Return the second derivatives of K by the rates."""
+    """Return M_ij = d2K / dyd_i dyd_j, shape (n, n), where yd are the rates of the student's variables."""
     by = parts.truth.coordinates.by_rate
     n = parts.n
     energy: Element = K.item()
-    momenta = [by(energy, i) for i in range(n)]
-    return np.array([[by(p, j) for j in range(n)] for p in momenta], dtype=object).reshape(n, n)
+    M = np.empty((n, n), dtype=object)
+    for i in range(n):
+        momentum = by(energy, i)
+        for j in range(n):
+            M[i, j] = by(momentum, j)
+    return M
 
 
 def _velocity_torques(parts: Consistency, M: Elements) -> Elements:
-    """Return dM/dt qd - d(qd^T M qd / 2)/dq."""
-    rates = parts.rates(Ring.rate)
+    """Return h = dM/dt yd - d(yd^T M yd / 2)/dy, shape (n,), for the student's variables y."""
+    yd = parts.rates(Ring.rate)
     by = parts.truth.coordinates.by_position
-    momenta = M @ rates
-    K = rates @ momenta / 2
+    momenta = M @ yd
+    K = yd @ momenta / 2
+
+    # With the momenta p = M yd:  dM/dt yd = sum over k of dp/dq_k qd_k
     ring = parts.truth.lagrangian.arm.ring
-    torques = [
-        ring.sum(momentum.by_position(k) * ring.rate(k) for k in range(parts.n)) - by(K, i)
-        for i, momentum in enumerate(momenta)
-    ]
+    torques = []
+    for i, momentum in enumerate(momenta):
+        rate_of_momentum = ring.sum(momentum.by_position(k) * ring.rate(k) for k in range(parts.n))
+        torques.append(rate_of_momentum - by(K, i))
     return np.array(torques, dtype=object)
 
 
 def _torques(parts: Consistency, M: Elements, h: Elements, g: Elements) -> Elements:
-    """Return M qdd + h + g."""
+    """Return tau = M ydd + h + g, with viscous friction if tau includes it, shape (n,)."""
     torques = M @ parts.rates(Ring.acceleration) + h + g
     friction = parts.truth.coordinates.in_y("tau", parts.truth.viscous) if parts.truth.friction else 0
     return torques + friction
 
 
 def _product(parts: Consistency, *links: Elements) -> Elements:
-    """Return base A1 ... An tool."""
+    """Return T = T_base A_1 ... A_n T_tool, shape (4, 4)."""
     T = parts.truth.kinematics.base
     for A in links:
         T = T @ A
@@ -157,24 +172,27 @@ def _product(parts: Consistency, *links: Elements) -> Elements:
 
 
 def _jacobian(parts: Consistency, T: Elements) -> Elements:
-    """Return the derivatives of T's origin by the variables, and the axes of dR/dq R^T, shape (6, n)."""
+    """Return J, shape (6, n): dp/dy_i of the origin p of T, then w_i of dR/dy_i R^T = (the matrix of w_i x)."""
     by = parts.truth.coordinates.by_position
+    R = T[:3, :3]
     columns = []
     for i in range(parts.n):
-        rate = np.array([[by(entry, i) for entry in row] for row in T[:3]], dtype=object)
-        turn = rate[:, :3] @ T[:3, :3].T
-        columns.append([*rate[:, 3], turn[2, 1], turn[0, 2], turn[1, 0]])
+        derivative = np.empty((3, 4), dtype=object)
+        for place, entry in np.ndenumerate(T[:3]):
+            derivative[place] = by(entry, i)
+        w_matrix = derivative[:, :3] @ R.T
+        columns.append([*derivative[:, 3], w_matrix[2, 1], w_matrix[0, 2], w_matrix[1, 0]])
     return np.array(columns, dtype=object).T
 
 
-_ROUTES: Mapping[str, tuple[tuple[str, ...], _Route]] = {
-    "M": (("K",), _hessian),
-    "C": (("M",), _velocity_torques),
-    "h": (("M",), _velocity_torques),
-    "g": (("V",), _gradient),
-    "tau": (("M", "C", "h", "g"), _torques),
-    "L": (("K", "V"), lambda _, K, V: element_array(K[()] - V[()])),
-    "T": (tuple(f"A{i}" for i in range(1, 33)), _product),
-    "J": (("T",), _jacobian),
+_ROUTES: Mapping[str, _Route] = {
+    "M": _Route(("K",), _hessian),
+    "C": _Route(("M",), _velocity_torques),
+    "h": _Route(("M",), _velocity_torques),
+    "g": _Route(("V",), _gradient),
+    "tau": _Route(("M", "C", "h", "g"), _torques),
+    "L": _Route(("K", "V"), lambda _, K, V: element_array(K[()] - V[()])),
+    "T": _Route(tuple(f"A{i}" for i in range(1, 33)), _product),
+    "J": _Route(("T",), _jacobian),
 }
-"""By quantity: the quantities that it is derived from, and the derivation."""
+"""Derivations of quantities from others on the sheet, by the quantities."""

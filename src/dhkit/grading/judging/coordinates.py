@@ -19,11 +19,12 @@ ANGLE = re.compile(r"\b([cs])(\d[\d_]*)\b", re.ASCII)
 
 
 _VARIABLE = re.compile(r"(?:q|qd|qdd)\d+", re.ASCII)
+"""A joint variable, rate or acceleration by name: qd1."""
 
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Student's joint variables y = S q, sums of the robot's joint variables q.
+    """The student's joint variables y = S q, sums of the robot's joint variables q.
 
     With q = B y, the torques of y are B^T tau, so that power stays the same, and the mass matrix is B^T M B (Siciliano
     et al., Robotics, 2009, section 7.8, for any linear change of coordinates).
@@ -31,7 +32,7 @@ class Coordinates:
     Attributes
     ----------
     sums
-        For each variable, the joints, from 0, whose variables it is the sum of.
+        Joints, from 0, whose variables each of the student's variables is the sum of.
     """
 
     sums: tuple[tuple[int, ...], ...]
@@ -43,10 +44,11 @@ class Coordinates:
 
     @classmethod
     def absolute(cls, arm: ExactArm) -> Coordinates:
-        """Return angles from a fixed direction: sums over the turning joints of parallel axes."""
+        """Return angles from a fixed direction: sums over consecutive revolute joints with parallel axes."""
         sums: dict[int, tuple[int, ...]] = {i: (i,) for i in range(arm.n)}
         for run in parallel_runs(arm):
-            sums |= {joint: run[: k + 1] for k, joint in enumerate(run)}
+            for k, joint in enumerate(run):
+                sums[joint] = run[: k + 1]
         return cls(tuple(sums[i] for i in range(arm.n)))
 
     @property
@@ -71,11 +73,14 @@ class Coordinates:
         """Return the robot's M, C, h, g, tau or J in these coordinates, written in q; other quantities stay."""
         if self.is_relative:
             return truth
-        if quantity in ("M", "C"):
-            return self.B.T @ truth @ self.B
-        if quantity in ("h", "g", "tau"):
-            return self.B.T @ truth
-        return truth @ self.B if quantity == "J" else truth
+        match quantity:
+            case "M" | "C":
+                return self.B.T @ truth @ self.B
+            case "h" | "g" | "tau":
+                return self.B.T @ truth
+            case "J":
+                return truth @ self.B
+        return truth
 
     def rates(self, rates: Elements) -> Elements:
         """Return the rates or accelerations of the variables from those of the joints, shape (n,)."""
@@ -86,8 +91,9 @@ class Coordinates:
         if self.is_relative:
             return element
         ring = element.ring
-        places = dict[int, Element]()
+        places: dict[int, Element] = {}
         for kind, generator in (("rate", ring.rate), ("acceleration", ring.acceleration)):
+            # qd = B yd, where yd is written with the names of qd.
             own = self.B @ np.array([generator(i) for i in range(ring.n)], dtype=object)
             places |= {ring.place(kind, i): x for i, x in enumerate(own)}
         return translated(element, ring, places)
@@ -98,25 +104,29 @@ class Coordinates:
             return text
         angles = {angle_name(joints): f"q{j + 1}" for j, joints in enumerate(self.sums)}
         for (j, long), (k, short) in product(enumerate(self.sums), repeat=2):
+            # q23 = (q1 + q2 + q3) - q1
             if len(short) < len(long) and long[: len(short)] == short:
                 angles.setdefault(angle_name(long[len(short) :]), f"q{j + 1} - q{k + 1}")
 
         def written(match: re.Match[str]) -> str:
             angle = angles.get(match[2])
-            return f"{'cos' if match[1] == 'c' else 'sin'}({angle})" if angle else match[0]
+            if not angle:
+                return match[0]
+            function = "cos" if match[1] == "c" else "sin"
+            return f"{function}({angle})"
 
         return ANGLE.sub(written, text)
 
     def own_state(self, state: Mapping[str, float]) -> dict[str, float]:
-        """Return a state given by the robot's q1, qd1 ... with the variables in their place; what it lacks is zero."""
+        """Return a state, given by the robot's q1, qd1 ..., in the student's variables; missing values are zero."""
         if self.is_relative:
             return dict(state)
         own: dict[str, float] = {}
         for kind in ("q", "qd", "qdd"):
             names = [f"{kind}{i + 1}" for i in range(len(self.sums))]
             if any(name in state for name in names):
-                values = [sum(state.get(names[i], 0.0) for i in joints) for joints in self.sums]
-                own |= dict(zip(names, values, strict=True))
+                for name, joints in zip(names, self.sums, strict=True):
+                    own[name] = sum(state.get(names[i], 0.0) for i in joints)
         return own | {name: value for name, value in state.items() if not _VARIABLE.fullmatch(name)}
 
     def by_position(self, element: Element, i: int) -> Element:
@@ -128,6 +138,6 @@ class Coordinates:
         return self._differentiate(Element.by_rate, element, i)
 
     def _differentiate(self, derivative: Callable[[Element, int], Element], element: Element, i: int) -> Element:
-        """Return the derivative by variable i, or its rate: the chain rule for q = B y."""
+        """Return the derivative by variable i, or its rate: df/dy_i = sum over j of df/dq_j B_ji, since q = B y."""
         ring = element.ring
         return ring.sum(derivative(element, j) * int(self.B[j, i]) for j in range(ring.n) if self.B[j, i])

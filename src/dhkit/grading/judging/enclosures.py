@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 PRECISIONS = (60, 250, 1000, 6000)
 """Decimal digits in which a tree is worked out, one after the other until its value is known."""
 RELATIVE_DIGITS = 26
-"""Known leading digits that are enough to tell a value from another one."""
+"""Number of leading digits that suffices to tell a value from another one."""
 _TOO_LARGE = "a number too large to be worked out"
 
 _Interval = Any
@@ -42,7 +42,7 @@ class LostDigitsError(AnswerError):
 
 
 class _UndecidedError(Exception):
-    """An interval too wide for a function: it holds a divisor's zero, or the end of the function's domain."""
+    """An interval too wide for a function: it contains a zero of the divisor, or an end of the function's domain."""
 
 
 def enclosed(
@@ -57,7 +57,7 @@ def enclosed(
     parts
         Number of the tree's parts.
     values
-        Numbers of mpmath by name, SI units and rad; ``pi`` and units need not be given.
+        Numbers of mpmath by name, in SI units and rad; ``pi`` and units need not be given.
     tolerance
         Largest absolute error of the value.
     relative
@@ -68,7 +68,7 @@ def enclosed(
     AnswerError
         No real, finite value; a name without value; or a function that is not known.
     TooLargeError
-        A number that is too large to be worked out.
+        A number is too large to be worked out.
     LostDigitsError
         No precision in :data:`PRECISIONS` gives the value within ``BOUNDS.enclosure_work``: digits cancel, or a
         function has no value nearby.
@@ -80,15 +80,21 @@ def enclosed(
         if digits > PRECISIONS[0] and parts * digits > BOUNDS.enclosure_work:
             break
         iv = mpmath.iv
-        previous = mpmath.iv.dps
+        previous = iv.dps
         iv.dps = digits
         try:
-            numbers = {**_units(digits), **{name: iv.mpf(x) for name, x in values.items() if name in used}}
-            interval = Evaluation(numbers, partial(_rational, digits=digits), _functions(), _power, _divide).of(tree)
+            given = {name: iv.mpf(x) for name, x in values.items() if name in used}
+            numbers = {**_units(digits), **given}
+            evaluation = Evaluation(numbers, partial(_rational, digits=digits), _functions(), _power, _divide)
+            interval = evaluation.of(tree)
             with mpmath.workdps(digits):
                 middle = mpmath.mpf(interval.mid)
                 width = mpmath.mpf(interval.delta.b)
-            allowed = max(tolerance, abs(middle) * mpmath.mpf(10) ** -RELATIVE_DIGITS) if relative else tolerance
+
+            # width <= max(tolerance, |value| 10^-RELATIVE_DIGITS)
+            allowed = tolerance
+            if relative:
+                allowed = max(tolerance, abs(middle) * mpmath.mpf(10) ** -RELATIVE_DIGITS)
             if mpmath.isfinite(width) and width <= allowed:
                 return middle, digits
         except _UndecidedError:
@@ -116,7 +122,7 @@ def _units(digits: int) -> Mapping[str, _Interval]:
 
 
 def _magnitudes(x: _Interval) -> list[int]:
-    """Return the binary magnitudes of an interval's bounds, without those of zeros."""
+    """Return the binary magnitudes m of an interval's bounds, |bound| <= 2^m, without those of zeros."""
     import mpmath
 
     bounds = [mpmath.mpf(bound) for bound in (x.a, x.b)]
@@ -126,12 +132,20 @@ def _magnitudes(x: _Interval) -> list[int]:
 
 
 def _integer_bits(x: _Interval) -> int:
-    """Return the bits of the larger bound before its point; negative for numbers below 1/2."""
+    """Return the number of bits before the point in the larger of the bounds; negative for numbers below 1/2."""
     return max(_magnitudes(x), default=0)
 
 
 def _refuse_below(x: _Interval, bound: int) -> None:
-    """Refuse an argument below the lower end of a function's domain, and one that may be below it."""
+    """Refuse an argument that is below ``bound``, the lower end of a function's domain, and one that may be.
+
+    Raises
+    ------
+    AnswerError
+        The argument is certainly outside the domain.
+    _UndecidedError
+        The interval is too wide to decide it.
+    """
     if x.b < bound:
         raise AnswerError("no real value")
     if x.a < bound:
@@ -155,11 +169,17 @@ def _power(base: _Interval, exponent: _Interval) -> _Interval:
     power = mpmath.mpf(exponent.mid)
     if size * abs(power) > BOUNDS.power_bits:
         raise TooLargeError(_TOO_LARGE)
-    if exponent.a == exponent.b and power == int(power):
-        whole = int(power)
-        return base**whole if whole >= 0 else _divide(mpmath.iv.mpf(1), base**-whole)
+
+    is_whole = exponent.a == exponent.b and power == int(power)
+    if is_whole:
+        k = int(power)
+        return base**k if k >= 0 else _divide(mpmath.iv.mpf(1), base**-k)
+
+    # 0^y = 0 for y > 0
     if base.a == base.b == 0 and exponent.a > 0:
         return base
+
+    # x^y = exp(y log(x)) for x > 0
     _refuse_below(base, 0)
     if base.a == 0:
         raise _UndecidedError
@@ -176,7 +196,10 @@ def _functions() -> Mapping[str, Callable[..., _Interval]]:
         return iv.sqrt(x)
 
     def other_leg(x: _Interval) -> _Interval:
-        """Return sqrt(1 - x^2): the cosine of an arc sine, and the sine of an arc cosine."""
+        """Return sqrt(1 - x^2): the cosine of an arc sine, and the sine of an arc cosine.
+
+        The product sqrt((1 - x)(1 + x)) keeps the digits that 1 - x^2 loses where |x| is near 1.
+        """
         _refuse_below(1 - abs(x), 0)
         return square_root((1 - x) * (1 + x))
 
@@ -206,6 +229,7 @@ def _functions() -> Mapping[str, Callable[..., _Interval]]:
         "sin": iv.sin,
         "cos": iv.cos,
         "tan": lambda x: _divide(iv.sin(x), iv.cos(x)),
+        # asin(x) = atan2(x, sqrt(1 - x^2)),    acos(x) = atan2(sqrt(1 - x^2), x)
         "asin": lambda x: arc_tangent(x, other_leg(x)),
         "acos": lambda x: arc_tangent(other_leg(x), x),
         "atan": lambda x: arc_tangent(x, iv.mpf(1)),

@@ -46,15 +46,15 @@ class Comparison:
     reader
         Reads answers into the ring.
     digits
-        Significant digits from which a decimal may have been rounded.
+        Number of significant digits from which a decimal may have been rounded.
     numbers
-        Parameters that stand for their numbers in the file.
+        Parameters that the answer has as numbers: verdicts hold at their values in the file.
     residuals
-        Elements that are zero for a right answer.
+        Function that returns elements which are zero for a right answer.
     seed
         Seed of the random states at which answers outside the ring are tried.
     up_to_constant
-        Whether answers outside the ring may be off by a constant; None if they cannot be tried.
+        Whether answers outside the ring may differ from the truth by a constant; None if such answers cannot be tried.
     """
 
     arm: ExactArm
@@ -122,17 +122,22 @@ def compare(tree: Tree, truth: Element, by: Comparison) -> Finding:
 
 
 def _compare(tree: Tree, truth: Element, by: Comparison) -> Finding:
+    # Outside the exact ring?
     try:
         answer = by.reader.read(tree)
     except OutsideTheRingError as reason:
         return _sample(tree, truth, by, str(reason))
     divisors = list(by.reader.divisors)
+
+    # Equal, exactly?
     try:
         is_equal = by.passes(answer, truth)
     except RingError:
         return _sample(tree, truth, by, "it multiplies out to too many terms")
     if is_equal:
         return Finding(Verdict.CORRECT, _proof_statement(by, divisors), answer)
+
+    # Equal within the rounding of its decimals?
     share = rounding_share(tree, truth, by.reader, by.residuals, by.digits)
     if share is not None:
         statement = (
@@ -140,6 +145,7 @@ def _compare(tree: Tree, truth: Element, by: Comparison) -> Finding:
             f"unit in the last place of its coarsest decimal of {by.digits} digits or more"
         )
         return Finding(Verdict.ROUNDED, statement, answer)
+
     difference = Quotient(answer.numerator_of_difference(truth), answer.denominator).element()
     return Finding(
         Verdict.WRONG,
@@ -152,11 +158,12 @@ def _compare(tree: Tree, truth: Element, by: Comparison) -> Finding:
 
 
 def _proof_statement(by: Comparison, divisors: Sequence[Element]) -> str:
-    """Return for which states an answer is proved: it has no value where it divides by zero."""
+    """Return a statement of the states for which an answer is proved: it has no value where it divides by zero."""
     if not divisors:
         parameters = "" if by.condition else " and every value of the parameters"
         return f"{_PROVED}{by.condition}, for every state{parameters}"
-    texts = [plain_text(readable(by.arm, x)) for x in divisors[:_MAX_NAMED_DIVISORS] if len(x) <= BOUNDS.written_terms]
+    short = [divisor for divisor in divisors[:_MAX_NAMED_DIVISORS] if len(divisor) <= BOUNDS.written_terms]
+    texts = [plain_text(readable(by.arm, divisor)) for divisor in short]
     more = " or another divisor is 0" if len(texts) < len(divisors) else ""
     zeros = " or ".join(f"{text} = 0" for text in texts) + more
     return f"{_PROVED}{by.condition} wherever the answer is defined: it has no value where {zeros}"
@@ -180,6 +187,7 @@ def readable(arm: ExactArm, element: Element) -> Element:
 def _difference_texts(
     arm: ExactArm, answer: Quotient, truth: Element, difference: Element | None
 ) -> tuple[str | None, str]:
+    """Return the difference as text and in LaTeX; None and empty if it is too long."""
     if difference is not None:
         if len(difference) > BOUNDS.written_terms:
             return plain_text(difference), ""
@@ -189,17 +197,23 @@ def _difference_texts(
     denominator = answer.denominator
     if max(len(numerator), len(denominator)) > BOUNDS.written_terms:
         return None, ""
-    numerator, denominator = readable(arm, numerator), readable(arm, denominator)
-    return (
-        f"({plain_text(numerator)})/({plain_text(denominator)})",
-        rf"\frac{{{latex_text(numerator)}}}{{{latex_text(denominator)}}}",
-    )
+    numerator = readable(arm, numerator)
+    denominator = readable(arm, denominator)
+    text = f"({plain_text(numerator)})/({plain_text(denominator)})"
+    latex = rf"\frac{{{latex_text(numerator)}}}{{{latex_text(denominator)}}}"
+    return text, latex
 
 
 # Witnesses
 
 _WITNESS_TRIALS = 24
-"""Number of states from which a witness is chosen; the second half has other parameters than the file's."""
+"""Largest number of states from which a witness is chosen; the second half has other parameters than the file's."""
+_FEWEST_TRIALS = 6
+"""Smallest number of states from which a witness is chosen."""
+_CLEARER = 1.5
+"""Ratio of the differences at which a further state replaces the witness."""
+_CLEAR = 1e-6
+"""Difference, relative to the right value, at which no further state is tried."""
 
 
 def _find_witness(tree: Tree, truth: Element, by: Comparison) -> Witness | None:
@@ -209,26 +223,29 @@ def _find_witness(tree: Tree, truth: Element, by: Comparison) -> Witness | None:
     """
     arm = by.arm
     rng = np.random.default_rng(7)
-    best: tuple[float, Witness] | None = None
+    best: Witness | None = None
+    largest_gap = 0.0
     used = names_of(tree) | names_in(truth)
     for k in range(_WITNESS_TRIALS):
-        state = {
-            f"{kind}{i + 1}": float(np.round(rng.uniform(-1.5, 1.5), 1))
-            for kind in ("q", "qd", "qdd")
-            for i in range(arm.n)
-        }
+        state: dict[str, float] = {}
+        for kind in ("q", "qd", "qdd"):
+            for i in range(arm.n):
+                state[f"{kind}{i + 1}"] = float(np.round(rng.uniform(-1.5, 1.5), 1))
         parameters = dict(arm.parameters)
         if k >= _WITNESS_TRIALS // 2:
             parameters |= {p: float(np.round(v * rng.uniform(0.5, 2.0), 3)) for p, v in parameters.items()}
+
         value = float(doubles(tree, {**parameters, **state}))
-        right = float(truth.value(arm.ring.values({**arm.values, **parameters}, *state_arrays(state, arm.n))))
+        generators = arm.ring.values({**arm.values, **parameters}, *state_arrays(state, arm.n))
+        right = float(truth.value(generators))
         gap = abs(value - right) if np.isfinite(value) else float("inf")
-        if best is None or gap > 1.5 * best[0]:
+        if best is None or gap > _CLEARER * largest_gap:
             shown = {name: x for name, x in {**state, **parameters}.items() if name in used}
-            best = (gap, Witness(shown, value if np.isfinite(value) else None, right))
-        if k >= 5 and best[0] > 1e-6 * max(1.0, abs(right)):
+            best = Witness(shown, value if np.isfinite(value) else None, right)
+            largest_gap = gap
+        if k + 1 >= _FEWEST_TRIALS and largest_gap > _CLEAR * max(1.0, abs(right)):
             break
-    return best[1] if best else None
+    return best
 
 
 def names_in(element: Element) -> set[str]:
@@ -244,8 +261,8 @@ def names_in(element: Element) -> set[str]:
 # Answers outside the ring
 
 _STATES_PER_SET = 5
-"""States that share parameters if an energy's zero is free: the first of them sets it, the others are compared. A small
-number leaves many sets of parameters: a difference may exist in a part of their range alone."""
+"""Number of states that share parameters if an energy's zero is free: the first of them sets it, the others are
+compared. A small number leaves many sets of parameters: a difference may exist in a part of their range alone."""
 
 
 def _sample(tree: Tree, truth: Element, by: Comparison, reason: str) -> Finding:
@@ -293,27 +310,36 @@ def _split_constants(tree: Tree, constants: set[str]) -> tuple[Tree, list[Tree]]
 def _first_difference(
     tree: Tree, nodes: int, truth: Element, by: Comparison, reason: str, states: Iterable[sampling.Sample]
 ) -> Finding | int:
-    """Return the finding at the first state where answer and truth differ; if none does, the number of states tried."""
-    used = names_of(tree) | names_in(truth)
-    shift: Any = 0
-    work = 0
-    constants = list[Tree]()
+    """Return the finding at the first state where answer and truth differ; if none does, the number of states tried.
 
-    def differs(state: sampling.Sample, value: Any, right: Any, why: str) -> Finding:
+    An energy counts from any zero: its value at the first state of each set, less the truth's, is subtracted from its
+    values at the others.
+    """
+    used = names_of(tree) | names_in(truth)
+
+    def differs(state: sampling.Sample, value: Any, right: Any, reason: str) -> Finding:
         shown = {name: float(x) for name, x in state.names.items() if name in used}
         witness = Witness(shown, _finite(value), _finite(right))
-        return Finding(Verdict.WRONG, f"a state shows it: {why}", witness=witness)
+        return Finding(Verdict.WRONG, f"a state shows it: {reason}", witness=witness)
 
-    if by.up_to_constant:  # energies count from any zero, however large, if it is a number at all
+    # The constant terms of an energy, however large, need only have a value.
+    constants: list[Tree] = []
+    if by.up_to_constant:
         tree, constants = _split_constants(tree, {*by.arm.parameters, *CONSTANTS})
+
+    shift: Any = 0
+    work = 0
     k = -1
     for k, state in enumerate(states):
+        is_first_of_set = k % _STATES_PER_SET == 0
+        sets_zero = by.up_to_constant and is_first_of_set
         right = sampling.element_value(truth, state)
         try:
-            for constant in constants if k % _STATES_PER_SET == 0 else ():
-                enclosed(constant, nodes, state.names, sampling.MIN_SIZE)
+            if is_first_of_set:
+                for constant in constants:
+                    enclosed(constant, nodes, state.names, sampling.MIN_SIZE)
+
             # The error of the state that sets the zero is that of all states after it, however small their values.
-            sets_zero = by.up_to_constant and k % _STATES_PER_SET == 0
             size = sampling.MIN_SIZE if sets_zero else max(abs(right), sampling.MIN_SIZE)
             tolerance = sampling.TOLERANCE / 10 * size
             value, digits = enclosed(tree, nodes, state.names, tolerance, relative=not by.up_to_constant)
@@ -321,6 +347,7 @@ def _first_difference(
             raise
         except AnswerError as error:
             return differs(state, None, right, f"{error} there")
+
         if sets_zero:
             shift = value - right
         if sampling.differ(value - shift, right):
@@ -332,5 +359,6 @@ def _first_difference(
 
 
 def _finite(value: Any) -> float | None:
+    """Return a value as a float; None for no value and for one that is not finite."""
     number = float("nan") if value is None else float(value)
     return number if np.isfinite(number) else None

@@ -11,7 +11,7 @@ import numpy as np
 from dhkit.description import Array
 
 SAME = 1e-9
-"""Tolerance in rad, and relative to the reach: arms whose poses differ by less at every tried state are one arm."""
+"""Largest difference of poses of one arm in two tables, in rad and relative to the reach, at every tried state."""
 
 
 class Change(Enum):
@@ -46,7 +46,7 @@ class FrameChange:
     number
         Number of the frame, from 0, or of the joint, from 1.
     values
-        Size of the change, m or degrees; three numbers for a direction or a point.
+        Size of the change, m or degrees; three numbers for a direction or a point, m.
     """
 
     change: Change
@@ -56,7 +56,8 @@ class FrameChange:
     def __str__(self) -> str:
         """Return the text of the change."""
         vector = "(" + ", ".join(f"{x:.4g}" for x in self.values) + ")"
-        return self.change.value.format(number=self.number, vector=vector, first=next(iter(self.values), 0.0))
+        first = self.values[0] if self.values else 0.0
+        return self.change.value.format(number=self.number, vector=vector, first=first)
 
 
 def frame_changes(i: int, D: Array, tolerance: float) -> Iterator[FrameChange]:
@@ -64,10 +65,13 @@ def frame_changes(i: int, D: Array, tolerance: float) -> Iterator[FrameChange]:
 
     Lengths that differ by no more than the tolerance, m, are equal.
     """
+    # The z axis (0, 0, +-1).
     if abs(abs(D[2, 2]) - 1) > SAME:
         yield FrameChange(Change.Z_ELSEWHERE, i, _vector(D[:3, 2]))
     elif D[2, 2] < 0:
         yield FrameChange(Change.Z_REVERSED, i)
+
+    # The x axis (cos, sin, 0) of an angle about z.
     angle = float(np.arctan2(D[1, 0], D[0, 0])) if abs(D[2, 0]) < SAME else np.nan
     if abs(abs(angle) - np.pi) < SAME:
         yield FrameChange(Change.X_REVERSED, i)
@@ -75,6 +79,8 @@ def frame_changes(i: int, D: Array, tolerance: float) -> Iterator[FrameChange]:
         yield FrameChange(Change.X_ELSEWHERE, i, _vector(D[:3, 0]))
     elif not abs(angle) < SAME:
         yield FrameChange(Change.X_TURNED, i, (float(np.degrees(angle)),))
+
+    # The origin.
     if np.max(np.abs(D[:2, 3])) > tolerance:
         yield FrameChange(Change.ORIGIN_ELSEWHERE, i, _vector(D[:3, 3]))
     elif abs(D[2, 3]) > tolerance:
@@ -82,18 +88,32 @@ def frame_changes(i: int, D: Array, tolerance: float) -> Iterator[FrameChange]:
 
 
 def joint_changes(i: int, is_revolute: bool, sense: float, offset: float, tolerance: float) -> Iterator[FrameChange]:
-    """Yield the changes of joint i, from 1: by its sense, +1 or -1, and the file's value at its zero, rad or m.
+    """Yield the changes of joint i, from 1.
 
-    Lengths that differ by no more than the tolerance, m, are equal.
+    Parameters
+    ----------
+    i
+        Number of the joint, from 1.
+    is_revolute
+        Whether the joint is revolute.
+    sense
+        +1, or -1 for a variable of the opposite sign.
+    offset
+        The file's joint value at the answer's zero, rad or m.
+    tolerance
+        Largest difference of equal lengths, m.
     """
     if sense < 0:
         yield FrameChange(Change.JOINT_REVERSED, i)
-    offset = wrapped(offset) if is_revolute else offset
-    if is_revolute and abs(abs(offset) - np.pi) < SAME:
+    if not is_revolute:
+        if abs(offset) > tolerance:
+            yield FrameChange(Change.JOINT_SLID, i, (float(offset),))
+        return
+    angle = wrapped(offset)
+    if abs(abs(angle) - np.pi) < SAME:
         yield FrameChange(Change.JOINT_HALF_TURN, i)
-    elif abs(offset) > (SAME if is_revolute else tolerance):
-        change = Change.JOINT_TURNED if is_revolute else Change.JOINT_SLID
-        yield FrameChange(change, i, (float(np.degrees(offset)) if is_revolute else float(offset),))
+    elif abs(angle) > SAME:
+        yield FrameChange(Change.JOINT_TURNED, i, (float(np.degrees(angle)),))
 
 
 def wrapped(angle: float) -> float:
@@ -102,5 +122,5 @@ def wrapped(angle: float) -> float:
 
 
 def _vector(vector: Array) -> tuple[float, ...]:
-    """Return a vector whose rounding errors about zero are removed, shape (3,)."""
+    """Return the entries of a vector (3,), with 0 for entries that are rounding errors."""
     return tuple(float(x) + 0.0 for x in np.where(np.abs(vector) < SAME, 0.0, vector))

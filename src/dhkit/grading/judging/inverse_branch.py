@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,29 +18,43 @@ from dhkit.grading.judging.inverse_poses import MATCHES, Mask, Poses
 from dhkit.grading.judging.numeric import EditedDoubles, doubles
 
 _CHANCE_SHARE = 0.01
-"""Share of poses up to which a branch agrees with a solution by chance."""
+"""Largest share of poses at which a branch may agree with an exact branch by chance, without following it."""
 MISSED_SHARE = 0.1
-"""Share of the failing poses for which Newton's method may have missed a solution."""
+"""Largest share of poses at which Newton's method may have missed a solution of an arm without a closed form."""
+_NO_VALUE_GAP = 1e300
+"""Distance, rad or relative to the reach, of a formula without a value from a solution: larger than any other."""
 Repair: TypeAlias = Callable[[Array], Array]
-"""Changes the values of one joint at all poses, shape (S,), rad or m."""
+"""Function that returns corrected values of one joint at all poses, from shape (S,) to shape (S,), rad or m."""
+
+
+class Agreement(NamedTuple):
+    """Comparison of a branch with the exact solutions, joint by joint in the order of evaluation."""
+
+    first_wrong: NDArray[np.intp]
+    """Rank in the order of evaluation of the first joint that matches no solution which matches all earlier joints,
+    shape (S,); n if there is no such joint."""
+    nearest: NDArray[np.intp]
+    """Index of the solution that is nearest at that joint, or at the last one, shape (S,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Branch:
     """A branch evaluated at all poses.
 
+    Shapes: S poses, n joints, and B exact branches of the closed form.
+
     Attributes
     ----------
     poses
-        Poses at which it is tried.
+        Poses at which the branch is tried.
     trees
         Formulas, one for each joint.
     repairs
-        Joints, from 0, with changes of their values before later joints use them.
+        Joints, from 0, with corrections of their values, made before later joints use them.
     given_order
         Joints, from 0, in the order in which their formulas are evaluated; by default as the formulas need it.
     judged_joint
-        The joint, from 0, whose values alone count, where those of the others are known; by default all count.
+        The only joint, from 0, whose values are judged, while those of the others are known; by default all are judged.
     """
 
     poses: Poses
@@ -75,18 +89,19 @@ class Branch:
     def repaired(self, joint: int, numbers: Array | float) -> Array:
         """Return the values of a joint's formula after its repairs, shape (S,), rad or m; NaN for no value."""
         x = np.array(np.broadcast_to(np.asarray(numbers, dtype=float), len(self.poses.T)))
-        for other, repair in self.repairs:
-            x = repair(x) if other == joint else x
+        for repaired_joint, repair in self.repairs:
+            if repaired_joint == joint:
+                x = repair(x)
         x[~np.isfinite(x)] = np.nan
         return x
 
     def independent(self, joint: int) -> list[int]:
-        """Return the joints whose formulas do not depend on a joint's, so that its own may use them."""
-        needing = {joint}
+        """Return the joints, from 0, whose formulas do not depend on a joint's value: its own formula may use them."""
+        dependent = {joint}
         for k in self.order:
-            if names_of(self.trees[k]) & {f"q{other + 1}" for other in needing}:
-                needing.add(k)
-        return [k for k in range(self.n) if k not in needing]
+            if names_of(self.trees[k]) & {f"q{other + 1}" for other in dependent}:
+                dependent.add(k)
+        return [k for k in range(self.n) if k not in dependent]
 
     def editable(self, joint: int) -> EditedDoubles:
         """Return the evaluation of a joint's formula, for trying changes."""
@@ -97,7 +112,7 @@ class Branch:
     def closed(self) -> Mask:
         """Mask (S,) of the poses that this branch solves.
 
-        Where one joint alone counts, those at which its value is that of an exact solution.
+        If a single joint is judged, they are the poses at which its value is that of an exact solution.
         """
         if self.judged_joint is not None:
             return self.agrees(self.judged_joint, self.q[:, self.judged_joint])
@@ -107,51 +122,52 @@ class Branch:
     def reachable(self) -> Mask:
         """Mask (S,) of the poses that this branch must solve.
 
-        They are the poses at which an exact branch that it follows elsewhere has a solution; all of them where one
-        joint alone counts, where it solves no pose, or where the exact branches are not known.
+        They are the poses at which an exact branch that it follows elsewhere has a solution. They are all poses if a
+        single joint is judged, if the branch solves no pose, or if the exact branches are not known.
         """
         every_pose = np.ones(len(self.closed), dtype=bool)
         solutions = self.poses.solutions
         if self.judged_joint is not None or not np.any(self.closed) or not self.poses.has_closed_form:
             return every_pose
-        shares = np.mean(self.poses.matches(self.q, solutions)[self.closed], axis=0)
+
+        # Share of the solved poses at which each exact branch has the joint values of this one, shape (B,).
+        matches = self.poses.matches(self.q, solutions)[self.closed]
+        shares = np.mean(matches, axis=0)
         follows = shares > _CHANCE_SHARE
         if not np.any(follows):
             return every_pose
+
         has_solution = np.any(np.isfinite(solutions[:, follows, 0]), axis=1)
         reached: Mask = self.closed | has_solution
         return reached
 
     @cached_property
     def failing(self) -> Mask:
-        """Mask (S,) of the poses that it must solve and does not."""
+        """Mask (S,) of the poses that this branch must solve and does not."""
         return self.reachable & ~self.closed
 
     @property
     def is_right(self) -> bool:
-        """Whether it solves every pose that it must."""
+        """Whether this branch solves every pose that it must."""
         return not np.any(self.failing)
 
     @cached_property
-    def agreement(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Comparison with the exact solutions, joint by joint in the order of evaluation; shape (S,) each.
-
-        The rank of the first joint that matches no solution which matches all earlier joints, n if there is none; and
-        the index of the solution that is nearest at that joint.
-        """
+    def agreement(self) -> Agreement:
+        """Comparison with the exact solutions, joint by joint in the order of evaluation."""
         truths = self.poses.truths
-        first = np.full(len(truths), self.n)
+        first_wrong = np.full(len(truths), self.n)
         nearest = np.argmax(np.all(np.isfinite(truths), axis=-1), axis=1)
         for rank, k in enumerate(self.order):
+            # Distances of this joint's values from those of the solutions that match all earlier joints.
             alive = self.alive[rank]
             gap = np.where(alive, self.poses.gaps(self.q[:, None, k], truths[..., k], k), np.inf)
-            gap = np.where(alive & np.isnan(gap), 1e300, gap)  # a formula without a value is far from any solution
+            gap = np.where(alive & np.isnan(gap), _NO_VALUE_GAP, gap)
 
-            is_undecided = first == self.n
+            is_undecided = first_wrong == self.n
             nearest = np.where(is_undecided, np.argmin(gap, axis=1), nearest)
             matches_none = ~np.any(gap < MATCHES, axis=1)
-            first[is_undecided & matches_none] = rank
-        return first, nearest
+            first_wrong[is_undecided & matches_none] = rank
+        return Agreement(first_wrong, nearest)
 
     @cached_property
     def alive(self) -> list[Mask]:
@@ -162,35 +178,41 @@ class Branch:
         truths = self.poses.truths
         alive = [np.all(np.isfinite(truths), axis=-1)]
         for k in self.order:
-            near = alive[-1] & (self.poses.gaps(self.q[:, None, k], truths[..., k], k) < MATCHES)
-            alive.append(np.where(np.any(near, axis=1, keepdims=True), near, alive[-1]))
+            earlier = alive[-1]
+            gaps = self.poses.gaps(self.q[:, None, k], truths[..., k], k)
+            near = earlier & (gaps < MATCHES)
+            alive.append(np.where(np.any(near, axis=1, keepdims=True), near, earlier))
         return alive
 
     def agrees(self, joint: int, x: Array) -> Mask:
-        """Return whether x (S,), rad or m, are values of a joint in solutions that agree with the preceding joints."""
+        """Return a mask (S,) of the poses at which x (S,), rad or m, is a joint's value in a matching exact solution.
+
+        Only the solutions that match all joints before this one in the order of evaluation are compared.
+        """
         gap = self.poses.gaps(x[:, None], self.poses.truths[..., joint], joint)
         near: Mask = np.any(self.alive[self.rank(joint)] & (gap < MATCHES), axis=1)
         return near
 
     def wrong_joint(self) -> int | None:
-        """Return the first joint that is wrong at a pose that should be reached; None if all are right.
+        """Return the first joint, from 0, that is wrong at a pose that the branch must solve; None if all are right.
 
-        Newton's method may have missed solutions: a joint must then be wrong at a good part of the poses.
+        Without a closed form Newton's method may have missed solutions: the joint must then be wrong at more than
+        ``MISSED_SHARE`` of the failing poses.
         """
-        ranks = np.sort(self.agreement[0][self.failing])
+        ranks = np.sort(self.agreement.first_wrong[self.failing])
         if not len(ranks) or not self.poses.isolated:
             return None
-        spared = 0 if self.poses.has_closed_form else int(MISSED_SHARE * len(ranks))
-        rank = int(ranks[spared])
+        disregarded = 0 if self.poses.has_closed_form else int(MISSED_SHARE * len(ranks))
+        rank = int(ranks[disregarded])
         return self.order[rank] if rank < self.n else None
 
     def sample(self, most: int) -> Branch:
-        """Return the branch at up to so many poses that it fails to reach, and at up to as many that it reaches."""
+        """Return the branch at up to ``most`` poses that it fails to solve and up to ``most`` that it solves."""
         chosen = [*np.flatnonzero(self.failing)[:most], *np.flatnonzero(self.closed)[:most]]
         return replace(self, poses=self.poses.at(chosen), repairs=())
 
     def with_repair(self, joint: int, repair: Repair) -> Branch:
-        """Return the branch with a change of a joint's values."""
+        """Return the branch with a further correction of a joint's values."""
         return replace(self, repairs=(*self.repairs, (joint, repair)))
 
     def with_tree(self, joint: int, tree: Tree) -> Branch:
@@ -210,13 +232,17 @@ def joint_order(branch: Sequence[Tree], where: str = "ik") -> tuple[int, ...]:
     AnswerError
         Formulas that need each other.
     """
-    names = [names_of(tree) for tree in branch]
-    needed = [{k for k in range(len(branch)) if f"q{k + 1}" in used} for used in names]
+    n = len(branch)
+    needed: list[set[int]] = []
+    for tree in branch:
+        names = names_of(tree)
+        needed.append({k for k in range(n) if f"q{k + 1}" in names})
+
     order: list[int] = []
-    while len(order) < len(branch):
-        ready = [k for k in range(len(branch)) if k not in order and needed[k] <= set(order)]
+    while len(order) < n:
+        left = [k for k in range(n) if k not in order]
+        ready = [k for k in left if needed[k] <= set(order)]
         if not ready:
-            left = ", ".join(f"q{k + 1}" for k in range(len(branch)) if k not in order)
-            raise AnswerError(f"{where}: {left} need each other")
+            raise AnswerError(f"{where}: {', '.join(f'q{k + 1}' for k in left)} need each other")
         order.append(ready[0])
     return tuple(order)

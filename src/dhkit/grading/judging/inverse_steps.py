@@ -16,11 +16,11 @@ import numpy as np
 from dhkit.description import Description
 from dhkit.errors import AnswerError
 from dhkit.expressions import ZERO, read
-from dhkit.expressions.syntax import Name, Sum, Tree
+from dhkit.expressions.syntax import Name, Tree
 from dhkit.expressions.trees import names_of
 from dhkit.grading.answers.inverse_steps import GivenStep
 from dhkit.grading.catalogue import hint_of, sentence_of
-from dhkit.grading.judging.changed_formulas import renamed
+from dhkit.grading.judging.changed_formulas import renamed, with_term
 from dhkit.grading.judging.inverse_poses import Poses
 from dhkit.grading.judging.step_context import Part, StepContext
 from dhkit.grading.judging.step_equations import Equations
@@ -31,21 +31,23 @@ from dhkit.grading.report import NO_STEP, Diagnosis, Entry, KinematicJudgement, 
 
 def _steps_in_table_angles(description: Description, steps: Sequence[GivenStep]) -> list[GivenStep] | None:
     """Return steps whose angles are the table's theta, joint value plus offset, in joint values; None if they agree."""
-    offsets = {
-        j: read(str(joint.theta))
-        for j, joint in enumerate(description.joints)
-        if description.kinds[j] == "R" and joint.theta != ZERO
-    }
+    offsets: dict[int, Tree] = {}
+    for j, joint in enumerate(description.joints):
+        if description.kinds[j] == "R" and joint.theta != ZERO:
+            offsets[j] = read(str(joint.theta))
     if not offsets:
         return None
-    change: dict[str, Tree] = {
-        f"q{j + 1}": Sum(((True, Name(f"q{j + 1}", 0)), (True, offset))) for j, offset in offsets.items()
-    }
+
+    # theta = q + offset stands in the formulas, and q = theta - offset is the joint value.
+    change: dict[str, Tree] = {}
+    for j, offset in offsets.items():
+        name = f"q{j + 1}"
+        change[name] = with_term(Name(name, 0), True, offset)
     changed = []
     for step in steps:
         solutions = [renamed(tree, change) for tree in step.solutions]
         if step.joint in offsets:
-            solutions = [Sum(((True, tree), (False, offsets[step.joint]))) for tree in solutions]
+            solutions = [with_term(tree, False, offsets[step.joint]) for tree in solutions]
         equations = tuple((renamed(left, change), renamed(right, change)) for left, right in step.equations)
         changed.append(replace(step, equations=equations, solutions=tuple(solutions)))
     return changed
@@ -86,14 +88,20 @@ def judge_steps(
         if in_table_angles is None or all(entry.verdict is not Verdict.WRONG for entry in judged.entries):
             return judged
         other = judge.judgement(in_table_angles)
+
     # One reading for the whole sheet: the joint values, unless more steps pass in the table's angles.
-    if sum(e.verdict.passes for e in other.entries) <= sum(e.verdict.passes for e in judged.entries):
+    passing = sum(entry.verdict.passes for entry in judged.entries)
+    passing_in_table_angles = sum(entry.verdict.passes for entry in other.entries)
+    if passing_in_table_angles <= passing:
         return judged
     return replace(other, notes=(*other.notes, Note(NoteKind.TABLE_ANGLES, "ik")))
 
 
 class _Judge(StepContext):
+    """Judges the steps of one sheet, in their order."""
+
     def judgement(self, steps: Sequence[GivenStep]) -> KinematicJudgement:
+        """Return the judgement of all steps, with an entry for each joint without a step."""
         entries: list[Entry] = []
         diagnosis: list[Diagnosis] = []
         notes: list[Note] = []
@@ -107,6 +115,7 @@ class _Judge(StepContext):
             notes += note
             if entry.verdict is Verdict.WRONG and step.joint not in self.solutions.solved:
                 wrong.append(step.joint)
+
         missing = sorted({*range(self.description.n)} - {step.joint for step in steps})
         entries += [
             Entry("ik", (len(steps) + k,), Verdict.INCOMPLETE, statement=f"{NO_STEP} q{j + 1}")
@@ -119,13 +128,25 @@ class _Judge(StepContext):
     def _step(
         self, k: int, step: GivenStep, before: Sequence[int], wrong: Sequence[int]
     ) -> tuple[Entry, list[Diagnosis], list[Note]]:
-        """Return the entry of step k, from 0, its diagnosis, and notes."""
+        """Return the entry of step k, from 0, its diagnosis, and notes.
+
+        Parameters
+        ----------
+        k
+            Number of the step, from 0.
+        step
+            The step.
+        before, wrong
+            Joints of earlier steps, from 0, and those of them whose steps are wrong.
+        """
         name = entry_name("ik", (k,))
         if step.error:
             if step.joint not in before:
                 self.solutions.skip(step.joint)
             return Entry("ik", (k,), Verdict.UNREADABLE, step.text, statement=step.error), [], []
-        parts, notes = [], []
+
+        parts: list[Part] = []
+        notes: list[Note] = []
         try:
             if step.equations:
                 parts.append(Equations(self, step, before).part())
@@ -133,10 +154,11 @@ class _Judge(StepContext):
                 self.solutions.skip(step.joint)
             else:
                 part, roots = self.solutions.part(step, before)
-                if part.verdict.passes:  # the solution is what was asked for
-                    open_parts = [one for one in parts if one.verdict is Verdict.INCOMPLETE]
-                    notes += [Note(NoteKind.STEP_REMARK, name, (one.statement,)) for one in open_parts]
-                    parts = [one for one in parts if one not in open_parts]
+                if part.verdict.passes:
+                    # The task asks for the solution: an incomplete equation is then a remark.
+                    incomplete = [one for one in parts if one.verdict is Verdict.INCOMPLETE]
+                    notes += [Note(NoteKind.STEP_REMARK, name, (one.statement,)) for one in incomplete]
+                    parts = [one for one in parts if one not in incomplete]
                 parts.append(part)
                 if roots is not None and roots[0] < roots[1]:
                     notes.append(Note(NoteKind.ROOTS_MISSING, name, (str(roots[0]), str(roots[1]))))
@@ -144,12 +166,15 @@ class _Judge(StepContext):
             self.solutions.skip(step.joint)
             return Entry("ik", (k,), Verdict.UNREADABLE, step.text, statement=str(error)), [], []
         notes += [Note(NoteKind.STEP_REMARK, name, (one.remark,)) for one in parts if one.remark]
+
         worst = max(parts, key=lambda part: part.verdict.severity)
         statement = "; ".join(part.statement for part in parts)
-        used = {name for tree in step.solutions for name in names_of(tree)}
+        used = set().union(*map(names_of, step.solutions))
         follows = [f"q{j + 1}" for j in wrong if f"q{j + 1}" in used]
         if follows and worst.verdict.passes:
-            statement += f"; right in terms of {', '.join(follows)}, which {'is' if len(follows) == 1 else 'are'} wrong"
+            verb = "is" if len(follows) == 1 else "are"
+            statement += f"; right in terms of {', '.join(follows)}, which {verb} wrong"
+
         found = [self._diagnosis(k, step, part) for part in parts if not part.verdict.passes and part.mistakes]
         difference = next((part.difference for part in parts if part.difference), None)
         witness = next((part.witness for part in parts if part.witness), None)
@@ -168,6 +193,7 @@ class _Judge(StepContext):
         return entry, found, notes
 
     def _diagnosis(self, k: int, step: GivenStep, part: Part) -> Diagnosis:
+        """Return the diagnosis of the first mistake in a part of step k, from 0."""
         mistake, detail = part.mistakes[0]
         where = f"ik, step {k + 1}, q{step.joint + 1}"
         worked = self.worked(step.joint)
@@ -176,7 +202,7 @@ class _Judge(StepContext):
         return Diagnosis(mistake, sentence, where, (entry_name("ik", (k,)),), hint)
 
     def worked(self, joint: int) -> str:
-        """Return where the worked solution finds a joint, from 0, as a sentence; empty without one."""
+        """Return a sentence with the step of the worked solution that finds a joint, from 0; empty without one."""
         step = self.derived(joint)
         if self.derivation is None or step is None:
             return ""

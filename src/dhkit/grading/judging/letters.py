@@ -1,4 +1,4 @@
-"""Which letters of a robot's file an answer has as numbers: those whose values are written where the letters stand.
+"""Letters of a robot's file that an answer has as numbers: their values are written where the letters stand.
 
 A number may stand for a letter where it is written: 9.81 for g, 0.5 for l1. A letter that is left out is not a number,
 though its value is 1, or 2 beside a factor 1/2 of the truth. Numbers that may stand for letters are decimals, and whole
@@ -23,6 +23,7 @@ from dhkit.grading.judging.truth import Truth, exact_number, substituted
 from dhkit.symbolic.ring import Element, RingError, element_array
 
 _NOTHING = Number(Fraction(0), "0", 0)
+"""Zero that replaces a number which may stand for a letter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +55,14 @@ class WrittenNumbers:
         bare = _without_written(tree, whole)
         if bare is tree:
             return frozenset()
-        whole_answer, remaining = self._element(tree), self._element(bare)
-        if whole_answer is None or remaining is None:  # its terms cannot be told apart
+
+        element = self._element(tree)
+        remaining = self._element(bare)
+        if element is None or remaining is None:
+            # Its terms cannot be told apart.
             return candidates if _has_written(tree) else frozenset()
+
+        # Whether a letter was left out depends on the others that are letters: the set shrinks until it stays.
         while candidates:
             left_out = self._left_out(remaining, right, candidates, values)
             if not left_out:
@@ -72,7 +78,7 @@ class WrittenNumbers:
             return None
 
     def _values(self, tree: Tree, right: Element) -> dict[str, Fraction]:
-        """Return the values of the letters that the right value has and the entry has not."""
+        """Return the values of the letters that the right value contains and the entry does not."""
         description = self.truth.description
         missing = names_in(right) & frozenset(description.parameters) - names_of(tree)
         return {name: exact_number(description, name) for name in missing}
@@ -80,16 +86,28 @@ class WrittenNumbers:
     def _left_out(
         self, remaining: Element, right: Element, letters: frozenset[str], values: Mapping[str, Fraction]
     ) -> frozenset[str]:
-        """Return the letters that the right value has in a term which remains where no number is written."""
-        without = self._with(right, letters, values, zeros=letters)
+        """Return the letters that the right value has in a term which remains where no number is written.
+
+        Parameters
+        ----------
+        remaining
+            The answer without the terms in which numbers are written.
+        right
+            The right value.
+        letters
+            Letters that may be numbers.
+        values
+            Values of the letters.
+        """
         in_numbers = self._with(right, letters, values)
+        without = self._with(right, letters, values, zeros=letters)
+
+        # Terms that come from letters, and in which the answer has something else than the terms without letters.
         own = remaining.terms
         known = without.terms
-        terms = [
-            monomial
-            for monomial in (in_numbers - without).terms
-            if own.get(monomial, 0) not in (0, known.get(monomial, 0))
-        ]
+        of_letters = (in_numbers - without).terms
+        terms = [monomial for monomial in of_letters if own.get(monomial, 0) not in (0, known.get(monomial, 0))]
+
         found = set()
         for letter in letters:
             share = in_numbers - self._with(right, letters, values, zeros=(letter,))
@@ -100,14 +118,14 @@ class WrittenNumbers:
     def _with(
         self, right: Element, letters: Collection[str], values: Mapping[str, Fraction], zeros: Collection[str] = ()
     ) -> Element:
-        """Return an element with numbers for letters, 0 for some of them."""
+        """Return an element with their values for letters, and 0 for those in ``zeros``."""
         ring = self.truth.arm(self.quantity).ring
         numbers = {name: ring.zero if name in zeros else ring.number(values[name]) for name in letters}
         return substituted(element_array([right]), numbers, ring)[0]  # type: ignore[no-any-return]
 
 
 def _is_written(number: Number, whole: Collection[Fraction] = ()) -> bool:
-    """Whether a number may stand for a letter: a decimal, or one of some whole numbers."""
+    """Whether a number may stand for a letter: a decimal, or one of the given whole numbers."""
     return "." in number.text or "e" in number.text.lower() or number.value in whole
 
 
@@ -117,7 +135,7 @@ def _has_written(tree: Tree) -> bool:
 
 
 def _without_written(tree: Tree, whole: Collection[Fraction] = ()) -> Tree:
-    """Return a formula with 0 for each number that may stand for a letter; itself if it has none.
+    """Return a formula with 0 for each number that may stand for a letter; the formula itself if it has none.
 
     Exponents and the arguments of functions keep their numbers. A quotient by such a number is 0 too, as the product
     with its reciprocal is; a divisor is never one of the whole numbers.

@@ -165,11 +165,17 @@ class EditedDoubles:
 
 def general_state(n: int) -> dict[str, float]:
     """Return values of q1 ... qn, qd1 ... and qdd1 ... in general position, SI units and rad."""
-    turns = np.random.default_rng(11).uniform(-1.5, 1.5, (3, n))
-    return {f"{kind}{i + 1}": float(turns[k, i]) for k, kind in enumerate(("q", "qd", "qdd")) for i in range(n)}
+    rows = np.random.default_rng(11).uniform(-1.5, 1.5, (3, n))
+    state: dict[str, float] = {}
+    for kind, row in zip(("q", "qd", "qdd"), rows, strict=True):
+        state |= {f"{kind}{i + 1}": float(x) for i, x in enumerate(row)}
+    return state
 
 
 def state_arrays(state: Mapping[str, float], n: int) -> tuple[Array, Array, Array]:
     """Return q, qd and qdd, shape (n,) each, of a state given by name, SI units and rad."""
-    q, qd, qdd = (np.array([state[f"{kind}{i + 1}"] for i in range(n)]) for kind in ("q", "qd", "qdd"))
+    joints = range(1, n + 1)
+    q = np.array([state[f"q{i}"] for i in joints])
+    qd = np.array([state[f"qd{i}"] for i in joints])
+    qdd = np.array([state[f"qdd{i}"] for i in joints])
     return q, qd, qdd

@@ -23,7 +23,7 @@ from dhkit.symbolic.ring import Element, Elements, RingError, element_array
 Index: TypeAlias = tuple[int, ...]
 """Indices of an entry in its quantity, from 0."""
 _ROUNDED_DECIMALS = 5e-3
-"""Relative tolerance that decimals of four digits stay below."""
+"""Largest relative difference of two sides of a chain that are equal but for the rounding of four digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,11 +39,11 @@ class JudgedQuantity:
     findings
         Findings by index; those of C concern the rows' products with the rates.
     truth
-        Right value, with numbers where the answer has them.
+        Right value, with numbers where the answer has them; of C that of C qd.
     numbers
         Parameters that the answer has as numbers.
     contradictions
-        Entries with a chain ``V = a = b`` whose sides differ.
+        Indices of entries with a chain ``V = a = b`` whose sides differ.
     """
 
     name: str
@@ -77,8 +77,12 @@ class JudgedQuantity:
     @property
     def answers(self) -> Mapping[Index, Quotient] | None:
         """The answer in the ring; None if an entry is outside."""
-        answers = {index: finding.answer for index, finding in self.findings.items()}
-        return None if any(answer is None for answer in answers.values()) else answers  # type: ignore[return-value]
+        answers: dict[Index, Quotient] = {}
+        for index, finding in self.findings.items():
+            if finding.answer is None:
+                return None
+            answers[index] = finding.answer
+        return answers
 
     @property
     def differences(self) -> Mapping[Index, Element] | None:
@@ -87,13 +91,13 @@ class JudgedQuantity:
         None if the difference of an entry is not an element of the ring.
         """
         differences: dict[Index, Element] = {}
-        rows = {index[0] for index in self.wrong_indices if index}
+        wrong_rows = {index[0] for index in self.wrong_indices if index}
         for index, finding in self.findings.items():
             if finding.verdict is Verdict.INCOMPLETE:
                 continue
             zero = self.right(index).ring.zero
-            passes = finding.verdict.passes and not (self.name == "C" and index[0] in rows)
-            element = zero if passes else finding.difference
+            is_in_wrong_row = self.name == "C" and index[0] in wrong_rows
+            element = zero if finding.verdict.passes and not is_in_wrong_row else finding.difference
             if element is None:
                 return None
             differences[index] = element
@@ -101,7 +105,7 @@ class JudgedQuantity:
 
 
 def place_of(quantity: str, index: Index) -> Index:
-    """Return the index at which an entry is judged: the row's for C, which is judged by C qd."""
+    """Return the index at which an entry is judged: for C, which is judged by C qd, that of the row."""
     return index[:1] if quantity == "C" else index
 
 
@@ -115,10 +119,11 @@ def judge_quantity(
     *,
     letters: frozenset[str] = frozenset(),
 ) -> JudgedQuantity:
-    """Judge a quantity with its parameters as letters; entries that are wrong so with numbers where they have these.
+    """Judge a quantity with its parameters as letters.
 
-    A number may stand where it is written, 9.81 for g; a letter that is left out is not a number. A sheet without any
-    letter is judged at the file's values.
+    Wrong entries are judged once more with numbers for those letters that they have as numbers. A number may stand
+    where it is written, 9.81 for g; a letter that is left out is not a number. A sheet without any letter is judged at
+    the file's values.
 
     Parameters
     ----------
@@ -131,7 +136,7 @@ def judge_quantity(
     task
         The task, for friction and total derivatives.
     digits
-        Significant digits from which a decimal may have been rounded.
+        Number of significant digits from which a decimal may have been rounded.
     seed
         Seed of the random states at which answers outside the ring are tried.
     letters
@@ -160,9 +165,8 @@ def _in_numbers(finding: Finding) -> Finding:
     """Return the finding on an entry that is right at the file's values, where the task asks for letters."""
     if not finding.verdict.passes:
         return finding
-    return replace(
-        finding, verdict=Verdict.INCOMPLETE, statement="right at the file's values; the task asks for letters"
-    )
+    statement = "right at the file's values; the task asks for letters"
+    return replace(finding, verdict=Verdict.INCOMPLETE, statement=statement)
 
 
 def _contradicts(entry: Given, judged: JudgedQuantity, by: Comparison) -> bool:
@@ -189,38 +193,41 @@ def _contradicts(entry: Given, judged: JudgedQuantity, by: Comparison) -> bool:
 def _in_written_numbers(
     judged: JudgedQuantity, truth: Truth, by: Comparison, letters: frozenset[str]
 ) -> JudgedQuantity:
-    """Judge the entries that are wrong in letters with numbers for the letters that they have as numbers.
+    """Return the judgement with numbers for the letters that wrong entries have as numbers.
 
-    If they are wrong then too, they are judged so where that makes other entries right, or where nothing is a letter.
+    It is returned if it makes an entry right, or if the sheet has no letter at all; else ``judged`` stays as it is.
     """
+    # The letters that each wrong entry, or row of C, has as numbers, and the truth with these numbers.
     written = WrittenNumbers(truth, judged.name, by.reader, letters)
     in_numbers = judged.truth.copy()
     numbers: dict[Index, frozenset[str]] = {}
-    for place, trees in _wrong_trees(judged, truth).items():
+    for place, tree in _wrong_trees(judged, truth).items():
         right = judged.truth[place]
-        found = written.letters(trees, right) if letters else parameters_in(element_array([right]), truth)
+        found = written.letters(tree, right) if letters else parameters_in(element_array([right]), truth)
         if found:
             numbers[place] = found
             in_numbers[place] = truth.with_numbers(judged.name, element_array([right]), found)[0]
     if not numbers:
         return judged
-    every = frozenset().union(*numbers.values())
+    every = frozenset[str]().union(*numbers.values())
+
+    # The findings at these places.
     findings = dict(judged.findings)
-    by_place = {place: replace(by, numbers=found) for place, found in numbers.items()}
     if judged.name == "C":
         findings |= _row_findings(judged.given, in_numbers, replace(by, numbers=every), truth)
     else:
         for entry in judged.given:
-            if entry.index in by_place:
-                findings[entry.index] = _finding(
-                    entry.tree, entry.error, in_numbers[entry.index], by_place[entry.index]
-                )
+            if entry.index in numbers:
+                by_numbers = replace(by, numbers=numbers[entry.index])
+                findings[entry.index] = _finding(entry.tree, entry.error, in_numbers[entry.index], by_numbers)
     other = replace(judged, findings=findings, truth=in_numbers, numbers=every)
     if letters and not other.wrong < judged.wrong:
         return judged
+
     # Entries that stay wrong are shown in letters, beside entries that are right in numbers.
-    right_now = {place for place in numbers if place not in {place_of(other.name, i) for i in other.wrong_indices}}
-    return replace(other, numbers=frozenset().union(*(numbers[place] for place in right_now)) or every)
+    still_wrong = {place_of(other.name, index) for index in other.wrong_indices}
+    of_right_places = [found for place, found in numbers.items() if place not in still_wrong]
+    return replace(other, numbers=frozenset[str]().union(*of_right_places) or every)
 
 
 def _wrong_trees(judged: JudgedQuantity, truth: Truth) -> dict[Index, Tree]:
@@ -228,13 +235,22 @@ def _wrong_trees(judged: JudgedQuantity, truth: Truth) -> dict[Index, Tree]:
     trees: dict[Index, Tree] = {}
     for index in judged.wrong_indices:
         place = place_of(judged.name, index)
-        row = [entry for entry in judged.given if place_of(judged.name, entry.index) == place and entry.tree]
+        entries = [entry for entry in judged.given if place_of(judged.name, entry.index) == place and entry.tree]
         if judged.name == "C":
-            terms = (Product(((True, e.tree), (True, _rate(truth.coordinates, e.index[1])))) for e in row if e.tree)
-            trees[place] = Sum(tuple((True, term) for term in terms))
-        elif row and row[0].tree is not None:
-            trees[place] = row[0].tree
+            trees[place] = _row_times_rates(entries, truth.coordinates)
+        elif entries and entries[0].tree is not None:
+            trees[place] = entries[0].tree
     return trees
+
+
+def _row_times_rates(row: Sequence[Given], coordinates: Coordinates) -> Tree:
+    """Return the formula of a row of C qd: sum over j of C_ij qd_j; entries without a formula are left out."""
+    terms: list[tuple[bool, Tree]] = []
+    for entry in row:
+        if entry.tree:
+            rate = _rate(coordinates, entry.index[1])
+            terms.append((True, Product(((True, entry.tree), (True, rate)))))
+    return Sum(tuple(terms))
 
 
 def parameters_in(array: Elements, truth: Truth) -> frozenset[str]:
@@ -258,7 +274,7 @@ def _finding(tree: Tree | None, error: str, right: Element, by: Comparison) -> F
 
 
 def _row_findings(given: Sequence[Given], right: Elements, by: Comparison, truth: Truth) -> dict[Index, Finding]:
-    """Judge C by C qd: the entries of a row share the finding on their sum with the rates."""
+    """Return the findings on C, which is judged by C qd: the entries of a row share that on the row of C qd."""
     findings: dict[Index, Finding] = {}
     for i in range(len(right)):
         row = [entry for entry in given if entry.index[0] == i]
@@ -266,16 +282,14 @@ def _row_findings(given: Sequence[Given], right: Elements, by: Comparison, truth
             findings |= _judge_partial_row(row, by, truth)
             continue
         error = next((entry.error for entry in row if entry.tree is None), "")
-        terms = tuple(
-            (True, Product(((True, e.tree), (True, _rate(truth.coordinates, e.index[1]))))) for e in row if e.tree
-        )
-        finding = _finding(None if error else Sum(terms), error, right[i], by)
-        if finding.verdict is Verdict.WRONG:
-            finding = replace(
-                finding, statement=f"{finding.statement}: row {i + 1} of C qd, to which the difference belongs"
-            )
+        tree = None if error else _row_times_rates(row, truth.coordinates)
+        finding = _finding(tree, error, right[i], by)
+        is_wrong = finding.verdict is Verdict.WRONG
+        if is_wrong:
+            statement = f"{finding.statement}: row {i + 1} of C qd, to which the difference belongs"
+            finding = replace(finding, statement=statement)
         findings |= {entry.index: finding for entry in row}
-        if finding.verdict is Verdict.WRONG:
+        if is_wrong:
             findings |= _judge_wrong_row(row, finding, by, truth)
     return findings
 
@@ -286,7 +300,11 @@ def _judge_wrong_row(row: Sequence[Given], wrong: Finding, by: Comparison, truth
     Zeros are right only beside other entries: a row of zeros is a row that was left out.
     """
     christoffel = truth.coordinates.in_y("C", truth.lagrangian.C)
-    alike = [e for e in row if _finding(e.tree, e.error, christoffel[e.index], by).verdict is Verdict.CORRECT]
+    alike: list[Given] = []
+    for entry in row:
+        finding = _finding(entry.tree, entry.error, christoffel[entry.index], by)
+        if finding.verdict is Verdict.CORRECT:
+            alike.append(entry)
     answer = wrong.answer.element() if wrong.answer is not None else None
     if answer is not None and answer.is_zero and not any(christoffel[entry.index] for entry in alike):
         return {}
@@ -296,7 +314,7 @@ def _judge_wrong_row(row: Sequence[Given], wrong: Finding, by: Comparison, truth
 
 
 def _judge_partial_row(row: Sequence[Given], by: Comparison, truth: Truth) -> dict[Index, Finding]:
-    """Judge a row of C that lacks entries: those of the Christoffel factorization are right.
+    """Return the findings on a row of C that lacks entries: those of the Christoffel factorization are right.
 
     Another factorization may be right too, but only the whole row could show it.
     """
@@ -330,7 +348,10 @@ def _residuals(name: str, task: Requirements) -> Residuals:
 
 
 def _slopes(answer: Quotient, truth: Element) -> Sequence[Element]:
-    """Return the derivatives of the difference by q and qd, times the square of the denominator."""
+    """Return the derivatives of the difference by q and qd, times the square of the denominator.
+
+    (N / D)' D^2 = N' D - N D', or N' where D is 1.
+    """
     numerator = answer.numerator_of_difference(truth)
     denominator = answer.denominator
     if _accelerates(numerator) or _accelerates(denominator):
@@ -355,5 +376,6 @@ def _euler_lagrange(answer: Quotient, truth: Element) -> Sequence[Element]:
 
 
 def _accelerates(element: Element) -> bool:
+    """Whether an element depends on an acceleration."""
     places = [element.ring.place("acceleration", i) for i in range(element.ring.n)]
-    return any(monomial[place] for monomial in element.terms for place in places)
+    return any(any(monomial[place] for place in places) for monomial in element.terms)

@@ -16,9 +16,10 @@ from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.symbolic.ring import Direction, Element, Monomial, Ring, RingError
 
 _WEIGHTED_BITS = 256
-"""Size of a coefficient, in bits, from which a pair of terms counts as more than one."""
+"""Size of a coefficient, in bits, from which a pair of terms counts as more than one: long numbers multiply slowly."""
 _CHECK_INTERVAL = 64
-"""Terms of a sum after which the size of its coefficients is measured."""
+"""Number of terms of a sum after which the size of its coefficients is measured; measuring each term would cost more
+than adding it. Products of fewer pairs of terms are not weighted by the size of their coefficients either."""
 _NUMBER_TOO_LONG = "a number too long to be kept exactly"
 _TOO_MANY_TERMS = "it multiplies out to too many terms"
 
@@ -29,12 +30,12 @@ class OutsideTheRingError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Quotient:
-    """An answer as a quotient of ring elements; its denominator is not zero."""
+    """An answer as a quotient N / D of ring elements; its denominator D is not zero."""
 
     numerator: Element
     denominator: Element
     bits: int = 1
-    """Bound on the size of its coefficients in bits."""
+    """Upper bound on the size of its coefficients in bits: estimated, and measured only where the estimate is large."""
 
     @property
     def is_polynomial(self) -> bool:
@@ -68,11 +69,11 @@ class RingReader(Algebra[Quotient]):
     ----------
     ring
         Ring of the truth.
+    angle_factor
+        Factor, 1/180 or 180, that joint variables in angles have besides pi or 1/pi. The reader removes it: it reads an
+        answer that confuses degrees and radians as if it did not. None to read angles as they are written.
     numbers
         Values of the file's parameters that the ring does not have, in SI units and rad.
-    angle_factor
-        Factor, 1/180 or 180, by which joint variables in angles are multiplied besides pi or 1/pi, and which is taken
-        off: the answer is read as if its angles had not been confused with degrees. None if there is no such factor.
     """
 
     def __init__(
@@ -83,9 +84,11 @@ class RingReader(Algebra[Quotient]):
         self.numbers = numbers or {}
         self.angle_factor = angle_factor
         self.divisors: list[Element] = []
-        """Divisors of the last entry, numbers left out: the entry is undefined at states where one is zero."""
+        """Divisors of the last entry that are not numbers: the entry is undefined at states where one is zero."""
         self._work = 0
+        """Pairs of terms multiplied for the last entry, weighted by the size of their coefficients."""
         self._angles: dict[Expression, Direction] = {}
+        """Cosine and sine of the angles read so far."""
         self._names = [f"q{i + 1}" for i in range(ring.n)]
         self._constants = set(ring.constants)
 
@@ -115,20 +118,20 @@ class RingReader(Algebra[Quotient]):
             return None
 
     def number(self, tree: Number) -> Quotient:
-        """Return a number."""
+        """Return a number as a quotient with denominator 1."""
         bits = tree.value.numerator.bit_length() + tree.value.denominator.bit_length()
         return self._polynomial(self.ring.number(tree.value), bits)
 
     def name(self, tree: Name) -> Quotient:
-        """Return a name of the robot's."""
+        """Return a name (joint variable, rate, acceleration, parameter, unit) as a quotient with denominator 1."""
         return self._polynomial(self._name(tree.text))
 
     def call(self, tree: Call) -> Quotient:
-        """Return a call: sines and cosines of angles, and roots that the ring has."""
+        """Return the value of a function: sines, cosines and tangents of angles, and roots that the ring has."""
         return self._call(tree.function, tree.arguments)
 
     def power(self, tree: Power) -> Quotient:
-        """Return a power, multiplied out."""
+        """Return a power with a whole exponent, multiplied out."""
         return self._power(tree.base, self.exponent(tree.exponent))
 
     def _name(self, text: str) -> Element:
@@ -142,38 +145,49 @@ class RingReader(Algebra[Quotient]):
             if unit is None:
                 raise OutsideTheRingError(f"{text} outside an angle")
             return ring.number(unit)
+
         for kind, prefix in (("acceleration", "qdd"), ("rate", "qd"), ("position", "q")):
-            if text.startswith(prefix) and text[len(prefix) :].isdecimal():
-                try:
-                    place = ring.place(kind, int(text[len(prefix) :]) - 1)
-                except KeyError:
-                    raise OutsideTheRingError(f"{text} outside a sine or a cosine") from None
-                return Element(ring, ring.polynomials.generator(place))
+            number = text.removeprefix(prefix)
+            if number == text or not number.isdecimal():
+                continue
+            joint = int(number) - 1
+            try:
+                place = ring.place(kind, joint)
+            except KeyError:
+                raise OutsideTheRingError(f"{text} outside a sine or a cosine") from None
+            return Element(ring, ring.polynomials.generator(place))
+
         raise OutsideTheRingError(f"{text}, which the equations do not have,")
 
     def _polynomial(self, element: Element, bits: int = 1) -> Quotient:
         return Quotient(element, self.ring.one, bits)
 
     def sum(self, terms: Sequence[tuple[bool, Quotient]]) -> Quotient:
-        """Add terms; those with denominator 1 are collected and added in groups."""
+        """Add terms: those with denominator 1 in groups, the others one after the other."""
         one = self.ring.one
-        pending: list[Element] = []
         polynomials = Quotient(self.ring.zero, one)
+        pending: list[Element] = []
+        pending_bits = 0
         fractions: Quotient | None = None
+
         for k, (added, quotient) in enumerate(terms, start=1):
             numerator = quotient.numerator if added else -quotient.numerator
-            signed = Quotient(numerator, quotient.denominator, quotient.bits)
             if quotient.denominator is one:
-                pending.append(signed.numerator)
-                polynomials = Quotient(polynomials.numerator, one, polynomials.bits + quotient.bits)
+                pending.append(numerator)
+                pending_bits += quotient.bits
             else:
+                signed = Quotient(numerator, quotient.denominator, quotient.bits)
                 fractions = signed if fractions is None else self._add_fractions(fractions, signed)
+
             if k % _CHECK_INTERVAL == 0 or k == len(terms):
                 total = self.ring.sum([polynomials.numerator, *pending])
-                polynomials = self._bound_coefficients(Quotient(total, one, polynomials.bits))
+                polynomials = self._bound_coefficients(Quotient(total, one, polynomials.bits + pending_bits))
                 pending = []
+                pending_bits = 0
+
         if fractions is None:
             return polynomials
+
         # p + N / D = (N + p D) / D
         numerator = fractions.numerator + self._multiply(polynomials.numerator, fractions.denominator)
         bits = fractions.bits + polynomials.bits
@@ -195,11 +209,13 @@ class RingReader(Algebra[Quotient]):
             above = quotient.numerator
             below = quotient.denominator
             if not is_factor:
+                # 1 / (N / D) = D / N
                 self._note_divisor(quotient.numerator)
                 above, below = below, above
             numerator = self._multiply(product.numerator, above)
             denominator = self._multiply(product.denominator, below)
-            product = self._bound_coefficients(Quotient(numerator, denominator, product.bits + quotient.bits))
+            bits = product.bits + quotient.bits
+            product = self._bound_coefficients(Quotient(numerator, denominator, bits))
         return self._divide(product.numerator, product.denominator, product.bits)
 
     def _divide(self, numerator: Element, denominator: Element, bits: int = 1) -> Quotient:
@@ -224,23 +240,26 @@ class RingReader(Algebra[Quotient]):
         quotient = self.of(base)
         power = abs(exponent)
 
-        # Coefficients of a power are about as many times as long: their size is measured before it is given up.
+        # Coefficients of x^k are about k times as long as those of x. The size of those of x is only estimated: it is
+        # measured (a quotient said to be beyond the bound is) before the power is refused. Up to four times the bound
+        # the power is multiplied out all the same, and its own coefficients are measured below.
         if quotient.bits * power > BOUNDS.coefficient_bits:
-            quotient = self._bound_coefficients(
-                Quotient(quotient.numerator, quotient.denominator, BOUNDS.coefficient_bits + 1)
-            )
+            unmeasured = Quotient(quotient.numerator, quotient.denominator, BOUNDS.coefficient_bits + 1)
+            quotient = self._bound_coefficients(unmeasured)
             if quotient.bits * power > 4 * BOUNDS.coefficient_bits:
                 raise OutsideTheRingError(_NUMBER_TOO_LONG)
 
         numerator = self._raise(quotient.numerator, power)
         denominator = self._raise(quotient.denominator, power)
         if exponent < 0:
+            # (N / D)^-k = D^k / N^k
             self._note_divisor(quotient.numerator)
             numerator, denominator = denominator, numerator
-        return self._bound_coefficients(self._divide(numerator, denominator, max(1, quotient.bits * power)))
+        bits = max(1, quotient.bits * power)
+        return self._bound_coefficients(self._divide(numerator, denominator, bits))
 
     def _bound_coefficients(self, quotient: Quotient) -> Quotient:
-        """Return a quotient whose coefficients are short enough, with their size measured if it was not known.
+        """Return a quotient after a check of its coefficients' size, measured if the estimate exceeds the bound.
 
         Raises
         ------
@@ -276,12 +295,14 @@ class RingReader(Algebra[Quotient]):
             return right
         if right is self.ring.one:
             return left
+
         pairs = len(left) * len(right)
         self._work += pairs
         if pairs > _CHECK_INTERVAL:  # long coefficients take longer to multiply
             self._work += pairs * _bits(right) // _WEIGHTED_BITS
         if self._work > BOUNDS.reading_work:
             raise OutsideTheRingError(_TOO_MANY_TERMS)
+
         product = left * right
         if len(product) > BOUNDS.product_terms:
             raise OutsideTheRingError(_TOO_MANY_TERMS)
@@ -309,11 +330,14 @@ class RingReader(Algebra[Quotient]):
         match function:
             case "sin" | "cos" | "tan":
                 cosine, sine = self._direction(arguments[0])
-                if function != "tan":
-                    return self._polynomial(cosine if function == "cos" else sine)
+                if function == "cos":
+                    return self._polynomial(cosine)
+                if function == "sin":
+                    return self._polynomial(sine)
                 self._note_divisor(cosine)
                 return self._divide(sine, cosine)
-            case "sign" | "abs" | "sqrt" | "asin" | "acos" | "atan" | "atan2":  # of parameters and numbers
+            case "sign" | "abs" | "sqrt" | "asin" | "acos" | "atan" | "atan2":
+                # Such a function of numbers and parameters is a constant that the ring may have.
                 try:
                     with Budget():
                         expression = value_of(Call(function, arguments, 0), [*self._constants, *self._names])
@@ -324,7 +348,9 @@ class RingReader(Algebra[Quotient]):
 
     def _direction(self, angle: Tree) -> Direction:
         """Return cosine and sine of a sum of whole multiples of joint variables and constant angles."""
-        symbols = {name for constant in self.ring.given for name in constant.symbols}
+        symbols: set[str] = set()
+        for constant in self.ring.given:
+            symbols |= constant.symbols
         try:
             with Budget():
                 expression = exact_angle(value_of(angle, [*symbols, *self._names]))
@@ -335,16 +361,18 @@ class RingReader(Algebra[Quotient]):
         return self._angles[expression]
 
     def _direction_of(self, angle: Expression) -> Direction:
-        direction = self.ring.one, self.ring.zero
-        rest = []
+        """Return cosine and sine of an angle, term by term: k1 q1 + k2 q2 + ... + constant."""
+        direction = (self.ring.one, self.ring.zero)
+        constant_terms = []
         for monomial, coefficient in angle.terms:
             joint_multiple = self._joint_multiple(monomial, coefficient)
             if joint_multiple is None:
-                rest.append((monomial, coefficient))
+                constant_terms.append((monomial, coefficient))
             else:
                 direction = self._add_angles(direction, self._multiple_angle(*joint_multiple))
-        if rest:
-            constant = Expression(tuple(rest))
+
+        if constant_terms:
+            constant = Expression(tuple(constant_terms))
             try:
                 direction = self._add_angles(direction, self.ring.direction(exact_angle(constant)))
             except (RingError, ExpressionError):
@@ -354,18 +382,26 @@ class RingReader(Algebra[Quotient]):
     def _joint_multiple(
         self, monomial: tuple[tuple[Atom, int], ...], coefficient: Fraction
     ) -> tuple[int, Fraction] | None:
-        """Return joint (from 0) and multiple of a term k q, or of k pi/180 q or k 180/pi q; None for other terms."""
+        """Return the joint, from 0, and the multiple k of a term k q; None for a term of another form.
+
+        Where degrees and radians are confused (``angle_factor``), the term is k (pi/180) q or k (180/pi) q.
+        """
         powers = {atom.name: exponent for atom, exponent in monomial}
-        joints = [name for name in powers if name.startswith("q") and name[1:].isdecimal()]
-        if len(joints) != 1 or powers[joints[0]] != 1:
+        variables = [name for name in powers if name.startswith("q") and name[1:].isdecimal()]
+        if len(variables) != 1:
             return None
-        joint = int(joints[0][1:]) - 1
+        variable = variables[0]
+        if powers[variable] != 1:
+            return None
+        joint = int(variable[1:]) - 1
+
         if self.angle_factor is None:
-            is_plain = joints[0] in self._names and len(monomial) == 1
+            is_plain = variable in self._names and len(monomial) == 1
             return (joint, coefficient) if is_plain else None
+
         # Degrees taken for radians have the factor pi/180, radians taken for degrees 180/pi.
         power_of_pi = 1 if self.angle_factor < 1 else -1
-        is_confused = powers == {joints[0]: 1, "pi": power_of_pi}
+        is_confused = powers == {variable: 1, "pi": power_of_pi}
         return (joint, coefficient / self.angle_factor) if is_confused else None
 
     def _multiple_angle(self, i: int, times: Fraction) -> Direction:
@@ -376,10 +412,14 @@ class RingReader(Algebra[Quotient]):
             raise OutsideTheRingError(f"an angle of {times} q{i + 1}")
         if abs(times) > BOUNDS.exponent:
             raise OutsideTheRingError(f"an angle of {str(times)[:20]} q{i + 1}, beyond {BOUNDS.exponent} times")
+
         single = (self.ring.cosine(i), self.ring.sine(i))
-        cosine, sine = self.ring.one, self.ring.zero
+        total = (self.ring.one, self.ring.zero)
         for _ in range(abs(int(times))):
-            cosine, sine = self._add_angles((cosine, sine), single)
+            total = self._add_angles(total, single)
+
+        # cos(-k q) = cos(k q),    sin(-k q) = -sin(k q)
+        cosine, sine = total
         return (cosine, sine if times > 0 else -sine)
 
     def _add_angles(self, a: Direction, b: Direction) -> Direction:
@@ -396,18 +436,22 @@ class RingReader(Algebra[Quotient]):
 
 
 def multiple_angle(ring: Ring, joint: int, times: int) -> Direction:
-    """Return cosine and sine of a multiple of the variable of a revolute joint, from 0."""
-    sign = 1 if times > 0 else -1  # cos(-q) = cos q, sin(-q) = -sin q
+    """Return cosine and sine of a whole multiple of the variable of a revolute joint, counted from 0."""
+    # cos(-q) = cos(q),    sin(-q) = -sin(q)
+    sign = 1 if times > 0 else -1
     single = (ring.cosine(joint), ring.sine(joint) * sign)
     return sum_of_angles(ring, [single] * abs(times))
 
 
 def sum_of_angles(ring: Ring, directions: Iterable[Direction]) -> Direction:
-    """Return cosine and sine of a sum of angles."""
-    c, s = ring.one, ring.zero
-    for x, y in directions:
-        c, s = c * x - s * y, s * x + c * y
-    return c, s
+    """Return cosine and sine of the sum of angles that are given by their cosines and sines."""
+    cosine, sine = ring.one, ring.zero
+    for cos_b, sin_b in directions:
+        cos_a, sin_a = cosine, sine
+        # cos(a + b) = cos a cos b - sin a sin b,    sin(a + b) = sin a cos b + cos a sin b
+        cosine = cos_a * cos_b - sin_a * sin_b
+        sine = sin_a * cos_b + cos_a * sin_b
+    return cosine, sine
 
 
 def varying(element: Element) -> Element:
@@ -430,5 +474,5 @@ def _rational(element: Element) -> Fraction | None:
 
 
 def _bits(element: Element) -> int:
-    """Return the size of the longest coefficient in bits."""
+    """Return the size of the longest coefficient, numerator and denominator together, in bits; 1 for zero."""
     return max((c.numerator.bit_length() + c.denominator.bit_length() for c in element.terms.values()), default=1)

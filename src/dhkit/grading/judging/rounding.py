@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,11 +30,11 @@ _Monomial = tuple[tuple[int, int], ...]
 """Numbers of atoms (names, sines and cosines of whole angles) with their exponents."""
 
 _DOUBLE_DIGITS = 15
-"""Significant digits from which a decimal is taken for a printed double."""
+"""Number of significant digits from which a decimal is taken for a printed double."""
 _DOUBLE_ALLOWANCE = Fraction(8, 2**52)
 """Relative allowance of a printed double: eight units in its last place, the loss of a few dozen operations."""
 _SOLVER_MARGIN = Fraction(1, 10**9)
-"""Relative error of the linear program's doubles at the edge of an allowance."""
+"""Relative margin of an allowance for rounding in the linear program, which is solved in doubles."""
 _DOUBLE_NOISE = 1e-15
 """Relative tolerance of equations without a rounded coefficient if the ring has numbers such as sqrt(2), which are
 doubles here; without such numbers they hold exactly."""
@@ -46,14 +46,14 @@ class _TooLongError(Exception):
 
 @dataclass(frozen=True)
 class _Coefficient:
-    """Sum of the contributions to the coefficient of one monomial, kept apart by their signs.
+    """Coefficient of one monomial, a sum of contributions that are kept apart by their signs.
 
     Attributes
     ----------
     positive, negative
-        Sums of the sizes of contributions of each sign.
+        Sums of the absolute values of the contributions of each sign.
     allowed
-        Sum of the contributions' sizes, each times its relative allowance.
+        Sum over the contributions of absolute value times relative allowance.
     finest, coarsest
         Smallest and largest relative allowance of a contribution.
     is_printed
@@ -69,9 +69,17 @@ class _Coefficient:
 
     @classmethod
     def of(cls, value: Fraction, share: Fraction, is_printed: bool = False) -> _Coefficient:
+        """Return the coefficient of one contribution with its relative allowance."""
         size = abs(value)
         zero = Fraction(0)
-        return cls(size if value > 0 else zero, size if value < 0 else zero, size * share, share, share, is_printed)
+        return cls(
+            positive=size if value > 0 else zero,
+            negative=size if value < 0 else zero,
+            allowed=size * share,
+            finest=share,
+            coarsest=share,
+            is_printed=is_printed,
+        )
 
     def __add__(self, other: _Coefficient) -> _Coefficient:
         return _Coefficient(
@@ -92,101 +100,143 @@ class _Coefficient:
 
     @property
     def share(self) -> Fraction:
-        """The relative allowance of the value."""
+        """Relative allowance of the value: the mean of those of its contributions, the finest if any cancel."""
         if self.positive and self.negative:
             return self.finest
-        return self.allowed / (self.positive + self.negative) if self.allowed else Fraction(0)
+        if not self.allowed:
+            return Fraction(0)
+        return self.allowed / (self.positive + self.negative)
 
 
 _Polynomial = dict[_Monomial, _Coefficient]
 
 
-class _Expansion(Algebra[tuple[_Polynomial, _Polynomial]]):
-    """Multiplies trees out into pairs of numerator and denominator, polynomials in atoms."""
+class _Ratio(NamedTuple):
+    """An answer, or a part of one, as a quotient of polynomials in atoms."""
+
+    numerator: _Polynomial
+    denominator: _Polynomial
+
+    @property
+    def inverse(self) -> _Ratio:
+        return _Ratio(self.denominator, self.numerator)
+
+
+class _Expansion(Algebra[_Ratio]):
+    """Multiplies trees out into quotients of polynomials in atoms.
+
+    Parameters
+    ----------
+    reader
+        Reads atoms into the ring.
+    digits
+        Number of significant digits from which a decimal may have been rounded.
+    """
 
     def __init__(self, reader: RingReader, digits: int) -> None:
         super().__init__()
         self.reader = reader
         self.digits = digits
         self.work = 0
+        """Number of products of two terms so far."""
         self.atoms: list[Element] = []
+        """Atoms by their numbers."""
         self.one: _Polynomial = {(): _Coefficient.of(Fraction(1), Fraction(0))}
         self._numbers: dict[Any, int] = {}
+        """Numbers of atoms by their terms."""
         self._images: dict[_Monomial, Element] = {(): reader.ring.one}
+        """Monomials as elements of the ring."""
 
-    def number(self, tree: Number) -> tuple[_Polynomial, _Polynomial]:
-        """Return a number with what its decimals allow."""
+    def number(self, tree: Number) -> _Ratio:
+        """Return a number with the allowance of its decimals."""
         share = _allowance(tree.value, tree.text, self.digits)
-        return self._number(tree.value, share, share == _DOUBLE_ALLOWANCE), self.one
+        is_printed = share == _DOUBLE_ALLOWANCE
+        return _Ratio(self._number(tree.value, share, is_printed), self.one)
 
-    def name(self, tree: Name) -> tuple[_Polynomial, _Polynomial]:
+    def name(self, tree: Name) -> _Ratio:
         """Return a name as an atom."""
         return self._atoms(tree)
 
-    def call(self, tree: Call) -> tuple[_Polynomial, _Polynomial]:
+    def call(self, tree: Call) -> _Ratio:
         """Return a call as an atom: decimals in it are not rounded."""
         return self._atoms(tree)
 
-    def _atoms(self, tree: Tree) -> tuple[_Polynomial, _Polynomial]:
+    def _atoms(self, tree: Tree) -> _Ratio:
         quotient = self.reader.read(tree)
-        return self._atom(quotient.numerator), self._atom(quotient.denominator)
+        return _Ratio(self._atom(quotient.numerator), self._atom(quotient.denominator))
 
-    def power(self, tree: Power) -> tuple[_Polynomial, _Polynomial]:
+    def power(self, tree: Power) -> _Ratio:
         """Return a power, multiplied out."""
         base = self.of(tree.base)
         exponent = self.reader.exponent(tree.exponent)
-        numerator, denominator = base if exponent >= 0 else base[::-1]
-        top, bottom = self.one, self.one
+        if exponent < 0:
+            base = base.inverse
+        power = _Ratio(self.one, self.one)
         for _ in range(abs(exponent)):
-            top = self._multiply(top, numerator)
-            bottom = self._multiply(bottom, denominator)
-        return self._normalize(top, bottom)
+            power = self._product(power, base)
+        return self._normalize(power)
 
-    def product(
-        self, factors: Sequence[tuple[bool, tuple[_Polynomial, _Polynomial]]]
-    ) -> tuple[_Polynomial, _Polynomial]:
+    def product(self, factors: Sequence[tuple[bool, _Ratio]]) -> _Ratio:
         """Return a product, multiplied out."""
-        top, bottom = self.one, self.one
-        for is_factor, quotient in factors:
-            numerator, denominator = quotient if is_factor else quotient[::-1]
-            top, bottom = self._normalize(self._multiply(top, numerator), self._multiply(bottom, denominator))
-        return top, bottom
+        product = _Ratio(self.one, self.one)
+        for is_factor, ratio in factors:
+            factor = ratio if is_factor else ratio.inverse
+            product = self._normalize(self._product(product, factor))
+        return product
+
+    def sum(self, terms: Sequence[tuple[bool, _Ratio]]) -> _Ratio:
+        """Return a sum over one denominator."""
+        total: _Polynomial = {}
+        common = self.one
+        for added, (numerator, denominator) in terms:
+            if not added:
+                numerator = {m: -c for m, c in numerator.items()}
+
+            # T / C + N / D = (T D + N C) / (C D)
+            if common != denominator:
+                total = self._multiply(total, denominator)
+                numerator = self._multiply(numerator, common)
+                common = self._multiply(common, denominator)
+
+            total = dict(total)
+            for m, c in numerator.items():
+                total[m] = total[m] + c if m in total else c
+        return _Ratio(total, common)
+
+    def element(self, polynomial: _Polynomial) -> Element:
+        """Return a polynomial as an element of the ring, without the allowances."""
+        return self.reader.ring.sum(self.image(m) * c.value for m, c in polynomial.items())
 
     def image(self, monomial: _Monomial) -> Element:
         """Return a monomial as an element of the ring."""
         if monomial not in self._images:
-            (atom, exponent), *rest = monomial
-            lower = (*(((atom, exponent - 1),) if exponent > 1 else ()), *rest)
-            self._images[monomial] = self.image(lower) * self.atoms[atom]
+            # x^k ... = (x^(k-1) ...) x for the first atom x
+            (atom, exponent), *others = monomial
+            lower = [(atom, exponent - 1)] if exponent > 1 else []
+            self._images[monomial] = self.image((*lower, *others)) * self.atoms[atom]
         return self._images[monomial]
 
     def _number(self, value: Fraction, share: Fraction, is_printed: bool = False) -> _Polynomial:
         return {(): _Coefficient.of(value, share, is_printed)} if value else {}
 
     def _atom(self, element: Element) -> _Polynomial:
+        """Return an element as a polynomial: a number, or an atom of its own."""
+        is_number = len(element) <= 1 and not any(any(monomial) for monomial in element.terms)
+        if is_number:
+            if element == 1:
+                return self.one
+            return self._number(sum(element.terms.values(), Fraction(0)), Fraction(0))
+
         key = frozenset(element.terms.items())
-        if len(element) <= 1 and not any(any(monomial) for monomial in element.terms):
-            return self._number(sum(element.terms.values(), Fraction(0)), Fraction(0)) if element != 1 else self.one
         if key not in self._numbers:
             self._numbers[key] = len(self.atoms)
             self.atoms.append(element)
         return {((self._numbers[key], 1),): _Coefficient.of(Fraction(1), Fraction(0))}
 
-    def sum(self, terms: Sequence[tuple[bool, tuple[_Polynomial, _Polynomial]]]) -> tuple[_Polynomial, _Polynomial]:
-        """Return a sum over one denominator."""
-        top: _Polynomial = {}
-        bottom = self.one
-        for added, (numerator, denominator) in terms:
-            if not added:
-                numerator = {m: -c for m, c in numerator.items()}
-            if bottom != denominator:
-                top = self._multiply(top, denominator)
-                numerator = self._multiply(numerator, bottom)
-                bottom = self._multiply(bottom, denominator)
-            top = dict(top)
-            for m, c in numerator.items():
-                top[m] = top[m] + c if m in top else c
-        return top, bottom
+    def _product(self, left: _Ratio, right: _Ratio) -> _Ratio:
+        numerator = self._multiply(left.numerator, right.numerator)
+        denominator = self._multiply(left.denominator, right.denominator)
+        return _Ratio(numerator, denominator)
 
     def _multiply(self, left: _Polynomial, right: _Polynomial) -> _Polynomial:
         if left is self.one:
@@ -196,29 +246,35 @@ class _Expansion(Algebra[tuple[_Polynomial, _Polynomial]]):
         self.work += len(left) * len(right)
         if self.work > BOUNDS.rounding_products:
             raise _TooLongError
+
         product: _Polynomial = {}
         for a, x in left.items():
             for b, y in right.items():
                 value = x.value * y.value
-                if value:
-                    m = _product(a, b)
-                    contribution = _Coefficient.of(value, max(x.share, y.share), x.is_printed or y.is_printed)
-                    product[m] = product[m] + contribution if m in product else contribution
+                if not value:
+                    continue
+                m = _product_of_monomials(a, b)
+                contribution = _Coefficient.of(value, max(x.share, y.share), x.is_printed or y.is_printed)
+                product[m] = product[m] + contribution if m in product else contribution
         return product
 
-    def _normalize(self, top: _Polynomial, bottom: _Polynomial) -> tuple[_Polynomial, _Polynomial]:
-        """Return numerator and denominator, divided by the denominator if that is a number."""
-        if bottom is self.one or set(bottom) != {()} or not bottom[()].value:
-            return top, bottom
-        divisor = bottom[()]
-        return self._multiply(top, self._number(1 / divisor.value, divisor.share, divisor.is_printed)), self.one
+    def _normalize(self, ratio: _Ratio) -> _Ratio:
+        """Return a quotient, divided by its denominator if that is a number."""
+        numerator, denominator = ratio
+        if denominator is self.one or set(denominator) != {()}:
+            return ratio
+        divisor = denominator[()]
+        if not divisor.value:
+            return ratio
+        reciprocal = self._number(1 / divisor.value, divisor.share, divisor.is_printed)
+        return _Ratio(self._multiply(numerator, reciprocal), self.one)
 
 
-def _product(a: _Monomial, b: _Monomial) -> _Monomial:
-    powers = dict(a)
+def _product_of_monomials(a: _Monomial, b: _Monomial) -> _Monomial:
+    exponents = dict(a)
     for atom, exponent in b:
-        powers[atom] = powers.get(atom, 0) + exponent
-    return tuple(sorted(powers.items()))
+        exponents[atom] = exponents.get(atom, 0) + exponent
+    return tuple(sorted(exponents.items()))
 
 
 def has_decimals(tree: Tree, digits: int) -> bool:
@@ -239,9 +295,9 @@ def rounding_share(tree: Tree, truth: Element, reader: RingReader, residuals: Re
     reader
         Reads angles and names into the truth's ring.
     residuals
-        Returns what is zero for a right answer; linear in the answer.
+        Returns elements that are zero for a right answer; linear in the answer.
     digits
-        Significant digits from which a decimal may have been rounded.
+        Number of significant digits from which a decimal may have been rounded.
 
     Returns
     -------
@@ -253,58 +309,67 @@ def rounding_share(tree: Tree, truth: Element, reader: RingReader, residuals: Re
         return None
     expansion = _Expansion(reader, digits)
     try:
-        top, bottom = expansion.of(tree)
+        answer = expansion.of(tree)
     except _TooLongError:
         return None
-    is_quotient = bottom != expansion.one
+    is_quotient = answer.denominator != expansion.one
     if is_quotient and not _is_plain(residuals, truth):
         return None
     ring = truth.ring
 
-    def whole(polynomial: _Polynomial) -> Element:
-        return ring.sum(expansion.image(m) * c.value for m, c in polynomial.items())
-
     def residual_changes(change: Element) -> list[Element]:
         """Return the change of the residuals by a change of the numerator."""
-        return [change] if is_quotient else list(residuals(Quotient(truth + change, ring.one), truth))
+        if is_quotient:
+            return [change]
+        return list(residuals(Quotient(truth + change, ring.one), truth))
 
+    # N / D = t if and only if N - t D = 0. Each coefficient may change by x times its allowance a, |x| <= 1, which
+    # adds x a m to N - t D for a monomial m of N, and -x t a m for one of D.
     largest = max((abs(c) for c in truth.terms.values()), default=Fraction(0))
+    columns = []
+    shares: dict[Any, Fraction] = {}
     try:
-        numerator, denominator = whole(top), whole(bottom)
-        columns = []
-        shares: dict[Any, Fraction] = {}
-        for polynomial, factor in ((top, ring.one), (bottom, -truth)):
+        numerator = expansion.element(answer.numerator)
+        denominator = expansion.element(answer.denominator)
+        for polynomial, factor in ((answer.numerator, ring.one), (answer.denominator, -truth)):
             for monomial, coefficient in polynomial.items():
-                allowed = abs(coefficient.value) * coefficient.share
-                if coefficient.is_printed and polynomial is top:
-                    allowed = max(allowed, _DOUBLE_ALLOWANCE * largest)  # cos(pi/2) prints as 6e-17
-                if allowed:
-                    change = expansion.image(monomial) * factor * allowed
-                    columns.append(_coefficients(residual_changes(change), ring))
-                    for group in _groups(change):
-                        shares[group] = max(shares.get(group, Fraction(0)), coefficient.coarsest)
+                allowance = abs(coefficient.value) * coefficient.share
+                if coefficient.is_printed and polynomial is answer.numerator:
+                    # A printed double may stand for zero: cos(pi/2) prints as 6e-17.
+                    allowance = max(allowance, _DOUBLE_ALLOWANCE * largest)
+                if not allowance:
+                    continue
+                change = expansion.image(monomial) * factor * allowance
+                columns.append(_coefficients(residual_changes(change), ring))
+                for group in _groups(change):
+                    shares[group] = max(shares.get(group, Fraction(0)), coefficient.coarsest)
     except RingError:
         return None
     columns = [column for column in columns if column]
     if not columns or len(columns) > BOUNDS.rounded_coefficients:
         return None
-    difference = numerator - truth * denominator
+
     reference = truth * denominator
+    difference = numerator - reference
     is_energy = not is_quotient and not _is_plain(residuals, truth)
     if not _is_small(difference, reference, shares, is_energy):
         return None
-    here = residual_changes(difference)
+
+    unchanged = _coefficients(residual_changes(difference), ring)
     noise = Fraction(_DOUBLE_NOISE) * largest if _numbers(ring) else Fraction(0)
-    share = _least_share(_coefficients(here, ring), columns, noise)
+    share = _least_share(unchanged, columns, noise)
     return share if share is not None and share <= 1 + 1e-9 else None
 
 
 def _groups(element: Element) -> dict[Any, list[Fraction]]:
-    """Return the sizes of coefficients, grouped by the factors besides sines and cosines: parameters, rates, slides."""
-    beside = [generator.kind not in ("sine", "cosine") for generator in element.ring.generators]
+    """Return the sizes of coefficients, grouped by the exponents of all but sines and cosines.
+
+    These are parameters, rates, accelerations and variables of prismatic joints: terms of one group differ in angles.
+    """
+    is_beside = [generator.kind not in ("sine", "cosine") for generator in element.ring.generators]
     groups: dict[Any, list[Fraction]] = {}
     for (_, monomial), coefficient in _coefficients([element], element.ring).items():
-        group = tuple(e for e, counts in zip(monomial, beside, strict=True) if counts)
+        group = tuple(exponent for exponent, beside in zip(monomial, is_beside, strict=True) if beside)
         groups.setdefault(group, []).append(abs(coefficient))
     return groups
 
@@ -318,9 +383,11 @@ def _is_small(difference: Element, reference: Element, shares: Mapping[Any, Frac
         difference = varying(difference)
     references = {group: sum(sizes) for group, sizes in _groups(reference).items()}
     for group, sizes in _groups(difference).items():
+        # In each group:  largest |difference| <= share (sum of |reference| + largest |difference|)
         share = shares.get(group, Fraction(0)) + _DOUBLE_ALLOWANCE
         largest = max(sizes)
-        if largest > share * (references.get(group, Fraction(0)) + largest) * (1 + _SOLVER_MARGIN):
+        allowed = share * (references.get(group, Fraction(0)) + largest)
+        if largest > allowed * (1 + _SOLVER_MARGIN):
             return False
     return True
 
@@ -334,15 +401,22 @@ def _is_plain(residuals: Residuals, truth: Element) -> bool:
 def _allowance(value: Fraction, text: str, digits: int) -> Fraction:
     """Return half a unit of a decimal's last digit relative to the decimal; 0 for shorter ones and other numbers."""
     mantissa, _, exponent = text.lower().partition("e")
+    is_decimal = "." in mantissa or bool(exponent)
     significant = len(mantissa.replace(".", "").lstrip("0"))
-    if not value or ("." not in mantissa and not exponent) or significant < digits:
+    if not value or not is_decimal or significant < digits:
         return Fraction(0)
-    half_unit = Fraction(1, 2) * Fraction(10) ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
+
+    # 1.234e-5 has 3 decimal places: half a unit of its last digit is 10^(-5 - 3) / 2.
+    places = len(mantissa.partition(".")[2])
+    half_unit = Fraction(1, 2) * Fraction(10) ** (int(exponent or 0) - places)
     share = half_unit / abs(value)
     return max(share, _DOUBLE_ALLOWANCE) if significant >= _DOUBLE_DIGITS else share
 
 
+# The linear program
+
 _Coefficients = Mapping[Any, Fraction]
+"""Coefficients by the number of the residual and the monomial."""
 
 
 def _coefficients(residuals: Sequence[Element], ring: PolynomialRing) -> _Coefficients:
@@ -353,7 +427,9 @@ def _coefficients(residuals: Sequence[Element], ring: PolynomialRing) -> _Coeffi
         for monomial, coefficient in element.terms.items():
             for place, number in numbers.items():
                 coefficient *= number ** monomial[place]
-            rest = tuple(0 if place in numbers else e for place, e in enumerate(monomial)) if numbers else monomial
+            rest = monomial
+            if numbers:
+                rest = tuple(0 if place in numbers else exponent for place, exponent in enumerate(monomial))
             sums[k, rest] = sums.get((k, rest), Fraction(0)) + coefficient
     return {place: value for place, value in sums.items() if value}
 
@@ -367,47 +443,69 @@ def _numbers(ring: PolynomialRing) -> dict[int, Fraction]:
     }
 
 
-def _least_share(here: _Coefficients, columns: Sequence[_Coefficients], noise: Fraction) -> float | None:
-    """Return the smallest possible maximum of |x| with here + sum x columns = 0; None if there is no such x.
+def _least_share(unchanged: _Coefficients, columns: Sequence[_Coefficients], noise: Fraction) -> float | None:
+    """Return the smallest possible maximum of |x_j| with b + A x = 0; None if there is no such x.
 
-    Equations are scaled by their largest entry, so that the solver's tolerance is a share of an allowance.
+    Parameters
+    ----------
+    unchanged
+        b: the residuals' coefficients of the answer as it is written.
+    columns
+        Columns of A: changes of these coefficients by one whole allowance.
+    noise
+        Largest coefficient that counts as zero if no column contributes to it.
     """
-    size: dict[Any, Fraction] = {}
+    # Each row is scaled by its largest entry, so that the solver's tolerance is a share of an allowance.
+    scales: dict[Any, Fraction] = {}
     for column in columns:
         for place, value in column.items():
-            size[place] = max(size.get(place, Fraction(0)), abs(value))
-    if any(place not in size and abs(value) > noise for place, value in here.items()):
-        return None  # a coefficient to which no decimal contributes
-    if any(place in size and abs(value) > size[place] * len(columns) for place, value in here.items()):
-        return None
-    if all(len(column) == 1 for column in columns) and len(size) == len(columns):
-        return max((float(abs(here.get(place, Fraction(0))) / most) for place, most in size.items()), default=0.0)
-    return _solve(here, columns, size)
+            scales[place] = max(scales.get(place, Fraction(0)), abs(value))
+
+    for place, value in unchanged.items():
+        if place not in scales:
+            if abs(value) > noise:
+                return None  # a coefficient to which no decimal contributes
+        elif abs(value) > scales[place] * len(columns):
+            return None  # |x_j| <= 1 does not suffice
+
+    # Each row has one unknown, and each unknown one row: x_j = -b_j / A_jj.
+    is_diagonal = all(len(column) == 1 for column in columns) and len(scales) == len(columns)
+    if is_diagonal:
+        shares = [float(abs(unchanged.get(place, Fraction(0))) / scale) for place, scale in scales.items()]
+        return max(shares, default=0.0)
+    return _solve(unchanged, columns, scales)
 
 
-def _solve(here: _Coefficients, columns: Sequence[_Coefficients], size: Mapping[Any, Fraction]) -> float | None:
+def _solve(unchanged: _Coefficients, columns: Sequence[_Coefficients], scales: Mapping[Any, Fraction]) -> float | None:
+    """Return the smallest s of a linear program: minimise s subject to A x = -b and -s <= x_j <= s; None without x."""
     from scipy.optimize import linprog
     from scipy.sparse import csr_array, eye_array, hstack, vstack
 
-    row_of = {place: k for k, place in enumerate(size)}
-    entries = [
-        (row_of[place], j, float(value / size[place]))
-        for j, column in enumerate(columns)
-        for place, value in column.items()
-    ]
-    right = [-float(here.get(place, Fraction(0)) / most) for place, most in size.items()]
-    # Variables: the changes in allowances, then the largest of them; |x| <= largest.
+    # The unknowns are x_1 ... x_k, then s.
     k = len(columns)
-    rows, places, values = zip(*entries, strict=True)
-    equations = csr_array((values, (rows, places)), shape=(len(size), k + 1))
-    largest = -np.ones((k, 1))
-    bounds = vstack([hstack([eye_array(k), largest]), hstack([-eye_array(k), largest])], format="csr")
+    row_of = {place: row for row, place in enumerate(scales)}
+    rows: list[int] = []
+    places: list[int] = []
+    values: list[float] = []
+    for j, column in enumerate(columns):
+        for place, value in column.items():
+            rows.append(row_of[place])
+            places.append(j)
+            values.append(float(value / scales[place]))
+    A = csr_array((values, (rows, places)), shape=(len(scales), k + 1))
+    minus_b = [-float(unchanged.get(place, Fraction(0)) / scale) for place, scale in scales.items()]
+
+    # x_j - s <= 0 and -x_j - s <= 0
+    minus_s = -np.ones((k, 1))
+    upper = hstack([eye_array(k), minus_s])
+    lower = hstack([-eye_array(k), minus_s])
+
     result = linprog(
         np.r_[np.zeros(k), 1.0],
-        A_ub=bounds,
+        A_ub=vstack([upper, lower], format="csr"),
         b_ub=np.zeros(2 * k),
-        A_eq=equations,
-        b_eq=right,
+        A_eq=A,
+        b_eq=minus_b,
         bounds=[(-1.5, 1.5)] * k + [(0, 1.5)],
         method="highs",
         options={"primal_feasibility_tolerance": 1e-9},

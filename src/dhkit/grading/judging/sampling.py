@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -20,11 +21,13 @@ if TYPE_CHECKING:
 
 _Key = TypeVar("_Key")
 DIGITS = 50
-"""Decimal digits of the arithmetic."""
-TOLERANCE, MIN_SIZE = 1e-25, 1e-3
-"""Relative tolerance for taking two numbers for equal, and the smallest size that it is relative to."""
+"""Number of decimal digits of the arithmetic."""
+TOLERANCE = 1e-25
+"""Largest relative difference of two numbers that count as equal: half of the digits may be lost."""
+MIN_SIZE = 1e-3
+"""Smallest size to which differences are relative, in the quantity's SI unit."""
 _NEAR_SIZES = {"q": 3.0, "qd": 2.0, "qdd": 2.0}
-"""Ranges of the states within one turn, in rad or m and their derivatives by time in s."""
+"""Largest joint values, rates and accelerations of states within one turn, in rad or m and their derivatives by s."""
 
 
 @dataclass(frozen=True)
@@ -53,11 +56,11 @@ def samples(
     arm
         The robot.
     numbers
-        Parameters that keep the file's values. Others come within a factor of four of theirs, spread evenly over its
-        logarithm: of S sets of parameters, each S-th of the range has one.
+        Parameters that keep the file's values. The others are the file's times factors between 1/4 and 4, whose
+        logarithms are spread evenly: of S sets of parameters, each S-th of the range contains one.
     seed
-        Seed of the random numbers. It must not be known to the writer of an answer: one that is wrong only far from the
-        tried states would pass.
+        Seed of the random numbers. It must not be known to the writer of an answer: an answer that is wrong only far
+        from the tried states would pass.
     every
         Number of consecutive states that share parameters.
     count
@@ -66,21 +69,25 @@ def samples(
     import mpmath
 
     rng = np.random.default_rng(seed)
-    sets = -(-count // every)
-    factors = dict[str, Any]()
+    sets = math.ceil(count / every)
+    factors: dict[str, Any] = {}
     for name in arm.parameters:
+        # Stratified samples of [0, 1): one in each interval of length 1 / sets, in random order.
         shares = (rng.permutation(sets) + rng.uniform(size=sets)) / sets
         factors[name] = 4.0 ** (2 * shares - 1)
+
     parameters: dict[str, Any] = {name: mpmath.mpf(value) for name, value in arm.description.numbers.values.items()}
     for k in range(count):
         if k % every == 0:
             for name, value in arm.parameters.items():
                 parameters[name] = mpmath.mpf(value if name in numbers else value * factors[name][k // every])
         names = dict(parameters)
+        # In turn: within one turn, at one scale that all joints share, at scales of their own.
         common = 10.0 ** rng.uniform(-3.0, 3.0)
         for i in range(arm.n):
             for kind, near in _NEAR_SIZES.items():
-                size = (near, common, 10.0 ** rng.uniform(-3.0, 3.0))[k % 3]
+                own = 10.0 ** rng.uniform(-3.0, 3.0)
+                size = (near, common, own)[k % 3]
                 names[f"{kind}{i + 1}"] = mpmath.mpf(rng.uniform(-size, size))
         yield Sample(names, _generators(arm, names))
 
@@ -92,7 +99,7 @@ def element_value(element: Element, sample: Sample) -> mpf:
 
 
 def _sum_of_products(terms: Iterable[tuple[Iterable[tuple[_Key, int]], Fraction]], value: Callable[[_Key], Any]) -> mpf:
-    """Return the sum of coefficients times powers of values."""
+    """Return the sum over terms of coefficient c times powers: sum of c x_1^e_1 x_2^e_2 ..."""
     import mpmath
 
     total = mpmath.mpf(0)

@@ -1,4 +1,4 @@
-"""What the judges of equations and of solutions of a step share."""
+"""Arm, poses and worked solution, which the judges of a step's equations and of its solutions share."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from dhkit.description import Array, Description
 from dhkit.errors import DescriptionError
-from dhkit.expressions.syntax import Name, Tree
+from dhkit.expressions.syntax import Name, Number, Tree
 from dhkit.expressions.trees import names_of
 from dhkit.grading.judging.inverse_edits import Lengths
 from dhkit.grading.judging.inverse_mistakes import lengths_of
@@ -20,6 +20,11 @@ from dhkit.symbolic import InverseDerivation, inverse_derivation, table_lengths
 from dhkit.symbolic.inverse.chain import ExactChain
 from dhkit.symbolic.inverse.steps import DerivationStep as DerivedStep
 
+_SAME_LENGTH = 1e-9
+"""Largest difference of two equal lengths from rounding, relative to the length."""
+_IDENTITY = 1e-12
+"""Largest entry, m or without unit, by which a transform that does nothing differs from the identity."""
+
 
 @dataclass
 class Part:
@@ -28,11 +33,12 @@ class Part:
     verdict: Verdict
     statement: str
     mistakes: list[tuple[str, str]] = field(default_factory=list)
-    """Mistakes with details."""
+    """Identifiers of mistakes in the catalogue, each with a detail for its sentence; the detail may be empty."""
     difference: str | None = None
+    """Difference of the sides of a wrong equation, as text."""
     witness: Witness | None = None
     remark: str = ""
-    """What a reader should know of a part that passes."""
+    """Reservation about a part that passes, such as a condition on the lengths; empty without one."""
 
 
 class StepContext:
@@ -70,7 +76,7 @@ class StepContext:
         return next((step for step in steps if step.unknown is not None and step.unknown.joint == joint), None)
 
     def lengths(self, trees: Sequence[Tree]) -> Lengths:
-        """Return the lengths that formulas may contain: by name where formulas use the names of the table's.
+        """Return the lengths that formulas may contain, with the names d1, a1 ... if the formulas use such names.
 
         Lengths of base and tool have no names.
         """
@@ -79,34 +85,37 @@ class StepContext:
         every = lengths_of(self.description)
         if not names & {*table}:
             return every
+
+        # First the lengths with a name: parameters, and entries of the table.
         numbers = self.description.numbers.values
-        values = {name: float(numbers[name]) for name in self.description.parameters}
-        values |= {name: float(value) for name, value in table.items()}
-        named = [abs(value) for value in values.values()]
-        others = [
-            (tree, value)
-            for tree, value in zip(every.trees, every.values, strict=True)
-            if not np.any(np.isclose(value, named, rtol=1e-9))
-        ]
-        trees_of_all = (*(Name(name, 0) for name in values), *(tree for tree, _ in others))
-        return Lengths(tuple(values), trees_of_all, (*named, *(value for _, value in others)), every.of_tool)
+        named = {name: float(numbers[name]) for name in self.description.parameters}
+        named |= {name: float(value) for name, value in table.items()}
+        sizes = [abs(value) for value in named.values()]
+        formulas: list[Name | Number] = [Name(name, 0) for name in named]
+
+        # Then those of base and tool that equal none of them.
+        others = [not np.any(np.isclose(value, sizes, rtol=_SAME_LENGTH)) for value in every.values]
+        formulas += [tree for tree, is_other in zip(every.trees, others, strict=True) if is_other]
+        other_sizes = [value for value, is_other in zip(every.values, others, strict=True) if is_other]
+        return Lengths(tuple(named), tuple(formulas), (*sizes, *other_sizes), every.of_tool)
 
     @cached_property
     def solved_poses(self) -> Poses:
         """The poses at which solutions are tried: those of joint values within the limits, then those of any angles.
 
-        Of these the poses at which the arm has most solutions: elsewhere a root may be right, and later joints out of
-        reach. Without a closed form the poses alone.
+        Only poses at which the arm has the largest number of solutions are kept: at others a root may be right though
+        later joints cannot reach the pose. Without a closed form they are :attr:`poses` themselves.
         """
         return self._solved[0]
 
     @property
     def within_limits(self) -> Mask:
-        """Which of :attr:`solved_poses` are those of joint values within the limits, shape (S,)."""
+        """Mask (S,) of those among :attr:`solved_poses` that joint values within the limits give."""
         return self._solved[1]
 
     @cached_property
     def _solved(self) -> tuple[Poses, Mask]:
+        """Both of :attr:`solved_poses` and :attr:`within_limits`."""
         inside = self.poses
         count = len(inside.q)
         if not inside.has_closed_form:
@@ -117,21 +126,25 @@ class StepContext:
         return every.at(rows), rows < count
 
     def misread(self, poses: Poses) -> Iterator[tuple[str, dict[str, Array | float]]]:
-        """Yield mistakes in which the pose is another frame's, each with the values that formulas then mean."""
+        """Yield mistakes in which the pose is another frame's, each with the values that formulas then mean.
+
+        T_base_last = T_world_base^-1 T_world_tool T_last_tool^-1; one of the outer factors, or both, are put in.
+        """
         numbers = self.description.numbers
-        outside = np.linalg.inv(numbers.T_world_base)
-        inside = np.linalg.inv(numbers.T_last_tool)
-        for mistake, before, behind in (
-            ("tool_not_taken_off", None, inside),
-            ("base_not_taken_off", outside, None),
-            ("base_and_tool_not_taken_off", outside, inside),
-        ):
-            if all(T is None or not np.allclose(T, np.eye(4), atol=1e-12) for T in (before, behind)):
-                T = poses.T if before is None else before @ poses.T
-                yield mistake, replace(poses, T=T if behind is None else T @ behind).values
+        T_base_world = np.linalg.inv(numbers.T_world_base)
+        T_tool_last = np.linalg.inv(numbers.T_last_tool)
+        has_base = not np.allclose(T_base_world, np.eye(4), atol=_IDENTITY)
+        has_tool = not np.allclose(T_tool_last, np.eye(4), atol=_IDENTITY)
+        if has_tool:
+            yield "tool_not_taken_off", replace(poses, T=poses.T @ T_tool_last).values
+        if has_base:
+            yield "base_not_taken_off", replace(poses, T=T_base_world @ poses.T).values
+        if has_base and has_tool:
+            yield "base_and_tool_not_taken_off", replace(poses, T=T_base_world @ poses.T @ T_tool_last).values
 
     @cached_property
     def chains(self) -> tuple[ExactChain, ExactChain]:
         """The arm with named lengths, and with numbers."""
-        named, numbers = (ExactChain.of(self.description, named=named, in_joint_values=True) for named in (True, False))
-        return named, numbers
+        with_names = ExactChain.of(self.description, named=True, in_joint_values=True)
+        with_numbers = ExactChain.of(self.description, named=False, in_joint_values=True)
+        return with_names, with_numbers

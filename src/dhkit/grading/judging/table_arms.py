@@ -21,7 +21,7 @@ from dhkit.symbolic.ring import Element
 _T = TypeVar("_T", Array, Element)
 
 SAME_TRANSFORM = 1e-12
-"""Relative tolerance, to the largest entry, within which two A_i are taken for equal in doubles."""
+"""Largest difference of two equal A_i in doubles, relative to the largest entry: a few roundings of sines."""
 
 Row: TypeAlias = tuple[Expression, Expression, Expression, Expression]
 """theta, d, a, alpha, with the joint variable in theta or d; rad and m."""
@@ -30,14 +30,20 @@ Row: TypeAlias = tuple[Expression, Expression, Expression, Expression]
 def parameter_values(description: Description, factors: Array) -> dict[str, float]:
     """Return the values of parameters by name, SI units and rad, independent ones times factors of shape (k,).
 
-    One that is 0 becomes its factor less 1: a letter of value 0 is a letter.
+    A parameter of value 0 becomes its factor less 1, so that it differs from 0 where it is varied.
     """
-    changed = {
-        name: value if value.symbols else exact(float(factor) - 1.0 if value.is_zero else float(value) * float(factor))
-        for (name, value), factor in zip(description.parameters.items(), factors, strict=True)
-    }
-    known = resolved(Named(changed)) if np.any(factors != 1) else resolved(description.parameters)
-    return {name: float(value) for name, value in known.items()}
+    if not np.any(factors != 1):
+        return {name: float(value) for name, value in resolved(description.parameters).items()}
+
+    changed: dict[str, Expression] = {}
+    for (name, value), factor in zip(description.parameters.items(), factors, strict=True):
+        if value.symbols:
+            changed[name] = value
+        elif value.is_zero:
+            changed[name] = exact(float(factor) - 1.0)
+        else:
+            changed[name] = exact(float(value) * float(factor))
+    return {name: float(value) for name, value in resolved(Named(changed)).items()}
 
 
 def row_numbers(row: Sequence[Tree], values: Mapping[str, float]) -> list[float]:
@@ -55,6 +61,9 @@ def link_entries(
 ) -> list[list[_T]]:
     """Return the entries of A_i, four rows of four, in doubles, arrays of them or elements of a ring.
 
+    A_i = Rz(theta) Tz(d) Tx(a) Rx(alpha) in the standard convention, Rx(alpha) Tx(a) Rz(theta) Tz(d) in the modified
+    one (Craig, Introduction to Robotics, ch. 3), where a and alpha are those of the link before.
+
     Parameters
     ----------
     convention
@@ -66,24 +75,32 @@ def link_entries(
     unit
         0 and 1 in the same arithmetic.
     """
-    (c, s) = theta
-    (ca, sa) = alpha
-    (zero, one) = unit
-    rows: list[list[_T]]
+    c, s = theta
+    ca, sa = alpha
+    zero, one = unit
     if convention is Convention.STANDARD:
-        rows = [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [zero, sa, ca, d]]
-    else:
-        rows = [[c, -s, zero, a], [s * ca, c * ca, -sa, -sa * d], [s * sa, c * sa, ca, ca * d]]
-    rows.append([zero, zero, zero, one])
-    return rows
+        return [
+            [c, -s * ca, s * sa, a * c],
+            [s, c * ca, -c * sa, a * s],
+            [zero, sa, ca, d],
+            [zero, zero, zero, one],
+        ]
+    return [
+        [c, -s, zero, a],
+        [s * ca, c * ca, -sa, -sa * d],
+        [s * sa, c * sa, ca, ca * d],
+        [zero, zero, zero, one],
+    ]
 
 
 def link_in_doubles(convention: Convention, theta: ArrayLike, d: ArrayLike, a: ArrayLike, alpha: ArrayLike) -> Array:
     """Return A_i in doubles, shape (..., 4, 4), of angles in rad and lengths in m of shape (...)."""
     theta, d, a, alpha = np.broadcast_arrays(theta, d, a, alpha)
-    unit = np.zeros(theta.shape), np.ones(theta.shape)
-    angles = [(np.cos(angle), np.sin(angle)) for angle in (theta, alpha)]
-    return np.moveaxis(np.array(link_entries(convention, angles[0], d, a, angles[1], unit)), (0, 1), (-2, -1))
+    unit = (np.zeros(theta.shape), np.ones(theta.shape))
+    theta_direction = (np.cos(theta), np.sin(theta))
+    alpha_direction = (np.cos(alpha), np.sin(alpha))
+    entries = np.array(link_entries(convention, theta_direction, d, a, alpha_direction, unit))
+    return np.moveaxis(entries, (0, 1), (-2, -1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +112,7 @@ class TableArm:
     convention
         Convention of the table.
     kinds
-        A letter for each joint: R for a revolute one.
+        Letter of each joint: R for a revolute one, P for a prismatic one.
     entries
         theta, d, a, alpha at joint values 0, shape (n, 4), rad and m.
     senses
@@ -122,19 +139,26 @@ class TableArm:
         n = len(kinds)
         own = np.array([[kind == "R", kind != "R", False, False] for kind in kinds], dtype=float)
 
-        def at(q: Array) -> Array:
+        def entries_at(q: Array) -> Array:
+            """Return the entries of the table at joint values, shape (n, 4), rad and m."""
             named = dict(values) | {f"q{i + 1}": float(x) for i, x in enumerate(q)}
             return np.array([row_numbers(row, named) for row in rows])
 
-        entries = at(np.zeros(n))
-        q = np.linspace(0.3, 0.9, n)
+        entries = entries_at(np.zeros(n))
         if not np.all(np.abs(entries) < BOUNDS.table_entry):
             return None
-        senses = np.sum((at(np.ones(n)) - entries) * own, axis=1)
-        moved = entries + own * (senses * q)[:, None]
+
+        # The slope of an entry in its own variable is the variable's sign.
+        senses = np.sum((entries_at(np.ones(n)) - entries) * own, axis=1)
         if not np.allclose(np.abs(senses), 1, atol=SAME_TRANSFORM):
             return None
-        return cls(convention, kinds, entries, senses) if np.allclose(at(q), moved, atol=SAME_TRANSFORM) else None
+
+        # With these signs alone the entries follow at other joint values.
+        q = np.linspace(0.3, 0.9, n)
+        expected = entries + own * (senses * q)[:, None]
+        if not np.allclose(entries_at(q), expected, atol=SAME_TRANSFORM):
+            return None
+        return cls(convention, kinds, entries, senses)
 
     @property
     def n(self) -> int:
@@ -148,20 +172,27 @@ class TableArm:
 
     def frames(self, q: Array) -> Array:
         """Return frames 0 ... n in frame 0, shape (n + 1, 4, 4), m, at joint values of shape (n,), rad and m."""
-        change = self.senses * q
-        turning = np.array([kind == "R" for kind in self.kinds])
+        travel = self.senses * q
+        is_revolute = np.array([kind == "R" for kind in self.kinds])
         theta, d, a, alpha = self.entries.T
-        links = link_in_doubles(self.convention, theta + change * turning, d + change * ~turning, a, alpha)
+        links = link_in_doubles(self.convention, theta + travel * is_revolute, d + travel * ~is_revolute, a, alpha)
+
+        # T_0i = T_0(i-1) A_i
         frames = [np.eye(4)]
         for A in links:
             frames.append(frames[-1] @ A)
         return np.array(frames)
 
     def screws(self, q: Array, scale: float) -> Array:
-        """Return the joint axes as screws (direction; moment / scale), without unit, shape (n, 6), in frame 0."""
+        """Return the joint axes in frame 0 as screws (direction; moment / scale), without unit, shape (n, 6).
+
+        Joint i moves along z of frame i - 1 in the standard convention, and of frame i in the modified one. With this z
+        and the frame's origin p, the screw is (z; p x z / scale) of a revolute and (0; z) of a prismatic joint.
+        """
         frames = self.frames(q)
-        moving = frames[:-1] if self.convention is Convention.STANDARD else frames[1:]
-        z = moving[:, :3, 2] * self.senses[:, None]
-        turning = np.array([[kind == "R"] for kind in self.kinds])
-        moments = np.cross(moving[:, :3, 3], z) / scale
-        return np.hstack([np.where(turning, z, 0), np.where(turning, moments, z)])
+        carrying = frames[:-1] if self.convention is Convention.STANDARD else frames[1:]
+        z = carrying[:, :3, 2] * self.senses[:, None]
+        p = carrying[:, :3, 3]
+        moments = np.cross(p, z) / scale
+        is_revolute = np.array([[kind == "R"] for kind in self.kinds])
+        return np.hstack([np.where(is_revolute, z, 0), np.where(is_revolute, moments, z)])

@@ -37,18 +37,19 @@ from dhkit.symbolic.ring import Direction, Ring
 from dhkit.symbolic.textbook_kinematics import with_massless_links
 
 COLUMNS = ("theta", "d", "a", "alpha")
+"""Columns of a table, in their order."""
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """The rows that were handed in.
+    """Rows of the table that was handed in.
 
     Attributes
     ----------
     trees
         Rows of theta, d, a, alpha, one for each joint; rad and m.
     entries
-        The same as exact values; None for entries outside exact arithmetic.
+        Exact values of the same entries; None for entries outside exact arithmetic.
     """
 
     trees: tuple[tuple[Tree, ...], ...]
@@ -70,32 +71,41 @@ class Answer:
         for i, row in enumerate(rows, start=1):
             if len(row) != len(COLUMNS):
                 raise AnswerError(f"dh, row {i}: {len(row)} entries; expected {', '.join(COLUMNS)}")
-        listed = tuple(
-            tuple(_entry(tree, names, f"dh, row {i}, {column}") for tree, column in zip(row, COLUMNS, strict=True))
-            for i, row in enumerate(rows, start=1)
-        )
-        return cls(tuple(tuple(row) for row in rows), listed)
+        entries: list[tuple[Expression | None, ...]] = []
+        for i, row in enumerate(rows, start=1):
+            columns = zip(row, COLUMNS, strict=True)
+            entries.append(tuple(_entry(tree, names, f"dh, row {i}, {column}") for tree, column in columns))
+        return cls(tuple(tuple(row) for row in rows), tuple(entries))
 
 
 def _entry(tree: Tree, names: Sequence[str], where: str) -> Expression | None:
-    """Return the exact value of an entry; None if it has none."""
-    for name in sorted(names_of(tree) - {*names, *CONSTANTS}):
-        raise AnswerError(f"{where}: unknown name {name!r}; expected {', '.join([*names, 'pi', 'deg'])}")
+    """Return the exact value of an entry; None if it has none.
+
+    Raises
+    ------
+    AnswerError
+        An unknown name or function.
+    """
+    unknown = sorted(names_of(tree) - {*names, *CONSTANTS})
+    if unknown:
+        raise AnswerError(f"{where}: unknown name {unknown[0]!r}; expected {', '.join([*names, 'pi', 'deg'])}")
     try:
         with budgeted():
             return value_of(tree, names)
     except ExpressionError:
+        # Evaluated for the error that an unknown function raises.
         doubles(tree, dict.fromkeys([*names, *CONSTANTS], 1.0))
         return None
 
 
 @dataclass(frozen=True)
 class JudgedRow:
-    """Verdict on a row, its reason, and the parameters for which it has numbers."""
+    """Verdict on a row, with its reason."""
 
     verdict: Verdict
     statement: str
     numbers: frozenset[str] = frozenset()
+    """Parameters of the file that a right row has as numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +117,9 @@ class TableRows:
     description
         The robot.
     answer
-        The rows that were handed in.
+        Rows that were handed in.
     convention
-        Convention of the answer, as it states.
+        Convention that the answer states.
     seed
         Seed of the random states at which entries outside the exact ring are tried.
     """
@@ -130,7 +140,7 @@ class TableRows:
         return self.convention is not self.description.convention
 
     def row(self, i: int) -> JudgedRow:
-        """Judge A_i, i from 0."""
+        """Return the verdict on A_i, i from 0."""
         entries = self.answer.entries[i]
         written = self.written(i)
         if None not in entries:
@@ -146,13 +156,15 @@ class TableRows:
     @cached_property
     def has_letters(self) -> bool:
         """Whether the answer has a parameter of the file anywhere."""
-        names = (names_of(tree) for row in self.answer.trees for tree in row)
-        return any(self.description.parameters.keys() & used for used in names)
+        names: set[str] = set()
+        for row in self.answer.trees:
+            names.update(*map(names_of, row))
+        return bool(self.description.parameters.keys() & names)
 
     def is_written(self, i: int, column: int) -> bool:
-        """Whether an entry of row i is without letters where the file has some: their numbers are written.
+        """Whether an entry of row i is written in numbers where the file has letters.
 
-        A letter of value 0 beside other letters was left out.
+        If other entries of the answer have letters, a letter of value 0 in the file was left out, and not written as 0.
         """
         parameters = self.description.parameters
         letters = self.reference[i][column].symbols & parameters.keys()
@@ -167,7 +179,8 @@ class TableRows:
 
     def reference_in_numbers(self, i: int) -> Row:
         """Return row i of the file, with numbers where the answer has them."""
-        return tuple(self._in_numbers(i, k, entry) for k, entry in enumerate(self.reference[i]))  # type: ignore[return-value]
+        theta, d, a, alpha = (self._in_numbers(i, k, entry) for k, entry in enumerate(self.reference[i]))
+        return theta, d, a, alpha
 
     def _in_numbers(self, i: int, column: int, truth: Expression) -> Expression:
         """Return an entry with the file's numbers where the answer has them."""
@@ -175,18 +188,20 @@ class TableRows:
 
     @cached_property
     def _values(self) -> dict[str, Expression]:
+        """Exact values of the file's parameters by name, SI units and rad."""
         return resolved(self.description.parameters)
 
     def is_proved(self, i: int, reference: Row) -> bool:
         """Whether A_i, i from 0, equals that of a row of the file in the ring of the file's parameters."""
         try:
-            A = self.reader.link(self.answer.entries[i], self.convention)
-            return bool((self.reader.link(reference, self.convention) == A).all())
+            answer = self.reader.link(self.answer.entries[i], self.convention)
+            truth = self.reader.link(reference, self.convention)
+            return bool((truth == answer).all())
         except (RingError, ExpressionError):
             return False
 
     def agrees_in_doubles(self, i: int) -> bool:
-        """Whether A_i, i from 0, agrees with the file's in doubles, for other values of the parameters as well."""
+        """Whether A_i, i from 0, agrees with the file's in doubles, at other values of the parameters as well."""
         fixed = {name: self.states[0][name] for name in self.written(i)}
         for state in self.states:
             values = state | fixed
@@ -195,7 +210,8 @@ class TableRows:
                 return False
             answer = link_in_doubles(self.convention, *entries)
             truth = link_in_doubles(self.convention, *(number_of(entry, values) for entry in self.reference[i]))
-            if not np.max(np.abs(answer - truth)) <= SAME_TRANSFORM * max(1.0, float(np.max(np.abs(truth)))):
+            largest = max(1.0, float(np.max(np.abs(truth))))
+            if not np.max(np.abs(answer - truth)) <= SAME_TRANSFORM * largest:
                 return False
         return True
 
@@ -211,19 +227,22 @@ class TableRows:
 
     @cached_property
     def states(self) -> list[dict[str, float]]:
-        """Values of joint variables and parameters by name, rad and SI units; the first with the file's parameters."""
+        """Values of joint variables and parameters by name, rad and SI units; the first with the file's parameters.
+
+        The others have parameters between a quarter and four times of the file's.
+        """
         random = np.random.default_rng(self.seed)
         states = []
         for k in range(STATES):
             q = random.uniform(-3, 3, self.n)
-            factors = 4.0 ** ((k > 0) * random.uniform(-1, 1, len(self.description.parameters)))
-            states.append(
-                parameter_values(self.description, factors) | {f"q{i + 1}": float(x) for i, x in enumerate(q)}
-            )
+            exponents = random.uniform(-1, 1, len(self.description.parameters))
+            factors = 4.0 ** ((k > 0) * exponents)
+            joints = {f"q{i + 1}": float(x) for i, x in enumerate(q)}
+            states.append(parameter_values(self.description, factors) | joints)
         return states
 
     def equal(self, i: int, column: int, truth: Expression) -> bool:
-        """Whether an entry of row i has a value, angles up to full turns; numbers may stand for parameters."""
+        """Whether an entry of row i equals a value, angles up to full turns; numbers may stand for parameters."""
         given = self.answer.entries[i][column]
         if given is None:
             return False
@@ -231,8 +250,8 @@ class TableRows:
         difference = naming.known(given) - naming.known(self._in_numbers(i, column, truth))
         if COLUMNS[column] in ("d", "a"):
             return difference.is_zero
-        turns = exact_angle(difference).half_turns
-        return turns is not None and turns % 2 == 0
+        half_turns = exact_angle(difference).half_turns
+        return half_turns is not None and half_turns % 2 == 0
 
 
 def other_convention(convention: Convention) -> Convention:
@@ -241,16 +260,25 @@ def other_convention(convention: Convention) -> Convention:
 
 
 def _file_rows(description: Description, convention: Convention) -> tuple[Row, ...]:
-    """Return the file's table in a convention: in the other one, a and alpha move to the neighbouring row."""
+    """Return the file's table in a convention: in the other one, a and alpha move to the neighbouring row.
+
+    Standard:   ... Rz(theta_i) Tz(d_i) [Tx(a_i) Rx(alpha_i)] Rz(theta_(i+1)) ...
+    Modified:   ... [Rx(alpha_i) Tx(a_i)] Rz(theta_(i+1)) Tz(d_(i+1)) ..., in row i + 1
+    """
     joints = description.joints
     links = [(joint.a, exact_angle(joint.alpha)) for joint in joints]
     if convention is not description.convention:
-        links = [*links[1:], (ZERO, ZERO)] if convention is Convention.STANDARD else [(ZERO, ZERO), *links[:-1]]
+        none = (ZERO, ZERO)
+        links = [*links[1:], none] if convention is Convention.STANDARD else [none, *links[:-1]]
+
     rows: list[Row] = []
     for i, (joint, (a, alpha)) in enumerate(zip(joints, links, strict=True), start=1):
         q = Expression.symbol(f"q{i}")
         theta = exact_angle(joint.theta)
-        rows.append((theta + q, joint.d, a, alpha) if joint.is_revolute else (theta, joint.d + q, a, alpha))
+        if joint.is_revolute:
+            rows.append((theta + q, joint.d, a, alpha))
+        else:
+            rows.append((theta, joint.d + q, a, alpha))
     return tuple(rows)
 
 
@@ -261,6 +289,7 @@ class _RowReader:
         self.ring: Ring = arm.ring
         self.naming = Naming(arm.description, arm.symbols)
         self.joints = {f"q{i + 1}": i for i in range(arm.n)}
+        """Numbers of the joints, from 0, by the names of their variables."""
 
     def link(self, row: Sequence[Expression | None], convention: Convention) -> Elements:
         """Return A_i of a row, shape (4, 4).
@@ -271,14 +300,14 @@ class _RowReader:
             An entry that the ring does not have.
         """
         theta, d, a, alpha = (ZERO if entry is None else self.naming.known(entry) for entry in row)
-        ring = self.ring
-        angles = (self.angle(theta), self.angle(alpha))
-        lengths = (self.length(d), self.length(a))
-        entries = link_entries(convention, angles[0], *lengths, angles[1], (ring.zero, ring.one))
+        theta_direction = self.angle(theta)
+        alpha_direction = self.angle(alpha)
+        unit = (self.ring.zero, self.ring.one)
+        entries = link_entries(convention, theta_direction, self.length(d), self.length(a), alpha_direction, unit)
         return np.array(entries, dtype=object)
 
     def length(self, length: Expression) -> Element:
-        """Return a length, in which variables of sliding joints may occur.
+        """Return a length, in which variables of prismatic joints may occur.
 
         Raises
         ------
@@ -286,22 +315,23 @@ class _RowReader:
             Another variable in the length, or a constant that the ring does not have.
         """
         ring = self.ring
-        total = []
+        terms = []
         for monomial, coefficient in length.terms:
             product = ring.number(coefficient)
             for atom, exponent in monomial:
                 joint = self.joints.get(atom.text)
                 if joint is None:
-                    product = product * ring.read(Expression(((((atom, exponent),), Fraction(1)),)))
+                    power = ((atom, exponent),)
+                    product = product * ring.read(Expression(((power, Fraction(1)),)))
                 elif ring.kinds[joint] != "R" and exponent > 0:
                     product = product * ring.position(joint) ** exponent
                 else:
                     raise RingError(f"{atom.text} in a length")
-            total.append(product)
-        return ring.sum(total)
+            terms.append(product)
+        return ring.sum(terms)
 
     def angle(self, angle: Expression) -> Direction:
-        """Return cosine and sine of an angle: whole multiples of turning joints' variables, and a constant.
+        """Return cosine and sine of an angle: whole multiples of revolute joints' variables, and a constant.
 
         Raises
         ------
@@ -309,15 +339,17 @@ class _RowReader:
             Another angle.
         """
         ring = self.ring
-        constant = []
-        parts = []
+        constants = []
+        multiples = []
         for monomial, coefficient in angle.terms:
             joint = self.joints.get(monomial[0][0].text) if len(monomial) == 1 else None
             if joint is None:
-                constant.append(Expression(((monomial, coefficient),)))
+                constants.append(Expression(((monomial, coefficient),)))
                 continue
+            ((atom, exponent),) = monomial
             is_multiple = coefficient.denominator == 1 and abs(coefficient) <= BOUNDS.angle_multiple
-            if ring.kinds[joint] != "R" or monomial[0][1] != 1 or not is_multiple:
-                raise RingError(f"{monomial[0][0].text} in an angle")
-            parts.append(multiple_angle(ring, joint, int(coefficient)))
-        return sum_of_angles(ring, [*parts, ring.direction(exact_angle(Expression.sum(constant)))])
+            if ring.kinds[joint] != "R" or exponent != 1 or not is_multiple:
+                raise RingError(f"{atom.text} in an angle")
+            multiples.append(multiple_angle(ring, joint, int(coefficient)))
+        constant = ring.direction(exact_angle(Expression.sum(constants)))
+        return sum_of_angles(ring, [*multiples, constant])

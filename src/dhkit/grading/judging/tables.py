@@ -8,7 +8,7 @@ positions of their joint axes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -29,16 +29,16 @@ from dhkit.grading.report import Diagnosis, Entry, KinematicJudgement, Verdict, 
 _OPEN_TASK = Requirements()
 """Requirements that leaves frames and zero pose open."""
 _UNEXPLAINED = {"theta": "wrong_theta", "d": "wrong_length", "a": "wrong_length", "alpha": "wrong_twist"}
-"""By column: the mistake that is named if no more specific one explains an entry."""
+"""Mistake for each column that is named if no more specific one explains a wrong entry."""
 
 
 @dataclass(frozen=True)
 class TableJudgement(KinematicJudgement):
     """Judgement of a table, with one entry for each row.
 
-    CORRECT is proved: A_i equals the file's. UNDECIDED: A_i agrees in doubles but is outside the exact ring, or the
-    whole table is the same arm in other frames, which is decided numerically. A table that has the file's frames and
-    counts joints from another zero is WRONG, whatever the constants, and a note says that it is the same arm.
+    CORRECT is proved: A_i equals the file's. UNDECIDED means that A_i agrees in doubles but is outside the exact ring,
+    or that the whole table is the same arm in other frames, which is decided numerically. A table that has the file's
+    frames and counts joints from another zero is WRONG, whatever the constants; a note says that it is the same arm.
 
     Attributes
     ----------
@@ -98,23 +98,21 @@ def judge_table(
 
 def _judge(table: TableRows, task: Requirements) -> TableJudgement:
     rows = [table.row(i) for i in range(table.n)]
-    in_numbers = frozenset().union(*(row.numbers for row in rows))
-    at_values = {name: table.states[0][name] for name in table.description.parameters if name in in_numbers}
-    notes: tuple[Note, ...] = ()
-    if table.converted:
-        conventions = (table.description.convention.value, table.convention.value)
-        notes = (Note(NoteKind.OTHER_CONVENTION, "dh", conventions),)
-    wrong = [i for i, row in enumerate(rows) if row.verdict is Verdict.WRONG]
     entries = _entries(rows)
+    notes = _notes(table)
+    in_numbers = frozenset[str]().union(*(row.numbers for row in rows))
+    at_values = _file_values(table, in_numbers)
+
+    wrong = _wrong_rows(rows)
     if not wrong:
         return TableJudgement(entries, notes=notes, at_values=at_values)
+
     mistakes = _row_mistakes(table, wrong)
     overlay = _overlay(table)
     # Without changes all frames are the file's to 1e-9: the numbers that are wrong by less belong to another arm.
     if overlay is not None and overlay.changes:
-        written = frozenset().union(*(table.written(i) for i in range(table.n)))
-        at_values = {name: table.states[0][name] for name in table.description.parameters if name in written}
-        return _judge_in_other_frames(table, rows, wrong, mistakes, overlay, task, notes, at_values)
+        return _judge_in_other_frames(table, rows, mistakes, overlay, task)
+
     diagnosis = tuple(mistake.diagnosis() for mistake in mistakes)
     if _is_of_other_convention(table):
         other = other_convention(table.convention).value
@@ -124,49 +122,71 @@ def _judge(table: TableRows, task: Requirements) -> TableJudgement:
     return TableJudgement(entries, diagnosis, notes, at_values)
 
 
+def _wrong_rows(rows: Sequence[JudgedRow]) -> list[int]:
+    """Return the numbers of the wrong rows, from 0."""
+    return [i for i, row in enumerate(rows) if row.verdict is Verdict.WRONG]
+
+
+def _notes(table: TableRows) -> tuple[Note, ...]:
+    if not table.converted:
+        return ()
+    conventions = (table.description.convention.value, table.convention.value)
+    return (Note(NoteKind.OTHER_CONVENTION, "dh", conventions),)
+
+
+def _file_values(table: TableRows, names: Collection[str]) -> dict[str, float]:
+    """Return the file's values of some parameters, SI units and rad."""
+    return {name: table.states[0][name] for name in table.description.parameters if name in names}
+
+
 def _judge_in_other_frames(
     table: TableRows,
     rows: Sequence[JudgedRow],
-    wrong: Sequence[int],
     mistakes: tuple[_RowMistake, ...],
     overlay: Overlay,
     task: Requirements,
-    notes: tuple[Note, ...],
-    at_values: Mapping[str, float],
 ) -> TableJudgement:
     """Judge a table that is the same arm in other frames.
 
     It is wrong if it has the file's frames with another zero, whatever the constants, or if a single slip explains it:
     a slip is likelier than a choice of frames that differs in one entry alone. Otherwise the frames are a choice.
     """
+    wrong = _wrong_rows(rows)
     moves_zeros_only = all(_moves_zero_only(table, i) for i in wrong)
     is_slip = len(mistakes) == 1 and mistakes[0].is_specific
-    named = tuple(mistake.diagnosis() for mistake in mistakes if mistake.is_specific)
     refusal = _refusal(overlay, task)
+
     rows = list(rows)
     for i in wrong:
-        rows[i] = (
-            replace(rows[i], statement=rows[i].statement + refusal)
-            if moves_zeros_only or is_slip or refusal
-            else replace(rows[i], verdict=Verdict.UNDECIDED, statement="the same arm in other frames, numerically")
-        )
+        if moves_zeros_only or is_slip or refusal:
+            rows[i] = replace(rows[i], statement=rows[i].statement + refusal)
+        else:
+            statement = "the same arm in other frames, numerically"
+            rows[i] = replace(rows[i], verdict=Verdict.UNDECIDED, statement=statement)
     entries = _entries(rows)
+
     other_frames = _diagnosis_of_table("other_frames", entries, "; ".join(map(str, overlay.changes)))
+    named = tuple(mistake.diagnosis() for mistake in mistakes if mistake.is_specific)
     diagnosis: tuple[Diagnosis, ...] = (other_frames,)
     if moves_zeros_only:
         diagnosis = (*named, other_frames)
     elif is_slip:
         diagnosis = named
+
+    notes = _notes(table)
     if moves_zeros_only or is_slip:
         notes = (*notes, Note(NoteKind.RIGHT_IN_OTHER_FRAMES, "dh"))
+
+    at_values = _file_values(table, _written(table))
     return TableJudgement(entries, diagnosis, notes, at_values, overlay.changes, overlay.moves_zero)
 
 
 def _moves_zero_only(table: TableRows, i: int) -> bool:
     """Whether row i, from 0, differs from the file's only by a constant added to its joint variable."""
     own_column = COLUMNS.index("theta" if table.description.kinds[i] == "R" else "d")
-    if not all(table.equal(i, k, truth) for k, truth in enumerate(table.reference[i]) if k != own_column):
-        return False
+    for k, truth in enumerate(table.reference[i]):
+        if k != own_column and not table.equal(i, k, truth):
+            return False
     entry = table.answer.entries[i][own_column]
     if entry is None:
         return False
@@ -175,10 +195,12 @@ def _moves_zero_only(table: TableRows, i: int) -> bool:
 
 
 def _refusal(overlay: Overlay, task: Requirements) -> str:
-    """Return why a table in other frames is wrong for a task; empty if it is allowed."""
+    """Return the reason for which a table in other frames is wrong for a task; empty if it is allowed."""
     if task.frames_given:
         return ": the task gives the frames"
-    return ": the task gives the zero pose" if overlay.moves_zero and task.zero_given else ""
+    if overlay.moves_zero and task.zero_given:
+        return ": the task gives the zero pose"
+    return ""
 
 
 def _entries(rows: Sequence[JudgedRow]) -> tuple[Entry, ...]:
@@ -191,13 +213,20 @@ def _diagnosis_of_table(mistake: str, entries: Sequence[Entry], detail: str) -> 
     return Diagnosis(mistake, sentence_of(mistake, detail=detail), "dh", concerned, hint_of(mistake))
 
 
+def _written(table: TableRows) -> frozenset[str]:
+    """Return the letters of the file that the answer has as numbers in some row."""
+    return frozenset[str]().union(*(table.written(i) for i in range(table.n)))
+
+
 def _overlay(table: TableRows) -> Overlay | None:
-    """Return how the answer's frames lie on the file's; None if the answer is another arm."""
+    """Return the relation of the answer's frames to the file's; None if the answer is another arm.
+
+    A table in letters has to be this arm at two sets of values: the file's, and random ones.
+    """
     strict = not table.converted
     kinds = table.description.kinds
+    fixed = {name: table.states[0][name] for name in _written(table)}
     best: Overlay | None = None
-    written = frozenset().union(*(table.written(i) for i in range(table.n)))
-    fixed = {name: table.states[0][name] for name in written}
     for state in table.states[: 2 if table.description.parameters else 1]:
         values = state | fixed
         answer = TableArm.of_trees(table.answer.trees, kinds, table.convention, values)
@@ -205,7 +234,8 @@ def _overlay(table: TableRows) -> Overlay | None:
         overlay = None if answer is None else overlaid(answer, truth, strict)
         if overlay is None:
             return None
-        best = best if best is not None and best.changes else overlay
+        if best is None or not best.changes:
+            best = overlay
     return best
 
 
@@ -225,13 +255,13 @@ class _RowMistake:
     Attributes
     ----------
     mistake
-        Identity of a mistake of the library.
+        Identifier of the mistake in the catalogue.
     row
         Number of the row, from 0.
     where
         Rows or entry that the mistake concerns, in words.
     is_specific
-        Whether the mistake says what is wrong with an entry, and not only that it is wrong.
+        Whether the mistake names the error in an entry, and not only that the entry is wrong.
     """
 
     mistake: str
@@ -248,13 +278,16 @@ class _RowMistake:
 
 def _row_mistakes(table: TableRows, wrong: Sequence[int]) -> tuple[_RowMistake, ...]:
     """Return the mistakes in wrong rows, from 0, in their order; rows outside exact arithmetic are left out."""
-    mistakes = []
-    left = list(wrong)
+    mistakes: list[_RowMistake] = []
+    unexplained = list(wrong)
     for i, j in combinations(wrong, 2):
-        if i in left and j in left and _matches(table, i, j) and _matches(table, j, i):
-            left = [k for k in left if k not in (i, j)]
-            mistakes += [_RowMistake("rows_exchanged", k, f"rows {i + 1} and {j + 1}") for k in (i, j)]
-    for i in left:
+        if i not in unexplained or j not in unexplained:
+            continue
+        if _matches(table, i, j) and _matches(table, j, i):
+            unexplained = [k for k in unexplained if k not in (i, j)]
+            where = f"rows {i + 1} and {j + 1}"
+            mistakes += [_RowMistake("rows_exchanged", i, where), _RowMistake("rows_exchanged", j, where)]
+    for i in unexplained:
         if None not in table.answer.entries[i]:
             mistakes += _explain_row(table, i)
     return tuple(sorted(mistakes, key=lambda mistake: mistake.row))
@@ -264,18 +297,26 @@ def _matches(table: TableRows, i: int, j: int) -> bool:
     """Whether row i of the answer is row j of the file, with the variable of joint i or of joint j."""
     own = {f"q{j + 1}": Expression.symbol(f"q{i + 1}")}
     moved = tuple(substitute(entry, own) for entry in table.reference[j])
-    return any(all(table.equal(i, column, row[column]) for column in range(4)) for row in (moved, table.reference[j]))
+    return _is_row(table, i, moved) or _is_row(table, i, table.reference[j])
+
+
+def _is_row(table: TableRows, i: int, row: Sequence[Expression]) -> bool:
+    """Whether row i of the answer, from 0, equals another row, entry by entry."""
+    return all(table.equal(i, k, entry) for k, entry in enumerate(row))
 
 
 def _explain_row(table: TableRows, i: int) -> Iterator[_RowMistake]:
     """Yield the mistakes in row i: one of the whole row, or one for each wrong entry."""
     theta, d, a, alpha = table.reference[i]
     q = Expression.symbol(f"q{i + 1}")
-    turning = table.description.kinds[i] == "R"
-    exchanged = (theta, a, d, alpha) if turning else (theta, a + q, d - q, alpha)
-    column = (theta - q, d + q, a, alpha) if turning else (theta + q, d - q, a, alpha)
-    for name, row in (("a_d_exchanged", exchanged), ("variable_column", column)):
-        if all(table.equal(i, k, entry) for k, entry in enumerate(row)):
+    if table.description.kinds[i] == "R":
+        exchanged = (theta, a, d, alpha)
+        other_column = (theta - q, d + q, a, alpha)
+    else:
+        exchanged = (theta, a + q, d - q, alpha)
+        other_column = (theta + q, d - q, a, alpha)
+    for name, row in (("a_d_exchanged", exchanged), ("variable_column", other_column)):
+        if _is_row(table, i, row):
             yield _RowMistake(name, i, f"row {i + 1}")
             return
     for k, truth in enumerate(table.reference[i]):
@@ -292,11 +333,15 @@ def _explain_entry(table: TableRows, i: int, k: int, truth: Expression) -> _RowM
 
 
 def _wrong_entries(table: TableRows, i: int, k: int, truth: Expression) -> Iterator[tuple[str, Expression]]:
-    """Yield mistakes in an entry, each with the entry that it gives."""
-    own = COLUMNS[k] == ("theta" if table.description.kinds[i] == "R" else "d")
-    q = Expression.symbol(f"q{i + 1}") if own else ZERO
+    """Yield mistakes in an entry, each with the entry that it gives.
+
+    The right entry is the joint variable plus an offset in the joint's own column, and the offset alone elsewhere.
+    """
+    own_column = "theta" if table.description.kinds[i] == "R" else "d"
+    has_variable = COLUMNS[k] == own_column
+    q = Expression.symbol(f"q{i + 1}") if has_variable else ZERO
     offset = truth - q
-    if own:
+    if has_variable:
         yield "variable_forgotten", offset
         for j in range(table.n):
             yield "variable_of_another_joint", offset + Expression.symbol(f"q{j + 1}")
@@ -305,6 +350,7 @@ def _wrong_entries(table: TableRows, i: int, k: int, truth: Expression) -> Itera
         yield f"{COLUMNS[k]}_forgotten", q
         yield "millimetres_for_metres", q + offset * 1000
         return
+
     yield "degrees_for_radians", q + offset * 180 / PI
     if COLUMNS[k] == "alpha":
         yield "alpha_sign", -truth

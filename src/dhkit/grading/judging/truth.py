@@ -30,7 +30,7 @@ class Truth:
     description
         The robot.
     coordinates
-        Joint variables in which torques and mass matrices are asked for.
+        Joint variables in which the task asks for torques and mass matrices.
     friction
         Whether tau includes viscous friction.
     """
@@ -57,7 +57,7 @@ class Truth:
         return lagrangian(self.description)
 
     def arm(self, quantity: str) -> ExactArm:
-        """Return the arm whose ring holds a quantity."""
+        """Return the arm to whose ring a quantity belongs."""
         return self.lagrangian.arm if quantity in DYNAMICS else self.kinematics.arm
 
     def reader(self, quantity: str) -> RingReader:
@@ -84,6 +84,7 @@ class Truth:
         return substituted(array, {p: ring.number(exact_number(self.description, p)) for p in numbers}, ring)
 
     def _in_robot_variables(self, quantity: str) -> Elements:
+        """Return the right value of a quantity in the robot's own joint variables."""
         if quantity not in DYNAMICS:
             return kinematic_quantity(self.kinematics, quantity)
         array = right_value(self.lagrangian, quantity)
@@ -91,10 +92,12 @@ class Truth:
 
     @cached_property
     def viscous(self) -> Elements:
-        """Viscous friction torques gear^2 B qd on the joints' side, shape (n,), N m or N."""
+        """Viscous friction torques r^2 B qd on the joints' side, shape (n,), N m or N, for gear ratios r."""
         arm = self.lagrangian.arm
-        pairs = zip(arm.gear, arm.viscous, strict=True)
-        return element_array([gear * gear * B * arm.ring.rate(i) for i, (gear, B) in enumerate(pairs)])
+        torques = []
+        for i, (r, B) in enumerate(zip(arm.gear, arm.viscous, strict=True)):
+            torques.append(r * r * B * arm.ring.rate(i))
+        return element_array(torques)
 
 
 @lru_cache(maxsize=32)
@@ -107,14 +110,19 @@ def truth_of(description: Description, absolute: bool = False, friction: bool = 
 
 def right_value(lag: Lagrangian, quantity: str) -> Elements:
     """Return M, C, h, g, tau, K, V or L in the robot's own joint variables, without friction."""
-    return element_array(lag.K - lag.V if quantity == "L" else getattr(lag, quantity))
+    if quantity == "L":
+        return element_array(lag.K - lag.V)
+    return element_array(getattr(lag, quantity))
 
 
 def kinematic_quantity(kinematics: TextbookKinematics, quantity: str) -> Elements:
     """Return A1 ... An (4, 4), T (4, 4) or J (6, n) of a derivation."""
-    if quantity in ("T", "J"):
-        return kinematics.T if quantity == "T" else kinematics.J
-    return kinematics.A[int(quantity[1:]) - 1]
+    if quantity == "T":
+        return kinematics.T
+    if quantity == "J":
+        return kinematics.J
+    link = int(quantity[1:])
+    return kinematics.A[link - 1]
 
 
 def substituted(array: Elements, values: Mapping[str, Element], ring: Ring) -> Elements:

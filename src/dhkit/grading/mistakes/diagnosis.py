@@ -35,9 +35,12 @@ from dhkit.symbolic.textbook_kinematics import (
 Differences: TypeAlias = Mapping[Index, Element]
 """Answer less truth of a quantity's entries, zero for right ones; without entries that were not handed in."""
 _Key: TypeAlias = frozenset[Any]
+"""Hashable normal form of an element: its terms; empty for zero."""
 _TEXTBOOK = {*MISTAKES, *KINEMATIC_MISTAKES}
+"""Mistakes that derivations of the textbook can make."""
 _ROUNDED_DECIMALS = 2e-3
-"""Tolerance relative to the largest entry: numbers of four decimals, multiplied and added, stay below it."""
+"""Largest difference of an answer in rounded decimals from the exact one, relative to the largest entry of the right
+one: numbers of four decimals, multiplied and added, stay below it."""
 
 
 class Variants:
@@ -76,23 +79,28 @@ class Variants:
         """Possible mistakes in the robot's transforms and Jacobian."""
         n = self.truth.description.n
         truth = self.truth
+
         # Mistakes in the Jacobian first: if it alone is wrong, they are likelier than mistakes in the transforms.
         names = [*JACOBIAN_MISTAKES, *LINK_MISTAKES, *POSE_MISTAKES]
         made = [(MadeAt(name), "") for name in names]
         if n > 1:
-            made += [(MadeAt(name, i), f"link {i}") for name in LINK_MISTAKES for i in range(1, n + 1)]
+            for name in LINK_MISTAKES:
+                made += [(MadeAt(name, i), f"link {i}") for i in range(1, n + 1)]
         made.append((MadeAt("translations_unrotated", n + 1), "tool"))
+        of_derivation = [Variant(at, _kinematic_change(truth, at), place, is_kinematic=True) for at, place in made]
+
         right = partial(kinematic_quantity, truth.kinematics)
         return [
             derivatives_of_cosines(truth),
-            *(Variant(at, _kinematic_change(truth, at), place, is_kinematic=True) for at, place in made),
+            *of_derivation,
             *_columns_exchanged(truth),
             *sums_of_angles(truth.kinematics.arm, right, is_kinematic=True),
         ]
 
     def change(self, variant: Variant, quantity: str) -> Elements:
-        """Return what a mistake adds to a quantity, with the file's numbers for ``numbers``."""
-        return self.in_numbers(quantity, variant.adds_to(_judged_by(quantity), self.truth.coordinates))
+        """Return the change of a quantity by a mistake, with the file's numbers for the parameters in ``numbers``."""
+        change = variant.adds_to(_judged_by(quantity), self.truth.coordinates)
+        return self.in_numbers(quantity, change)
 
     def in_numbers(self, quantity: str, array: Elements) -> Elements:
         """Return elements with the file's numbers instead of the parameters that answers have as numbers."""
@@ -106,7 +114,8 @@ class Variants:
             return
         changes: list[_Changed] = []
         by_entry: dict[tuple[Index, _Key], list[_Changed]] = {}
-        for variant in self.dynamic if quantity in DYNAMICS else self.kinematic:
+        variants = self.dynamic if quantity in DYNAMICS else self.kinematic
+        for variant in variants:
             keys = {place: _key_of(quantity, x) for place, x in np.ndenumerate(self.change(variant, quantity))}
             if not any(keys.values()):
                 continue
@@ -126,13 +135,16 @@ class Variants:
         wrong = [(place, key) for place, key in wanted.items() if key]
         if not wrong:
             return []
+
+        # Only mistakes that cause the difference of the entry with the fewest such mistakes are compared.
         candidates = min((self._by_entry[quantity].get(entry, []) for entry in wrong), key=len)
         return [changed.variant for changed in candidates if _fits(changed.keys, wanted)]
 
     def changes_none(self, variant: Variant, quantity: str, places: Sequence[Index]) -> bool:
         """Whether a mistake leaves some entries of a quantity unchanged."""
         change = self.change(variant, quantity)
-        return all(not _key_of(quantity, change[place]) for place in {place_of(quantity, index) for index in places})
+        judged_places = {place_of(quantity, index) for index in places}
+        return not any(_key_of(quantity, change[place]) for place in judged_places)
 
     def entry(self, quantity: str, index: Index, difference: Element) -> list[Variant]:
         """Return the mistakes that cause exactly the difference of one entry."""
@@ -158,13 +170,15 @@ class Variants:
         if quantity not in self._values:
             changes = [self.change(changed.variant, quantity) for changed in self._changes[quantity]]
             self._values[quantity] = [arm.evaluate(change, q, qd, qdd) for change in changes]
-        here = arm.evaluate(truth, q, qd, qdd)
-        tolerance = _ROUNDED_DECIMALS * np.max(np.abs(here), initial=0.0)
-        return [
-            changed.variant
-            for changed, values in zip(self._changes[quantity], self._values[quantity], strict=True)
-            if all(abs(here[index] + values[index] - value) <= tolerance for index, value in answer.items())
-        ]
+        right = arm.evaluate(truth, q, qd, qdd)
+        tolerance = _ROUNDED_DECIMALS * np.max(np.abs(right), initial=0.0)
+
+        near: list[Variant] = []
+        for changed, change in zip(self._changes[quantity], self._values[quantity], strict=True):
+            wrong = right + change
+            if all(abs(wrong[index] - value) <= tolerance for index, value in answer.items()):
+                near.append(changed.variant)
+        return near
 
     def pair(self, quantity: str, differences: Differences) -> tuple[Variant, Variant] | None:
         """Return two of the textbook's mistakes that together cause exactly the differences; None if no two do."""
@@ -183,14 +197,14 @@ class Variants:
 
 @dataclass(frozen=True, eq=False)
 class _Changed:
-    """Mistake with the normal forms of its changes of a quantity's entries; empty for unchanged entries."""
+    """Mistake with the normal forms of its changes of a quantity's entries, which are empty for unchanged entries."""
 
     variant: Variant
     keys: Mapping[Index, _Key]
 
 
 def _kinematic_change(truth: Truth, made: MadeAt) -> Make:
-    """Return what a mistake adds to A1 ... An, T and J; the derivation is made once, when first asked for."""
+    """Return the function of what a mistake adds to A1 ... An, T and J; it derives them once, when first called."""
     wrong = cache(lambda: derive_kinematics(truth.description, {made}))
     return lambda quantity: kinematic_quantity(wrong(), quantity) - kinematic_quantity(truth.kinematics, quantity)
 
@@ -198,14 +212,17 @@ def _kinematic_change(truth: Truth, made: MadeAt) -> Make:
 def _columns_exchanged(truth: Truth) -> Iterator[Variant]:
     """Yield exchanges of two columns of the Jacobian."""
     for i, j in combinations(range(truth.description.n), 2):
-        order = [*range(truth.description.n)]
-        order[i], order[j] = j, i
-
-        def change(quantity: str, order: list[int] = order) -> Elements:
-            right = kinematic_quantity(truth.kinematics, quantity)
-            return right[:, order] - right if quantity == "J" else right * 0
-
+        order = list(range(truth.description.n))
+        order[i] = j
+        order[j] = i
+        change = partial(_with_columns, truth, order)
         yield Variant(MadeAt("columns_exchanged"), change, f"columns {i + 1} and {j + 1}", 1, is_kinematic=True)
+
+
+def _with_columns(truth: Truth, order: list[int], quantity: str) -> Elements:
+    """Return the change of a quantity if the columns of the Jacobian have another order; zero for the transforms."""
+    right = kinematic_quantity(truth.kinematics, quantity)
+    return right[:, order] - right if quantity == "J" else right * 0
 
 
 @dataclass(eq=False)
@@ -224,7 +241,9 @@ class _Pairs:
         """Return a pair whose second mistake explains what the first leaves of the differences."""
         for first in self.tables.textbook(self.quantity):
             change = self.tables.change(first, self.quantity)
-            rest = {index: x - change[place_of(self.quantity, index)] for index, x in differences.items()}
+            rest: dict[Index, Element] = {}
+            for index, difference in differences.items():
+                rest[index] = difference - change[place_of(self.quantity, index)]
             for second in self.tables.whole(self.quantity, rest):
                 if second.identity in _TEXTBOOK and _fits(self._both(first, second), wanted):
                     return first, second
@@ -246,12 +265,14 @@ class _Pairs:
 
     @cached_property
     def _todo(self) -> Iterator[tuple[Variant, Variant]]:
-        additive = self.quantity in DYNAMICS
+        """Pairs that are not derived yet: those whose changes do not add up."""
+        is_additive = self.quantity in DYNAMICS
         pairs = combinations(self.tables.textbook(self.quantity), 2)
-        derived = ((a, b) for a, b in pairs if not (additive and _apart(a.made, b.made)))
+        derived = ((a, b) for a, b in pairs if not (is_additive and _apart(a.made, b.made)))
         return islice(derived, BOUNDS.derived_pairs)
 
     def _derived(self, wanted: Mapping[Index, _Key]) -> tuple[Variant, Variant] | None:
+        """Return a pair whose derivation gives the wanted changes; pairs are derived as far as needed."""
         for keys, pair in self.derived_pairs.items():
             if _fits(dict(keys), wanted):
                 return pair
@@ -281,7 +302,9 @@ def _keys_of(quantity: str, differences: Differences) -> dict[Index, _Key]:
 
 def _key_of(quantity: str, element: Element) -> _Key:
     """Return the hashable normal form of an element; of an energy without the terms that do not depend on the state."""
-    return frozenset((varying(element) if quantity in ("V", "L") else element).terms.items())
+    if quantity in ("V", "L"):
+        element = varying(element)
+    return frozenset(element.terms.items())
 
 
 def _fits(keys: Mapping[Index, _Key], wanted: Mapping[Index, _Key]) -> bool:
@@ -291,5 +314,7 @@ def _fits(keys: Mapping[Index, _Key], wanted: Mapping[Index, _Key]) -> bool:
 
 def _apart(a: MadeAt, b: MadeAt) -> bool:
     """Whether two mistakes are made at different links or bodies, so that their changes add up."""
-    bodies = a.body is not None and b.body is not None and a.body != b.body
-    return a.link is not None and b.link is not None and (a.link != b.link or bodies)
+    if a.link is None or b.link is None:
+        return False
+    are_other_bodies = a.body is not None and b.body is not None and a.body != b.body
+    return a.link != b.link or are_other_bodies

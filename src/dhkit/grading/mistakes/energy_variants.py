@@ -9,7 +9,7 @@ from itertools import combinations
 
 from dhkit.description import Convention, Description, Joint
 from dhkit.errors import DhkitError
-from dhkit.expressions import ZERO, Expression
+from dhkit.expressions import ZERO
 from dhkit.grading.judging.truth import Truth
 from dhkit.grading.mistakes.bounds import BOUNDS
 from dhkit.grading.mistakes.variants import Change, Variant, make_lazily
@@ -19,6 +19,7 @@ from dhkit.symbolic.textbook import BodyMotion, TextbookDerivation, derive
 
 _HALF = Fraction(1, 2)
 _MILLIMETRES = 1000
+"""Number of millimetres in a metre."""
 _SHAPES = {
     "disc_for_rod": (6,),
     "rod_about_end": (4,),
@@ -27,9 +28,15 @@ _SHAPES = {
     "inertia_quarter_for_rod": (3,),
     "rod_with_half_length": (Fraction(1, 4),),
 }
-"""By mistake: factors of a rod's m l^2/12 about its centre, such as 6 for m l^2/2."""
-_OF_TURNING = frozenset(("velocity_at_joint", "inertia_about_joint", "inertia_about_com_at_joint")) | frozenset(
-    ("velocity_relative_angle", "height_relative_angle")
+"""Factors of a rod's m l^2/12 about its centre, such as 6 for m l^2/2, by the mistakes that make them."""
+_OF_REVOLUTE_JOINTS = frozenset(
+    (
+        "velocity_at_joint",
+        "inertia_about_joint",
+        "inertia_about_com_at_joint",
+        "velocity_relative_angle",
+        "height_relative_angle",
+    )
 )
 """Mistakes with the angle of a revolute joint, or with the inertia about its axis."""
 _RARER = frozenset(("omega_unturned", "inertia_axes", "com_rotation_transposed", "gravity_axis", "gravity_axis_back"))
@@ -37,6 +44,7 @@ _RARER = frozenset(("omega_unturned", "inertia_axes", "com_rotation_transposed",
 _INERTIA_MISTAKES = ("inertia_forgotten", "inertia_about_joint", "inertia_about_com_at_joint", "inertia_doubled")
 """Mistakes that may be made at some links alone, because the first link only turns about its own axis."""
 _EXCHANGED_AXES = ((0, 1), (1, 2), (0, 2))
+"""Pairs of axes, from 0, whose principal moments of inertia may be exchanged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,11 +77,11 @@ class _Part:
 
 def _parts(textbook: TextbookDerivation) -> list[_Part]:
     """Return the bodies of all links."""
-    return [
-        _Part(i, motion.body.name if len(link.bodies) > 1 else None, motion)
-        for i, link in enumerate(textbook.links, start=1)
-        for motion in link.bodies
-    ]
+    parts: list[_Part] = []
+    for i, link in enumerate(textbook.links, start=1):
+        has_several = len(link.bodies) > 1
+        parts += [_Part(i, motion.body.name if has_several else None, motion) for motion in link.bodies]
+    return parts
 
 
 def energy_variants(truth: Truth) -> Iterator[Variant]:
@@ -95,6 +103,7 @@ def _textbook(textbook: TextbookDerivation) -> Iterator[Variant]:
     def rarity(name: str) -> int:
         return int(name in _RARER)
 
+    # At all links, or at one.
     for name in names:
         yield Variant(MadeAt(name), make_lazily(_derived, textbook, MadeAt(name)), rarity=rarity(name))
         for i in range(1, n + 1):
@@ -102,30 +111,38 @@ def _textbook(textbook: TextbookDerivation) -> Iterator[Variant]:
                 continue
             made = MadeAt(name, i)
             yield Variant(made, make_lazily(_derived, textbook, made), f"link {i}", rarity(name))
+
+    # At some links.
     for name in _INERTIA_MISTAKES:
-        for links in _subsets([i for i in range(1, n + 1) if _is_possible(textbook, name, i)]):
+        possible = [i for i in range(1, n + 1) if _is_possible(textbook, name, i)]
+        for links in _subsets(possible):
             make = make_lazily(_derived, textbook, *(MadeAt(name, i) for i in links))
             yield Variant(MadeAt(name), make, _listed(links), 1)
+
+    # At one of several bodies of a link.
     for name in names:
-        for part in several if name in LINK_MISTAKES else ():
+        if name not in LINK_MISTAKES:
+            continue
+        for part in several:
             if _is_possible(textbook, name, part.link):
                 made = part.mistake(name)
                 yield Variant(made, make_lazily(_derived, textbook, made), part.place, 1 + rarity(name))
 
 
 def _is_possible(textbook: TextbookDerivation, name: str, link: int) -> bool:
-    """Whether a mistake can be made at a link, from 1: a sliding joint has no angle and no parallel axis."""
-    return name not in _OF_TURNING or textbook.arm.ring.kinds[link - 1] == "R"
+    """Whether a mistake can be made at a link, from 1: a prismatic joint has no angle and no parallel axis."""
+    return name not in _OF_REVOLUTE_JOINTS or textbook.arm.ring.kinds[link - 1] == "R"
 
 
 def _subsets(links: Sequence[int]) -> Iterator[tuple[int, ...]]:
-    """Yield the subsets of at least two links, without all of them; none of more than four links."""
+    """Yield the subsets of two links or more, except the whole set; none if there are many links."""
     if len(links) <= BOUNDS.subset_links:
         for count in range(2, len(links)):
             yield from combinations(links, count)
 
 
 def _listed(links: Sequence[int]) -> str:
+    """Return links in words: links 1, 2 and 4."""
     return f"links {', '.join(map(str, links[:-1]))} and {links[-1]}"
 
 
@@ -156,8 +173,9 @@ def _with_com_of_first(description: Description, part: _Part) -> Description:
     """Return an arm with a body moved to the centre of mass of its link's first body."""
     joints = list(description.joints)
     own = joints[part.link - 1]
-    bodies = (replace(body, com=own.bodies[0].com) if body.name == part.name else body for body in own.bodies)
-    joints[part.link - 1] = replace(own, bodies=tuple(bodies))
+    com = own.bodies[0].com
+    bodies = tuple(replace(body, com=com) if body.name == part.name else body for body in own.bodies)
+    joints[part.link - 1] = replace(own, bodies=bodies)
     return replace(description, joints=tuple(joints))
 
 
@@ -182,39 +200,54 @@ def _shapes(textbook: TextbookDerivation) -> Iterator[Variant]:
 def _scaled_inertia(
     textbook: TextbookDerivation, identity: str, factor: Fraction, parts: Sequence[_Part]
 ) -> Iterator[Variant]:
+    """Yield inertias of bodies about their centres of mass times a factor: of all bodies, of some, or of one."""
     if len(parts) > 1:
         yield Variant(MadeAt(identity), make_lazily(_more_inertia, textbook, parts, factor - 1), rarity=1)
     by_link = {part.link: part for part in parts}
-    for links in _subsets([*by_link]) if len(by_link) == len(parts) else ():
-        make = make_lazily(_more_inertia, textbook, [by_link[i] for i in links], factor - 1)
-        yield Variant(MadeAt(identity), make, _listed(links), 1)
+    has_one_each = len(by_link) == len(parts)
+    if has_one_each:
+        for links in _subsets(list(by_link)):
+            make = make_lazily(_more_inertia, textbook, [by_link[i] for i in links], factor - 1)
+            yield Variant(MadeAt(identity), make, _listed(links), 1)
     for part in parts:
         place = part.place if textbook.arm.n > 1 or part.name is not None else ""
         yield Variant(part.mistake(identity), make_lazily(_more_inertia, textbook, [part], factor - 1), place, 1)
 
 
 def _is_rod(part: _Part) -> bool:
-    """Whether an inertia is a rod's m l^2/12, with the centre of mass at half its length from the link's frame."""
+    """Whether an inertia is a rod's m l^2/12, with the centre of mass at half its length from the link's frame.
+
+    With the centre at c = l/2 it is I = m (2 |c|)^2 / 12, so that 12 I = 4 m c . c.
+    """
     body = part.motion.body
     square = body.com @ body.com
-    moment = body.mass * square * 4
-    return bool(square) and any((body.inertia[k, k] * 12 - moment).is_zero for k in range(3))
+    if not square:
+        return False
+    twelvefold = body.mass * square * 4
+    return any((body.inertia[k, k] * 12 - twelvefold).is_zero for k in range(3))
 
 
 def _more_inertia(textbook: TextbookDerivation, parts: Iterable[_Part], share: Fraction) -> Change:
+    """Return the change of the energies by a share of bodies' inertias: K += share * sum of w . I w / 2."""
+    energies = []
+    for part in parts:
+        omega = part.motion.omega
+        inertia = part.motion.body.inertia
+        energies.append(omega @ inertia @ omega * _HALF * share)
     ring = textbook.arm.ring
-    motions = [part.motion for part in parts]
-    energies = [motion.omega @ motion.body.inertia @ motion.omega * _HALF * share for motion in motions]
     return Change(ring.sum(energies), ring.zero)
 
 
 def _exchanged_moments(textbook: TextbookDerivation, part: _Part, a: int, b: int) -> Change:
-    tensor = part.motion.body.inertia
-    omega = part.motion.omega
+    """Return the change of the energies if a body's principal moments about axes a and b are exchanged."""
+    moments = part.motion.body.inertia.diagonal()
     order = list(range(3))
-    order[a], order[b] = b, a
-    moments = tensor.diagonal()
+    order[a] = b
+    order[b] = a
     difference = moments[order] - moments
+
+    # K += sum over k of w_k^2 (I'_kk - I_kk) / 2
+    omega = part.motion.omega
     ring = textbook.arm.ring
     return Change(ring.sum(omega[k] * omega[k] * difference[k] * _HALF for k in range(3)), ring.zero)
 
@@ -223,6 +256,7 @@ def _exchanged_moments(textbook: TextbookDerivation, part: _Part, a: int, b: int
 
 
 def _drives(textbook: TextbookDerivation) -> Iterator[Variant]:
+    """Yield mistakes with drives: exchanged with another joint's, or with an inverted gear ratio."""
     arm = textbook.arm
     for i, j in combinations(range(arm.n), 2):
         if arm.rotor[i] or arm.rotor[j]:
@@ -231,26 +265,34 @@ def _drives(textbook: TextbookDerivation) -> Iterator[Variant]:
     driven = [i for i in range(arm.n) if arm.rotor[i] and _inverse(arm.gear[i]) is not None]
     if driven:
         yield Variant(MadeAt("gear_inverted"), make_lazily(_inverted_gears, textbook, driven), rarity=1)
-    for i in driven if arm.n > 1 else ():
-        made = MadeAt("gear_inverted", i + 1)
-        yield Variant(made, make_lazily(_inverted_gears, textbook, [i]), f"joint {i + 1}", 1)
+    if arm.n > 1:
+        for i in driven:
+            made = MadeAt("gear_inverted", i + 1)
+            yield Variant(made, make_lazily(_inverted_gears, textbook, [i]), f"joint {i + 1}", 1)
 
 
 def _exchanged_drives(textbook: TextbookDerivation, i: int, j: int) -> Change:
+    """Return the change of the energies if the drives of joints i and j are exchanged.
+
+    With the armatures J (rotor inertias on the joints' side), K += (J_j - J_i) (qd_i^2 - qd_j^2) / 2.
+    """
     arm = textbook.arm
     difference = arm.armature[j] - arm.armature[i]
-    squares = [arm.ring.rate(k) * arm.ring.rate(k) for k in (i, j)]
-    return Change(difference * (squares[0] - squares[1]) * _HALF, arm.ring.zero)
+    square_i = arm.ring.rate(i) * arm.ring.rate(i)
+    square_j = arm.ring.rate(j) * arm.ring.rate(j)
+    return Change(difference * (square_i - square_j) * _HALF, arm.ring.zero)
 
 
 def _inverted_gears(textbook: TextbookDerivation, joints: Iterable[int]) -> Change:
+    """Return the change of the energies if gear ratios r of joints are inverted: K += I (1/r^2 - r^2) qd^2 / 2."""
     arm = textbook.arm
     energies = []
     for i in joints:
-        inverse = _inverse(arm.gear[i])
+        ratio = arm.gear[i]
+        inverse = _inverse(ratio)
         if inverse is not None:
             rate = arm.ring.rate(i)
-            energies.append(arm.rotor[i] * (inverse * inverse - arm.gear[i] * arm.gear[i]) * rate * rate * _HALF)
+            energies.append(arm.rotor[i] * (inverse * inverse - ratio * ratio) * rate * rate * _HALF)
     return Change(arm.ring.sum(energies), arm.ring.zero)
 
 
@@ -266,7 +308,7 @@ def _inverse(gear: Element) -> Element | None:
 
 
 def _slides(textbook: TextbookDerivation) -> Iterator[Variant]:
-    """Yield mistakes in positions of links: the variable of one sliding joint is missing."""
+    """Yield mistakes in positions of links: the variable of one prismatic joint is missing."""
     ring = textbook.arm.ring
     for k in range(ring.n):
         if ring.kinds[k] == "R":
@@ -282,73 +324,92 @@ def _slides(textbook: TextbookDerivation) -> Iterator[Variant]:
 
 
 def _without_slide(textbook: TextbookDerivation, motions: Iterable[BodyMotion], k: int) -> Change:
-    """Return the change if a sliding joint is fixed at zero in the positions of bodies, not in their orientations."""
+    """Return the change if a prismatic joint k, from 0, is fixed at zero in the positions of bodies.
+
+    With the wrong position p' and velocity v' of a centre of mass, K += m (v' . v' - v . v) / 2, V -= m g . (p' - p).
+    """
     arm = textbook.arm
     ring = textbook.arm.ring
-    K, V = ring.zero, ring.zero
+    fixed = {ring.place("position", k): ring.zero}
+    K = ring.zero
+    V = ring.zero
     for motion in motions:
-        place = element_array([translated(x, ring, {ring.place("position", k): ring.zero}) for x in motion.com])
-        velocity = element_array([x.by_time() for x in place])
+        position = element_array([translated(x, ring, fixed) for x in motion.com])
+        velocity = element_array([x.by_time() for x in position])
         mass = motion.body.mass
         K = K + mass * (velocity @ velocity - motion.velocity @ motion.velocity) * _HALF
-        V = V - mass * (arm.gravity @ (place - motion.com))
+        V = V - mass * (arm.gravity @ (position - motion.com))
     return Change(K, V)
 
 
-# The table behind the dynamics
+# The table from which the dynamics are derived
 
 
 def table_variants(truth: Truth) -> Iterator[Variant]:
     """Yield mistakes in the table that the equations come from."""
     textbook = derive(truth.description)
     description = textbook.arm.description
-    standard = description.convention is Convention.STANDARD
-    other = replace(description, convention=Convention.MODIFIED if standard else Convention.STANDARD)
-    yield Variant(MadeAt("convention_in_dynamics"), make_lazily(_of_description, textbook, other), rarity=1)
-    turned = [i for i, joint in enumerate(description.joints) if not (joint.alpha - -joint.alpha).is_zero]
-    for links in ([turned] if len(turned) > 1 else []) + [[i] for i in turned]:
-        made = MadeAt("twist_sign_in_dynamics", links[0] + 1 if len(links) == 1 else None)
-        place = f"row {links[0] + 1}" if len(links) == 1 else ""
-        wrong = _with_twists_turned(description, links)
-        yield Variant(made, make_lazily(_of_description, textbook, wrong), place, 1)
 
-    if any(not x.symbols and not x.is_zero for joint in description.joints for x in _lengths(joint)):
+    # The other convention.
+    is_standard = description.convention is Convention.STANDARD
+    other = replace(description, convention=Convention.MODIFIED if is_standard else Convention.STANDARD)
+    yield Variant(MadeAt("convention_in_dynamics"), make_lazily(_of_description, textbook, other), rarity=1)
+
+    # Twists with the opposite sign: all of them, or one.
+    twisted = [i for i, joint in enumerate(description.joints) if not (joint.alpha - -joint.alpha).is_zero]
+    if len(twisted) > 1:
+        wrong = _with_twists_reversed(description, twisted)
+        yield Variant(MadeAt("twist_sign_in_dynamics"), make_lazily(_of_description, textbook, wrong), "", 1)
+    for i in twisted:
+        wrong = _with_twists_reversed(description, [i])
+        made = MadeAt("twist_sign_in_dynamics", i + 1)
+        yield Variant(made, make_lazily(_of_description, textbook, wrong), f"row {i + 1}", 1)
+
+    # Lengths in millimetres, if some are numbers.
+    if any(map(_has_length_in_numbers, description.joints)):
         wrong = replace(description, joints=tuple(map(_in_millimetres, description.joints)))
         made = MadeAt("millimetres_for_metres")
         yield Variant(made, make_lazily(_of_description, textbook, wrong), rarity=1)
+
+    # The offset of a joint variable forgotten.
     for i, joint in enumerate(description.joints):
-        offset = "theta" if description.kinds[i] == "R" else "d"
-        if not getattr(joint, offset).is_zero:
-            without = replace(joint, theta=ZERO) if offset == "theta" else replace(joint, d=ZERO)
-            joints = (*description.joints[:i], without, *description.joints[i + 1 :])
-            make = make_lazily(_of_description, textbook, replace(description, joints=joints))
-            yield Variant(MadeAt("offset_in_dynamics", i + 1), make, f"q{i + 1}", 1)
+        is_revolute = description.kinds[i] == "R"
+        offset = joint.theta if is_revolute else joint.d
+        if offset.is_zero:
+            continue
+        without = replace(joint, theta=ZERO) if is_revolute else replace(joint, d=ZERO)
+        joints = (*description.joints[:i], without, *description.joints[i + 1 :])
+        make = make_lazily(_of_description, textbook, replace(description, joints=joints))
+        yield Variant(MadeAt("offset_in_dynamics", i + 1), make, f"q{i + 1}", 1)
 
 
-def _lengths(joint: Joint) -> list[Expression]:
-    """Return the lengths of a row and of its bodies' centres of mass, m."""
-    return [joint.a, joint.d, *(x for body in joint.bodies for x in body.com)]
+def _has_length_in_numbers(joint: Joint) -> bool:
+    """Whether a length of a row, or of its bodies' centres of mass, is a number other than 0."""
+    lengths = [joint.a, joint.d]
+    for body in joint.bodies:
+        lengths += body.com
+    return any(not length.symbols and not length.is_zero for length in lengths)
 
 
 def _in_millimetres(joint: Joint) -> Joint:
     """Return a row whose lengths are multiplied by a thousand; inertias stay."""
-    bodies = tuple(
-        replace(body, com=(x * _MILLIMETRES, y * _MILLIMETRES, z * _MILLIMETRES))
-        for body in joint.bodies
-        for x, y, z in [body.com]
-    )
-    return replace(joint, a=joint.a * _MILLIMETRES, d=joint.d * _MILLIMETRES, bodies=bodies)
+    bodies = []
+    for body in joint.bodies:
+        x, y, z = body.com
+        bodies.append(replace(body, com=(x * _MILLIMETRES, y * _MILLIMETRES, z * _MILLIMETRES)))
+    return replace(joint, a=joint.a * _MILLIMETRES, d=joint.d * _MILLIMETRES, bodies=tuple(bodies))
 
 
-def _with_twists_turned(description: Description, links: Collection[int]) -> Description:
-    joints = tuple(
-        replace(joint, alpha=-joint.alpha) if i in links else joint for i, joint in enumerate(description.joints)
-    )
-    return replace(description, joints=joints)
+def _with_twists_reversed(description: Description, links: Collection[int]) -> Description:
+    """Return an arm with -alpha instead of alpha in some rows, from 0."""
+    joints = list(description.joints)
+    for i in links:
+        joints[i] = replace(joints[i], alpha=-joints[i].alpha)
+    return replace(description, joints=tuple(joints))
 
 
 def _of_description(textbook: TextbookDerivation, description: Description) -> Change:
-    """Return the change of the energies to another description's; zero if its ring has other constants."""
+    """Return the change of the energies to those of another description; zero if its ring has other constants."""
     ring = textbook.arm.ring
     try:
         wrong = derive(description, symbols=textbook.arm.symbols)

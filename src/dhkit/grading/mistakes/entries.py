@@ -32,8 +32,10 @@ def slip_of(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None
     if difference is None or difference.is_zero or len(difference) > BOUNDS.compared_terms:
         return None
     arm = truth.arm(quantity.name)
-    if quantity.name in ("V", "L"):  # they count from any zero
-        difference, right = varying(difference), varying(right)
+    if quantity.name in ("V", "L"):
+        # Energies count from any zero.
+        difference = varying(difference)
+        right = varying(right)
     if quantity.name == "g" and not right and _is_weight(truth, difference):
         return Slip("weight_on_vertical_axis", plain_text(readable(arm, difference)))
     return slip_between(truth, quantity.name, right + difference, right)
@@ -43,11 +45,9 @@ def slip_between(truth: Truth, name: str, answer: Element, right: Element) -> Sl
     """Return the slip that turns the truth into an answer, in the student's own rates and angles."""
     own = truth.coordinates.in_own_rates
     slip = slip_in(truth.arm(name), own(answer), own(right))
-    return (
-        None
-        if slip is None
-        else replace(slip, detail=in_own_angles(truth, slip.detail), right=in_own_angles(truth, slip.right))
-    )
+    if slip is None:
+        return None
+    return replace(slip, detail=in_own_angles(truth, slip.detail), right=in_own_angles(truth, slip.right))
 
 
 def in_own_angles(truth: Truth, text: str) -> str:
@@ -62,17 +62,21 @@ def shown_in_own_angles(truth: Truth, quantity: str, finding: Finding) -> Findin
     coordinates = truth.coordinates
     if coordinates.is_relative:
         return finding
-    texts, witness = finding.texts, finding.witness
+    texts = finding.texts
     if finding.difference is not None:
         own = readable(truth.arm(quantity), coordinates.in_own_rates(finding.difference))
-        texts = in_own_angles(truth, plain_text(own)), ""
+        texts = (in_own_angles(truth, plain_text(own)), "")
+    witness = finding.witness
     if witness is not None:
         witness = replace(witness, state=coordinates.own_state(witness.state))
     return replace(finding, texts=texts, witness=witness)
 
 
 def slip_of_C(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | None:
-    """Return the slip in the only entry of a row of C that differs from the Christoffel factorization; else None."""
+    """Return the slip in the only entry of a row of C that differs from the Christoffel factorization.
+
+    None if several entries of the row differ, or if there is no slip.
+    """
     reader = truth.reader("C")
     right = truth.coordinates.in_y("C", truth.lagrangian.C)
     differing: list[tuple[Element, Element]] = []
@@ -87,16 +91,21 @@ def slip_of_C(truth: Truth, quantity: JudgedQuantity, index: Index) -> Slip | No
     if len(differing) != 1:
         return None
     answer, entry = differing[0]
-    names = (identity for identity, factor in FACTORS.items() if answer == entry * factor)
-    identity = next(names, None)
-    return slip_between(truth, "C", answer, entry) if identity is None or len(entry) == 1 else Slip(identity, "")
+    factors = [identity for identity, factor in FACTORS.items() if answer == entry * factor]
+    if factors and len(entry) != 1:
+        return Slip(factors[0], "")
+    return slip_between(truth, "C", answer, entry)
 
 
 def _is_weight(truth: Truth, difference: Element) -> bool:
-    """Whether a torque contains the parameter of the gravitational acceleration, if that is a parameter."""
-    names = {name for x in truth.description.gravity for name in x.symbols}
-    places = [k for k, g in enumerate(difference.ring.generators) if g.text in names]
-    return not places or all(any(monomial[k] for k in places) for monomial in difference.terms)
+    """Whether all terms of a torque contain the gravitational acceleration; True if that is not a parameter."""
+    names: set[str] = set()
+    for component in truth.description.gravity:
+        names |= component.symbols
+    places = [k for k, generator in enumerate(difference.ring.generators) if generator.text in names]
+    if not places:
+        return True
+    return all(any(monomial[k] for k in places) for monomial in difference.terms)
 
 
 def distinct(quantity: JudgedQuantity) -> list[Index]:
@@ -110,7 +119,10 @@ def distinct(quantity: JudgedQuantity) -> list[Index]:
 
 def mirrored(quantity: JudgedQuantity, index: Index) -> Diagnosis | None:
     """Return the diagnosis of an entry of M whose mirror image is right; None for other entries."""
-    if quantity.name != "M" or index[0] == index[1] or not quantity.findings[index[::-1]].verdict.passes:
+    if quantity.name != "M" or index[0] == index[1]:
+        return None
+    mirror_image = quantity.findings[index[::-1]]
+    if not mirror_image.verdict.passes:
         return None
     return diagnosis_of_slip(quantity, index, Slip("mass_matrix_not_symmetric", ""))
 
@@ -146,7 +158,7 @@ def described(truth: Truth, quantity: JudgedQuantity, index: Index) -> Diagnosis
 
 
 def compare_terms(arm: ExactArm, answer: Element, truth: Element) -> tuple[str, str]:
-    """Return in words how the terms of an answer differ from those of the truth, and what is right in their place.
+    """Return the differences of an answer's terms from those of the truth in words, and the right terms instead.
 
     Parameters
     ----------
@@ -157,29 +169,32 @@ def compare_terms(arm: ExactArm, answer: Element, truth: Element) -> tuple[str, 
     """
     # All three in the angles in which they differ least: c12 is one term, c1*c2 - s1*s2 are two.
     truth, answer, _ = shortened_alike(arm, [truth, answer, answer - truth])
-    ours = truth.terms
-    theirs = answer.terms
+    right = truth.terms
+    given = answer.terms
     ring = truth.ring
 
-    def text(terms: dict[tuple[int, ...], Fraction]) -> str:
-        return plain_text(ring.from_terms(terms))
+    def texts(terms: dict[tuple[int, ...], Fraction]) -> list[str]:
+        return [plain_text(ring.from_terms({monomial: coefficient})) for monomial, coefficient in terms.items()]
 
-    differences = {
-        "missing": [text({m: c}) for m, c in ours.items() if m not in theirs],
-        "too much": [text({m: c}) for m, c in theirs.items() if m not in ours],
-        "another factor": [text({m: theirs[m]}) for m, c in ours.items() if m in theirs and theirs[m] != c],
-    }
-    right = [text({m: c}) for m, c in ours.items() if m not in theirs or theirs[m] != c]
-    listed = {kind: _few(terms) for kind, terms in differences.items() if terms}
-    missing = differences["missing"]
-    parts = [f"{kind}: {terms}" for kind, terms in listed.items() if kind != "missing"]
+    missing = {m: c for m, c in right.items() if m not in given}
+    too_much = {m: c for m, c in given.items() if m not in right}
+    with_other_factor = {m: given[m] for m, c in right.items() if m in given and given[m] != c}
+
+    parts = []
     if missing:
-        kind = kind_of_terms(arm, ring.from_terms({m: c for m, c in ours.items() if m not in theirs}))
+        kind = kind_of_terms(arm, ring.from_terms(missing))
         count = f"{len(missing)} terms are missing" if len(missing) > 1 else "a term is missing"
-        parts.insert(0, f"{count}, with {kind}" if kind else count)
-    return "; ".join(parts) or "the terms are the same", _few(right)
+        parts.append(f"{count}, with {kind}" if kind else count)
+    if too_much:
+        parts.append(f"too much: {_few(texts(too_much))}")
+    if with_other_factor:
+        parts.append(f"another factor: {_few(texts(with_other_factor))}")
+
+    instead = {m: c for m, c in right.items() if m in missing or m in with_other_factor}
+    return "; ".join(parts) or "the terms are the same", _few(texts(instead))
 
 
 def _few(terms: Sequence[str]) -> str:
+    """Return a list of the first terms, and the number of the others."""
     more = f" and {len(terms) - _MAX_NAMED_TERMS} more" if len(terms) > _MAX_NAMED_TERMS else ""
     return ", ".join(terms[:_MAX_NAMED_TERMS]) + more

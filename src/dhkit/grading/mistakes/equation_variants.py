@@ -30,7 +30,8 @@ def equation_variants(truth: Truth) -> Iterator[Variant]:
     yield from sums_of_angles(truth.lagrangian.arm, partial(right_value, truth.lagrangian))
     yield from _other_coordinates(truth)
     yield from _zero_poses(truth)
-    yield from _friction(truth) if truth.friction else ()
+    if truth.friction:
+        yield from _friction(truth)
 
 
 def lagrangian_sum(truth: Truth) -> Variant:
@@ -38,9 +39,12 @@ def lagrangian_sum(truth: Truth) -> Variant:
     lag = truth.lagrangian
 
     def make(quantity: str) -> Elements:
+        # K + V instead of K - V: L gets 2 V, and tau, with g = dV/dq, gets -2 g.
         if quantity == "L":
             return element_array(2 * lag.V)
-        return -2 * lag.g if quantity == "tau" else nothing(lag, quantity)
+        if quantity == "tau":
+            return -2 * lag.g
+        return nothing(lag, quantity)
 
     return Variant(MadeAt("lagrangian_sum"), make)
 
@@ -76,19 +80,21 @@ def _steps(truth: Truth) -> Iterator[Variant]:
 
 
 def _mass_rate(lag: Lagrangian, momenta: Elements) -> Elements:
-    """Return dM/dt qd."""
+    """Return dM/dt qd, for the momenta p = M qd: sum over k of dp/dq_k qd_k."""
     ring = lag.arm.ring
-    return element_array([ring.sum(p.by_position(k) * ring.rate(k) for k in range(ring.n)) for p in momenta])
+    rates = [ring.sum(p.by_position(k) * ring.rate(k) for k in range(ring.n)) for p in momenta]
+    return element_array(rates)
 
 
 def _without_chain_rule(lag: Lagrangian, momenta: Elements) -> Elements:
     """Return the change of h if d/dt of cos(q) is taken for -sin(q), without the rate of q."""
     ring = lag.arm.ring
-    bare = element_array([ring.sum(p.by_position(k) for k in range(ring.n)) for p in momenta])
-    return bare - _mass_rate(lag, momenta)
+    without_rates = [ring.sum(p.by_position(k) for k in range(ring.n)) for p in momenta]
+    return element_array(without_rates) - _mass_rate(lag, momenta)
 
 
 def _velocity_change(truth: Truth, momenta: Elements, name: str) -> Make:
+    """Return the change of h by a mistake in a step of Euler and Lagrange's equation."""
     lag = truth.lagrangian
     wrong = partial(velocity_torques, lag.arm.ring, lag.K, momenta, frozenset({MadeAt(name)}))
     if name not in VELOCITY_FACTORS or truth.coordinates.is_relative:
@@ -97,7 +103,10 @@ def _velocity_change(truth: Truth, momenta: Elements, name: str) -> Make:
 
 
 def _scaled_in_y(truth: Truth, squares: bool, factor: Fraction) -> Elements:
-    """Return the change of the robot's h if products of the student's own rates have another factor."""
+    """Return the change of the robot's h if products of the student's own rates have another factor.
+
+    The torques of y are written in its rates by qd = B yd, get the factor there, and are written in qd by yd = S qd.
+    """
     ring = truth.lagrangian.arm.ring
     coordinates = truth.coordinates
     n = truth.description.n
@@ -110,7 +119,7 @@ def _scaled_in_y(truth: Truth, squares: bool, factor: Fraction) -> Elements:
 
 
 def _gravity_torques(truth: Truth) -> Iterator[Variant]:
-    """Yield gravity torques from right heights, but with the joints' own angles."""
+    """Yield gravity torques that follow from right heights, but with the joints' own angles instead of their sums."""
     textbook = derive(truth.description)
     for i in range(1, truth.description.n):
         if truth.description.kinds[i] == "R":
@@ -139,22 +148,27 @@ def _heights(truth: Truth) -> Iterator[Variant]:
     lag = truth.lagrangian
     for i in lag.arm.ring.angles:
         for sign in (-1, 1):
-            shifted = _shifted(lag, i, sign)
+            change = partial(_height_change, lag, _shifted(lag, i, sign))
+            yield Variant(MadeAt("height_sin_cos", i + 1), change, f"q{i + 1}")
 
-            def make(quantity: str, shifted: Make = shifted) -> Elements:
-                if quantity in ("V", "g"):
-                    return shifted(quantity)
-                if quantity in ("L", "tau"):
-                    return shifted("V") * -1 if quantity == "L" else shifted("g")
-                return nothing(lag, quantity)
 
-            yield Variant(MadeAt("height_sin_cos", i + 1), make, f"q{i + 1}")
+def _height_change(lag: Lagrangian, shifted: Make, quantity: str) -> Elements:
+    """Return the change of a quantity if an angle is shifted in the potential energy alone."""
+    match quantity:
+        case "V" | "g":
+            return shifted(quantity)
+        case "L":
+            return shifted("V") * -1
+        case "tau":
+            return shifted("g")
+    return nothing(lag, quantity)
 
 
 # Mistakes with right matrices
 
 
 def _matrices(truth: Truth) -> Iterator[Variant]:
+    """Yield mistakes in the order of entries: of C transposed, of rates, of equations."""
     lag = truth.lagrangian
     n = truth.description.n
     rates = element_array([lag.arm.ring.rate(i) for i in range(n)])
@@ -178,12 +192,15 @@ def _motor_torques(truth: Truth) -> Make:
 
 
 def _equations_exchanged(lag: Lagrangian, i: int, j: int) -> Make:
+    """Return the change if the equations of joints i and j, from 0, are exchanged."""
+
     def make(quantity: str) -> Elements:
         value = right_value(lag, quantity)
         if not value.ndim:
             return nothing(lag, quantity)
         order = list(range(lag.n))
-        order[i], order[j] = j, i
+        order[i] = j
+        order[j] = i
         return value[order] - value
 
     return make
@@ -192,15 +209,17 @@ def _equations_exchanged(lag: Lagrangian, i: int, j: int) -> Make:
 def _rates_exchanged(lag: Lagrangian, i: int, j: int) -> Make:
     """Return the change if the squares of two rates are exchanged in h."""
     ring = lag.arm.ring
-    a, b = ring.place("rate", i), ring.place("rate", j)
+    rate_i = ring.place("rate", i)
+    rate_j = ring.place("rate", j)
 
     def exchange(torque: Element) -> Element:
         terms: dict[tuple[int, ...], Fraction] = {}
         for monomial, coefficient in torque.terms.items():
-            powers = list(monomial)
-            if max(powers[a], powers[b]) == 2:
-                powers[a], powers[b] = powers[b], powers[a]
-            terms[tuple(powers)] = terms.get(tuple(powers), Fraction(0)) + coefficient
+            exponents = list(monomial)
+            if max(exponents[rate_i], exponents[rate_j]) == 2:
+                exponents[rate_i], exponents[rate_j] = exponents[rate_j], exponents[rate_i]
+            term = tuple(exponents)
+            terms[term] = terms.get(term, Fraction(0)) + coefficient
         return ring.from_terms(terms)
 
     return changed_only(lag, "h", lambda: element_array([exchange(x) for x in lag.h]) - lag.h)
@@ -233,19 +252,21 @@ def _declared(truth: Truth, meant: Coordinates, matrix: Elements, quantity: str)
     answer = element_array(meant.in_y(quantity, right_value(lag, quantity)))
     places: dict[int, Element] = {}
     for i in range(n):
+        # Variable i is read as the sum over j of (matrix_ij times the robot's variable j).
+        weights = {j: int(matrix[i, j]) for j in range(n) if matrix[i, j]}
         for kind, generator in (("rate", ring.rate), ("acceleration", ring.acceleration)):
-            places[ring.place(kind, i)] = ring.sum(generator(j) * int(matrix[i, j]) for j in range(n) if matrix[i, j])
+            places[ring.place(kind, i)] = ring.sum(generator(j) * weight for j, weight in weights.items())
         if i in ring.angles:
-            multiples = [multiple_angle(ring, j, int(matrix[i, j])) for j in range(n) if matrix[i, j]]
-            c, s = sum_of_angles(ring, multiples)
-            places |= {ring.place("cosine", i): c, ring.place("sine", i): s}
+            cosine, sine = sum_of_angles(ring, [multiple_angle(ring, j, weight) for j, weight in weights.items()])
+            places[ring.place("cosine", i)] = cosine
+            places[ring.place("sine", i)] = sine
     wrong = translated_array(answer, places)
-    change = element_array(wrong - element_array(truth.coordinates.in_y(quantity, right_value(lag, quantity))))
-    return _in_robot_variables(truth.coordinates, quantity, change)
+    right = element_array(truth.coordinates.in_y(quantity, right_value(lag, quantity)))
+    return _in_robot_variables(truth.coordinates, quantity, element_array(wrong - right))
 
 
 def _in_robot_variables(coordinates: Coordinates, quantity: str, change: Elements) -> Elements:
-    """Return a change in the declared coordinates in the robot's own."""
+    """Return a change in the declared coordinates y = S q in the robot's own: S^T M S, S^T tau."""
     if coordinates.is_relative or quantity not in DYNAMICS:
         return change
     if quantity in ("M", "C"):
@@ -262,6 +283,10 @@ def _zero_poses(truth: Truth) -> Iterator[Variant]:
 
 
 def _shifted(lag: Lagrangian, i: int, sign: int) -> Make:
+    """Return the change if an angle q is shifted by a quarter turn.
+
+    With the sign e: cos(q + e pi/2) = -e sin(q), sin(q + e pi/2) = e cos(q).
+    """
     ring = lag.arm.ring
     turned = {ring.place("cosine", i): ring.sine(i) * -sign, ring.place("sine", i): ring.cosine(i) * sign}
     return lambda quantity: translated_array(right_value(lag, quantity), turned) - right_value(lag, quantity)
@@ -271,10 +296,13 @@ def _shifted(lag: Lagrangian, i: int, sign: int) -> Make:
 
 
 def _friction(truth: Truth) -> Iterator[Variant]:
+    """Yield mistakes with the viscous friction of the drives, r^2 B qd for gear ratios r."""
     lag = truth.lagrangian
     arm = lag.arm
     yield Variant(MadeAt("friction_forgotten"), changed_only(lag, "tau", lambda: truth.viscous * -1))
     yield Variant(MadeAt("friction_sign"), changed_only(lag, "tau", lambda: truth.viscous * -2))
+
+    # B qd or r B qd instead.
     for power in (0, 1):
         torques = element_array([arm.gear[i] ** power * arm.viscous[i] * arm.ring.rate(i) for i in range(arm.n)])
         change = partial(np.subtract, torques, truth.viscous)

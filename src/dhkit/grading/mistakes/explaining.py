@@ -35,6 +35,7 @@ _PARTS = {
     "K": "in the kinetic energy",
     "V": "in the potential energy",
 }
+"""Parts of tau and of L in words, by the quantities to which they belong."""
 _MAX_ENTRIES_ALONE = 2
 """Largest number of entries of which a sentence says that the mistake was made in them alone."""
 _MAX_LIKELY_RARITY = 1
@@ -58,15 +59,21 @@ def explain(
     judged
         Quantities by name.
     digits
-        Significant digits from which a decimal may have been rounded.
+        Number of significant digits from which a decimal may have been rounded.
     follows
-        By quantity: wrong entries that follow from other wrong answers of the sheet, and are right in themselves.
+        Wrong entries of each quantity that follow from other wrong answers of the sheet, and are right in themselves.
     """
     left = {name: quantity for name, quantity in judged.items() if quantity.wrong}
     diagnoses: list[Diagnosis] = []
-    following = {
-        name for name in left if all(index in (follows or {}).get(name, {}) for index in left[name].wrong_indices)
-    }
+
+    # Quantities whose wrong entries all follow from other wrong answers.
+    following: set[str] = set()
+    for name, quantity in left.items():
+        explained_entries = (follows or {}).get(name, {})
+        if all(index in explained_entries for index in quantity.wrong_indices):
+            following.add(name)
+
+    # Mistakes that the answer shows by itself.
     _move(left, diagnoses, plain_causes.in_degrees(truth, left))
     _move(left, diagnoses, plain_causes.with_inverted_gears(truth, left))
     diagnoses += plain_causes.weights_on_vertical_axes(truth, left, following)
@@ -74,13 +81,17 @@ def explain(
     _move(left, diagnoses, plain_causes.zeros(truth, left, following))
     _move(left, diagnoses, plain_causes.without_rates(left, following))
     _move(left, diagnoses, plain_causes.in_other_units(truth, left))
-    # A mistake that explains only answers which follow from wrong ones is not the sheet's first error.
-    for allowed in (lambda names, rarity: rarity <= _MAX_LIKELY_RARITY, lambda names, rarity: len(names) > 1):
+
+    # Single mistakes that explain whole quantities: first likely ones, then those that explain several quantities. One
+    # that explains only answers which follow from wrong ones is not the sheet's first error.
+    for allowed in (_is_likely, _explains_several):
         single = _single(truth, judged, left, allowed)
         _move(left, diagnoses, {names: one for names, one in single.items() if not following.issuperset(names)})
     _move(left, diagnoses, _nearly(truth, left, digits))
     for name in following & left.keys():
         del left[name]
+
+    # Quantities one by one, then entries one by one.
     for explained in (plain_causes.too_few_digits, _slips, _rare, _whole_factor, _parts, _pair):
         for name, quantity in list(left.items()):
             own = explained(truth, judged, quantity)
@@ -95,10 +106,23 @@ def explain(
 def _move(
     left: dict[str, JudgedQuantity], diagnoses: list[Diagnosis], explained: Mapping[tuple[str, ...], Diagnosis]
 ) -> None:
+    """Append diagnoses, and remove the quantities that they explain, by whose names they are, from ``left``."""
     for names, diagnosis in explained.items():
         diagnoses.append(diagnosis)
         for name in names:
             left.pop(name, None)
+
+
+def _is_likely(names: tuple[str, ...], rarity: int) -> bool:
+    return rarity <= _MAX_LIKELY_RARITY
+
+
+def _is_rare(names: tuple[str, ...], rarity: int) -> bool:
+    return rarity > _MAX_LIKELY_RARITY
+
+
+def _explains_several(names: tuple[str, ...], rarity: int) -> bool:
+    return len(names) > 1
 
 
 # Mistakes that explain whole quantities
@@ -110,19 +134,23 @@ def _single(
     wrong: Mapping[str, JudgedQuantity],
     allowed: Callable[[tuple[str, ...], int], bool],
 ) -> dict[tuple[str, ...], Diagnosis]:
-    """Find mistakes that explain whole quantities, as many as possible each, and that no right answer contradicts."""
+    """Return the diagnoses of mistakes that explain whole quantities, as many as possible each, by their names.
+
+    No right answer contradicts these mistakes; ``allowed`` says of the names of quantities and the rarity of a mistake
+    whether it is returned.
+    """
     candidates: dict[str, list[Variant]] = {}
     for name, quantity in wrong.items():
         differences = quantity.differences
         if differences:
             whole = tables_of(truth, quantity).whole(name, differences)
             candidates[name] = [variant for variant in whole if not _contradicted(truth, judged, variant)]
-    ranked = _fewest(candidates)
-    return {
-        names: diagnosis_of(variants, [wrong[name] for name in names])
-        for names, variants in ranked.items()
-        if allowed(names, variants[0].rarity)
-    }
+
+    diagnoses: dict[tuple[str, ...], Diagnosis] = {}
+    for names, variants in _fewest(candidates).items():
+        if allowed(names, variants[0].rarity):
+            diagnoses[names] = diagnosis_of(variants, [wrong[name] for name in names])
+    return diagnoses
 
 
 def _contradicted(truth: Truth, judged: Mapping[str, JudgedQuantity], variant: Variant) -> bool:
@@ -139,11 +167,12 @@ def _contradicted(truth: Truth, judged: Mapping[str, JudgedQuantity], variant: V
 def _fewest(candidates: Mapping[Any, list[Variant]]) -> dict[tuple[Any, ...], list[Variant]]:
     """Return a small set of mistakes that explains as much as possible, chosen greedily.
 
-    By the names that it explains, each mistake comes first in the list of those that explain the same.
+    Each mistake is the first in a list of those that explain the same names, which are the key of the list.
     """
     left = dict(candidates)
-    chosen = dict[tuple[Any, ...], list[Variant]]()
+    chosen: dict[tuple[Any, ...], list[Variant]] = {}
     while any(left.values()):
+        # Names that each mistake explains, and the mistake itself, by its identity and place.
         explains: dict[tuple[str, str], list[Any]] = {}
         listed: dict[tuple[str, str], Variant] = {}
         for name, variants in left.items():
@@ -153,7 +182,10 @@ def _fewest(candidates: Mapping[Any, list[Variant]]) -> dict[tuple[Any, ...], li
                 if name not in explained:  # a mistake may be made in several ways
                     explained.append(name)
                 listed.setdefault(key, variant)
-        ranked = sorted(listed, key=lambda key: (-len(explains[key]), listed[key].rarity))
+
+        # Most names first, then the more frequent mistake.
+        rank = {key: (-len(explains[key]), variant.rarity) for key, variant in listed.items()}
+        ranked = sorted(listed, key=rank.__getitem__)
         names = explains[ranked[0]]
         chosen[tuple(names)] = [listed[key] for key in ranked if explains[key] == names]
         left = {name: variants for name, variants in left.items() if name not in names}
@@ -161,13 +193,13 @@ def _fewest(candidates: Mapping[Any, list[Variant]]) -> dict[tuple[Any, ...], li
 
 
 def _nearly(truth: Truth, wrong: Mapping[str, JudgedQuantity], digits: int) -> dict[tuple[str, ...], Diagnosis]:
-    """Find mistakes that explain quotients, and answers that have rounded decimals too."""
+    """Return the diagnoses of mistakes that explain quotients, and answers with rounded decimals, by quantities."""
     diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     for name, quantity in wrong.items():
-        there = [entry for entry in quantity.given if entry.tree is not None]
-        in_ring = all(quantity.findings[entry.index].answer is not None for entry in there)
-        rounded = any(entry.tree is not None and has_decimals(entry.tree, digits) for entry in there)
-        if name in ("C", "V", "L") or not in_ring or not (rounded or quantity.differences is None):
+        given = [entry for entry in quantity.given if entry.tree is not None]
+        is_in_ring = all(quantity.findings[entry.index].answer is not None for entry in given)
+        is_rounded = any(entry.tree is not None and has_decimals(entry.tree, digits) for entry in given)
+        if name in ("C", "V", "L") or not is_in_ring or not (is_rounded or quantity.differences is None):
             continue
         by = Comparison(truth.arm(name), truth.reader(name), digits)
         likely = tables_of(truth, quantity).near(name, quantity.truth, _numbers(truth, quantity))
@@ -198,19 +230,20 @@ def _explains_answer(truth: Truth, variant: Variant, quantity: JudgedQuantity, b
 
 
 def _slips(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
-    """Find one slip in a term of each wrong entry; nothing if an entry has none."""
+    """Return the diagnoses of one slip in a term of each wrong entry; none if an entry has no slip."""
+    slip_of = entries.slip_of_C if quantity.name == "C" else entries.slip_of
     diagnoses: list[Diagnosis] = []
     for index in entries.distinct(quantity):
-        slip = (
-            entries.slip_of_C(truth, quantity, index)
-            if quantity.name == "C"
-            else entries.slip_of(truth, quantity, index)
-        )
+        slip = slip_of(truth, quantity, index)
         if slip is None or entries.mirrored(quantity, index) or entries.whole_factor(quantity, index):
             return []
         diagnoses.append(diagnosis_of_slip(quantity, index, slip))
-    if len({one.sentence for one in diagnoses}) > 1 and (rare := _rare(truth, judged, quantity)):
-        return rare
+
+    # One rare mistake is likelier than several different slips.
+    if len({one.sentence for one in diagnoses}) > 1:
+        rare = _rare(truth, judged, quantity)
+        if rare:
+            return rare
     return [replace(one, equivalent=plain_causes.equivalent(truth, quantity)) for one in diagnoses]
 
 
@@ -218,18 +251,21 @@ def _slips(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQ
 
 
 def _rare(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
-    """Find single mistakes that are possible, but rare."""
-    return list(
-        _single(truth, judged, {quantity.name: quantity}, lambda names, rarity: rarity > _MAX_LIKELY_RARITY).values()
-    )
+    """Return the diagnoses of single mistakes that are possible, but rare."""
+    found = _single(truth, judged, {quantity.name: quantity}, _is_rare)
+    return list(found.values())
 
 
 def _whole_factor(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
-    """Find a factor that all entries, all of them wrong, share."""
+    """Return the diagnoses of a factor that all wrong entries share; none if they share none."""
     wrong = entries.distinct(quantity)
     if any(entries.mirrored(quantity, index) for index in wrong):
         return []
-    factors = [one for index in wrong if (one := entries.whole_factor(quantity, index)) is not None]
+    factors: list[Diagnosis] = []
+    for index in wrong:
+        factor = entries.whole_factor(quantity, index)
+        if factor is not None:
+            factors.append(factor)
     is_shared = len(factors) == len(wrong) and len({one.mistake for one in factors}) == 1
     return factors if is_shared else []
 
@@ -241,23 +277,24 @@ def _parts(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQ
         return []
     tables = tables_of(truth, quantity)
     split = _split_in_parts(truth, quantity.name, differences)
-    parts = {part: whole for part, whole in split.items() if not all(x.is_zero for x in whole.values())}
-    right = {part: whole for part, whole in split.items() if part not in parts}
+    wrong = {part: whole for part, whole in split.items() if not all(x.is_zero for x in whole.values())}
+    right = {part: whole for part, whole in split.items() if part not in wrong}
 
-    def leaves_the_rest(variant: Variant) -> int:
-        return sum(not tables.changes_none(variant, part, list(whole)) for part, whole in right.items())
+    def leaves_right_parts(variant: Variant) -> bool:
+        unchanged = [tables.changes_none(variant, part, list(whole)) for part, whole in right.items()]
+        return all(unchanged)
 
-    candidates = {
-        part: [variant for variant in tables.whole(part, whole) if not leaves_the_rest(variant)]
-        for part, whole in parts.items()
-    }
+    candidates: dict[str, list[Variant]] = {}
+    for part, whole in wrong.items():
+        candidates[part] = [variant for variant in tables.whole(part, whole) if leaves_right_parts(variant)]
     explained = _fewest(candidates)
     diagnoses = [diagnosis_of(variants, [quantity]) for variants in explained.values()]
-    left = [part for part in parts if not any(part in names for names in explained)]
-    if not diagnoses and len(parts) == len(split):
+    if not diagnoses and not right:
         return []
-    for part in left:
-        diagnoses += _part_entries(truth, quantity, part, parts[part])
+
+    for part, whole in wrong.items():
+        if not any(part in names for names in explained):
+            diagnoses += _part_entries(truth, quantity, part, whole)
     return diagnoses
 
 
@@ -281,7 +318,7 @@ def _part_entries(truth: Truth, quantity: JudgedQuantity, part: str, whole: Diff
 
 
 def _pair(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
-    """Find two mistakes of a derivation that together explain a quantity."""
+    """Return the diagnoses of two mistakes of a derivation that together explain a quantity; none if no two do."""
     differences = quantity.differences
     terms = sum(map(len, differences.values())) if differences else 0
     if not differences or not _MIN_PAIR_TERMS <= terms <= BOUNDS.pair_terms:
@@ -293,7 +330,7 @@ def _pair(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQu
 
 
 def _split_in_parts(truth: Truth, name: str, differences: Differences) -> Mapping[str, Differences]:
-    """Split the differences of tau or L by the factors of their terms: accelerations, products of rates, or neither.
+    """Return the differences of tau or L, split by the factors of terms: accelerations, products of rates, or neither.
 
     Parts of tau are M, whose entries are the coefficients of accelerations, h and g; parts of L are K and V.
     """
@@ -301,15 +338,20 @@ def _split_in_parts(truth: Truth, name: str, differences: Differences) -> Mappin
     n = ring.n
     accelerations = [ring.place("acceleration", i) for i in range(n)]
     rates = [ring.place("rate", i) for i in range(n)]
-    parts: dict[str, dict[Index, Element]] = {"M": {}, "h": {}, "g": {}} if name == "tau" else {"K": {}, "V": {}}
+    names = ("M", "h", "g") if name == "tau" else ("K", "V")
+    parts: dict[str, dict[Index, Element]] = {part: {} for part in names}
     for index, element in differences.items():
         moving = {m: c for m, c in element.terms.items() if any(m[k] for k in rates)}
         resting = {m: c for m, c in element.terms.items() if not any(m[k] for k in (*rates, *accelerations))}
         if name == "L":
+            # L = K - V
             parts["K"][index] = ring.from_terms(moving)
             parts["V"][index] = -ring.from_terms(resting)
             continue
-        parts["h"][index], parts["g"][index] = ring.from_terms(moving), ring.from_terms(resting)
+
+        # tau_i = sum over j of M_ij ydd_j + h_i + g_i, where qdd = B ydd
+        parts["h"][index] = ring.from_terms(moving)
+        parts["g"][index] = ring.from_terms(resting)
         by_joint = [_coefficient(element, k) for k in accelerations]
         for j in range(n):
             parts["M"][*index, j] = ring.sum(by_joint[k] * int(truth.coordinates.B[k, j]) for k in range(n))
@@ -317,7 +359,7 @@ def _split_in_parts(truth: Truth, name: str, differences: Differences) -> Mappin
 
 
 def _coefficient(element: Element, place: int) -> Element:
-    """Return the coefficient of an acceleration."""
+    """Return the coefficient of the acceleration at a place of the ring's generators."""
     terms = {(*m[:place], 0, *m[place + 1 :]): c for m, c in element.terms.items() if m[place] == 1}
     return element.ring.from_terms(terms)
 
@@ -340,14 +382,16 @@ def _entries(truth: Truth, quantity: JudgedQuantity) -> list[Diagnosis]:
         else:
             tables = tables_of(truth, quantity)
             candidates[index] = tables.entry(quantity.name, index, difference) if difference is not None else []
+
     # A single entry proves little: many entries of transforms look alike, and so do those of a confused answer.
     certain = quantity.name in DYNAMICS and all(candidates.values())
     for indices, variants in _fewest(candidates).items():
         if len(indices) == 1 and not certain:
             continue
         diagnosis = diagnosis_of(variants, [quantity], indices)
-        few = len(diagnosis.entries) <= _MAX_ENTRIES_ALONE
-        alone = f"{diagnosis.sentence[:-1]}, in {' and '.join(diagnosis.entries)} alone."
-        diagnoses.append(replace(diagnosis, sentence=alone) if few else diagnosis)
-        candidates = {index: v for index, v in candidates.items() if index not in indices}
+        if len(diagnosis.entries) <= _MAX_ENTRIES_ALONE:
+            alone = f"{diagnosis.sentence[:-1]}, in {' and '.join(diagnosis.entries)} alone."
+            diagnosis = replace(diagnosis, sentence=alone)
+        diagnoses.append(diagnosis)
+        candidates = {index: found for index, found in candidates.items() if index not in indices}
     return diagnoses + [entries.described(truth, quantity, index) for index in candidates]

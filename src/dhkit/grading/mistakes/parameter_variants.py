@@ -25,27 +25,35 @@ def parameter_variants(truth: Truth) -> Iterator[Variant]:
     yield from _factors(truth, symbols, kinds)
     yield from _tilts(truth)
     yield from _units(truth, [name for name in symbols if kinds.get(name) == "length"])
+
     alike = [pair for pair in combinations(symbols, 2) if _are_alike(*pair, kinds)]
     for first, second in alike:
         swapped = {first: ring.constant(second), second: ring.constant(first)}
         place = f"{first} and {second}"
         yield Variant(MadeAt("parameters_exchanged"), _replaced(truth, swapped), place, 1)
     for first, second in permutations(symbols, 2):
-        if (first, second) in alike or (second, first) in alike:
-            made = MadeAt("parameter_for_another")
-            yield Variant(made, _replaced(truth, {first: ring.constant(second)}), f"{second} for {first}", 1)
-            if kinds.get(first) == "length" and first in kinds and lag.n <= BOUNDS.half_length_joints:
-                half = ring.constant(second) * Fraction(1, 2)
-                yield Variant(made, _replaced(truth, {first: half}), f"{second}/2 for {first}", 1)
-                yield Variant(made, _replaced(truth, {first: ring.constant(second) * 2}), f"2*{second} for {first}", 2)
+        if (first, second) not in alike and (second, first) not in alike:
+            continue
+        made = MadeAt("parameter_for_another")
+        other = ring.constant(second)
+        yield Variant(made, _replaced(truth, {first: other}), f"{second} for {first}", 1)
+        if kinds.get(first) == "length" and lag.n <= BOUNDS.half_length_joints:
+            half = other * Fraction(1, 2)
+            yield Variant(made, _replaced(truth, {first: half}), f"{second}/2 for {first}", 1)
+            yield Variant(made, _replaced(truth, {first: other * 2}), f"2*{second} for {first}", 2)
     for i, j in combinations(range(1, truth.description.n + 1), 2):
-        pairs = [(x, y) for x in symbols for y in symbols if _swaps(x, y, i, j)]
+        # l1 and l2, m1 and m2 ... of links 1 and 2.
+        pairs = [(x, y) for x, y in permutations(symbols, 2) if _are_of_links(x, y, i, j)]
         if len(pairs) > 1:
-            swapped = {a: ring.constant(b) for x, y in pairs for a, b in ((x, y), (y, x))}
+            swapped = {}
+            for x, y in pairs:
+                swapped[x] = ring.constant(y)
+                swapped[y] = ring.constant(x)
             yield Variant(MadeAt("links_exchanged"), _replaced(truth, swapped), f"links {i} and {j}", 1)
 
 
 def _factors(truth: Truth, symbols: list[str], kinds: Mapping[str, str]) -> Iterator[Variant]:
+    """Yield mistakes by which a parameter has another factor: it is forgotten, doubled, halved, has another sign."""
     ring = truth.lagrangian.arm.ring
     for identity, factor in PARAMETER_FACTORS.items():
         for name in symbols:
@@ -55,19 +63,23 @@ def _factors(truth: Truth, symbols: list[str], kinds: Mapping[str, str]) -> Iter
 
 
 def _units(truth: Truth, lengths: list[str]) -> Iterator[Variant]:
+    """Yield mistakes by which all lengths, or one of them, are in another unit."""
     ring = truth.lagrangian.arm.ring
     groups = [lengths] if len(lengths) > 1 else []
+    groups += [[name] for name in lengths]
     for identity, factor in UNITS.items():
-        for names in (*groups, *([name] for name in lengths)):
+        for names in groups:
             values = {name: ring.constant(name) * factor for name in names}
-            yield Variant(MadeAt(identity), _replaced(truth, values), names[0] if len(names) == 1 else "", 2)
+            place = names[0] if len(names) == 1 else ""
+            yield Variant(MadeAt(identity), _replaced(truth, values), place, 2)
 
 
 def _tilts(truth: Truth) -> Iterator[Variant]:
     """Yield mistakes with constant angles: forgotten, wrong sign, sine and cosine exchanged."""
     ring = truth.lagrangian.arm.ring
     for cosine in ring.constants:
-        if not cosine.startswith("cos(") or (sine := f"sin{cosine[3:]}") not in ring.constants:
+        sine = f"sin{cosine[3:]}"
+        if not cosine.startswith("cos(") or sine not in ring.constants:
             continue
         c = ring.constant(cosine)
         s = ring.constant(sine)
@@ -103,11 +115,12 @@ def _kinds(description: Description) -> dict[str, str]:
         note("length", joint.a, joint.d)
     note("rotor", *(coupling.inertia for coupling in description.couplings))
     note("length", *description.tool.placement.xyz)
-    bodies = [body for joint in description.joints for body in joint.bodies]
-    for body in bodies:
-        note("length", *body.com)
-    for body in bodies:
-        note("inertia", *(getattr(body.inertia, key) for key in INERTIA_PLACES))
+    for joint in description.joints:
+        for body in joint.bodies:
+            note("length", *body.com)
+    for joint in description.joints:
+        for body in joint.bodies:
+            note("inertia", *(getattr(body.inertia, key) for key in INERTIA_PLACES))
     return kinds
 
 
@@ -116,12 +129,14 @@ def _are_alike(first: str, second: str, kinds: Mapping[str, str]) -> bool:
     return kinds.get(first, first) == kinds.get(second, second) or _letters(first) == _letters(second)
 
 
-def _swaps(first: str, second: str, i: int, j: int) -> bool:
+def _are_of_links(first: str, second: str, i: int, j: int) -> bool:
+    """Whether two parameters are the same one of links i and j, from 1: l1 and l2."""
     letters = _letters(first)
     return bool(letters) and first == f"{letters}{i}" and second == f"{letters}{j}"
 
 
 def _letters(name: str) -> str:
+    """Return a name without the number at its end."""
     return name.rstrip("0123456789")
 
 
@@ -129,17 +144,22 @@ def _replaced(truth: Truth, values: Mapping[str, Element]) -> Make:
     """Return the change if parameters are replaced; zero for quantities with constants that are made of them."""
     ring = truth.lagrangian.arm.ring
     places = {ring.place("constant", name): value for name, value in values.items()}
+
+    # Constants such as sin(alpha) that contain a replaced parameter.
     dependent = [
         ring.place("constant", constant.text)
         for constant in ring.given
         if constant.text not in values and not constant.symbols.isdisjoint(values)
     ]
 
+    def depends(element: Element) -> bool:
+        return any(any(monomial[k] for k in dependent) for monomial in element.terms)
+
     def make(quantity: str) -> Elements:
         whole = right_value(truth.lagrangian, quantity)
         if quantity == "tau" and truth.friction:
             whole = whole + truth.viscous
-        if any(term[k] for k in dependent for element in whole.flat for term in element.terms):
+        if dependent and any(map(depends, whole.flat)):
             return whole * 0
         return translated_array(whole, places) - whole
 

@@ -26,16 +26,17 @@ from dhkit.grading.report import Diagnosis, Verdict
 from dhkit.symbolic.ring import Elements
 
 _DEGREE_FACTORS = (Fraction(1, 180), Fraction(180))
-"""Factors, besides pi and 1/pi, of angles that are confused with degrees."""
+"""Factors, besides pi and 1/pi, of angles in which degrees and radians are confused."""
 _ZEROS = {"h": "velocity_torques_missing", "C": "velocity_torques_missing", "g": "gravity_torques_missing"}
-"""By quantity: the mistake if all its entries are zero."""
+"""Mistake if all entries of a quantity are zero, by the quantity; ``entry_zero`` for others."""
 _RATE = re.compile(r"qd\d+")
+"""Names of rates."""
 _MIN_DIGITS = 2
 """Smallest number of significant digits of decimals that count as too short rather than wrong."""
 
 
 def in_degrees(truth: Truth, wrong: Mapping[str, JudgedQuantity]) -> dict[tuple[str, ...], Diagnosis]:
-    """Find quantities that are right if factors pi/180 or 180/pi are taken off their angles."""
+    """Return the diagnoses of quantities that are right without the factors pi/180 or 180/pi of their angles."""
     diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     for name, quantity in wrong.items():
         readers = [RingReader(truth.arm(name).ring, angle_factor=factor) for factor in _DEGREE_FACTORS]
@@ -49,9 +50,11 @@ def _is_right(quantity: JudgedQuantity, reader: RingReader, change: Callable[[Tr
     for entry in quantity.given:
         if quantity.findings[entry.index].verdict is not Verdict.WRONG:
             continue
+        if entry.tree is None:
+            return False
         try:
-            right = quantity.right(entry.index)
-            if entry.tree is None or not reader.read(change(entry.tree)).numerator_of_difference(right).is_zero:
+            answer = reader.read(change(entry.tree))
+            if not answer.numerator_of_difference(quantity.right(entry.index)).is_zero:
                 return False
         except (OutsideTheRingError, AnswerError):
             return False
@@ -59,17 +62,25 @@ def _is_right(quantity: JudgedQuantity, reader: RingReader, change: Callable[[Tr
 
 
 def with_inverted_gears(truth: Truth, wrong: Mapping[str, JudgedQuantity]) -> dict[tuple[str, ...], Diagnosis]:
-    """Find quantities that are right if gear ratios are inverted in them; for ratios in numbers there are variants."""
-    gears = {name for joint in truth.description.joints if joint.drive for name in joint.drive.gear.symbols}
+    """Return the diagnoses of quantities that are right if the gear ratios in them are inverted.
+
+    They are ratios in letters; for ratios in numbers there are variants.
+    """
+    gears: set[str] = set()
+    for joint in truth.description.joints:
+        if joint.drive:
+            gears |= joint.drive.gear.symbols
+    if not gears:
+        return {}
+
     one = Number(Fraction(1), "1", 0)
-    inverse: dict[str, Tree] = {name: Product(((True, one), (False, Name(name, 0)))) for name in gears}
-    return {
-        (name,): diagnosis_of_whole(quantity, "gear_inverted")
-        for name, quantity in wrong.items()
-        if gears
-        and name in ("M", "K", "tau")
-        and _is_right(quantity, RingReader(truth.arm(name).ring), partial(renamed, change=inverse))
-    }
+    inverses: dict[str, Tree] = {name: Product(((True, one), (False, Name(name, 0)))) for name in gears}
+    invert = partial(renamed, change=inverses)
+    diagnoses: dict[tuple[str, ...], Diagnosis] = {}
+    for name, quantity in wrong.items():
+        if name in ("M", "K", "tau") and _is_right(quantity, RingReader(truth.arm(name).ring), invert):
+            diagnoses[(name,)] = diagnosis_of_whole(quantity, "gear_inverted")
+    return diagnoses
 
 
 def weights_on_vertical_axes(truth: Truth, left: dict[str, JudgedQuantity], following: set[str]) -> list[Diagnosis]:
@@ -77,12 +88,14 @@ def weights_on_vertical_axes(truth: Truth, left: dict[str, JudgedQuantity], foll
     g = left.get("g")
     if g is None or "g" in following or any(g.right(index) for index in g.wrong_indices):
         return []
-    slips = {index: slip_of(truth, g, index) for index in g.wrong_indices}
-    if any(slip is None or slip.identity != "weight_on_vertical_axis" for slip in slips.values()):
+    slips = [slip_of(truth, g, index) for index in g.wrong_indices]
+    weights = [slip for slip in slips if slip is not None and slip.identity == "weight_on_vertical_axis"]
+    if len(weights) < len(slips):
         return []
     del left["g"]
     alike = equivalent(truth, g)
-    return [replace(diagnosis_of_slip(g, i, slip), equivalent=alike) for i, slip in slips.items() if slip is not None]
+    pairs = zip(g.wrong_indices, weights, strict=True)
+    return [replace(diagnosis_of_slip(g, index, slip), equivalent=alike) for index, slip in pairs]
 
 
 def one_entry_of_C(truth: Truth, left: dict[str, JudgedQuantity], following: set[str]) -> list[Diagnosis]:
@@ -99,7 +112,7 @@ def one_entry_of_C(truth: Truth, left: dict[str, JudgedQuantity], following: set
 
 
 def zeros(truth: Truth, left: Mapping[str, JudgedQuantity], following: set[str]) -> dict[tuple[str, ...], Diagnosis]:
-    """Find quantities that were handed in as zero."""
+    """Return the diagnoses of quantities that were handed in as zero."""
     diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     for name, quantity in left.items():
         wrong = quantity.wrong_indices
@@ -111,25 +124,27 @@ def zeros(truth: Truth, left: Mapping[str, JudgedQuantity], following: set[str])
 
 
 def without_rates(left: Mapping[str, JudgedQuantity], following: set[str]) -> dict[tuple[str, ...], Diagnosis]:
-    """Find C and h without any rate, which are not zero."""
+    """Return the diagnoses of C and h if they are not zero and contain no rate."""
     diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     for name in ("C", "h"):
         quantity = left.get(name)
         if quantity is None or name in following or quantity.is_zero:
             continue
         trees = [entry.tree for entry in quantity.given if entry.tree is not None]
-        if trees and not any(_RATE.fullmatch(text) for tree in trees for text in names_of(tree)):
+        names = set().union(*map(names_of, trees))
+        if trees and not any(map(_RATE.fullmatch, names)):
             diagnoses[(name,)] = diagnosis_of_whole(quantity, "rates_missing")
     return diagnoses
 
 
 def in_other_units(truth: Truth, left: Mapping[str, JudgedQuantity]) -> dict[tuple[str, ...], Diagnosis]:
-    """Find quantities with lengths as numbers in another unit; other parameters may be symbols."""
+    """Return the diagnoses of quantities with lengths as numbers in another unit; other parameters may be symbols."""
     diagnoses: dict[tuple[str, ...], Diagnosis] = {}
     lengths = lengths_of(truth.description)
     for name, quantity in left.items():
-        there = [entry.tree for entry in quantity.given if entry.tree is not None]
-        absent = [p for p in lengths if not any(p in names_of(tree) for tree in there)]
+        trees = [entry.tree for entry in quantity.given if entry.tree is not None]
+        names = set().union(*map(names_of, trees))
+        absent = [parameter for parameter in lengths if parameter not in names]
         ring = truth.arm(name).ring
         if name not in DYNAMICS or name == "C" or not absent or not set(absent) <= set(ring.constants):
             continue
@@ -149,7 +164,7 @@ def _has_answers(quantity: JudgedQuantity, expected: Elements) -> bool:
 
 
 def too_few_digits(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQuantity) -> list[Diagnosis]:
-    """Find decimals that would be right within rounding if fewer digits were enough."""
+    """Return the diagnosis of decimals that would be right within rounding if fewer digits were enough."""
     name = quantity.name
     if name in ("C", "V", "L"):
         return []

@@ -17,7 +17,7 @@ from dhkit.symbolic.mistakes import MadeAt
 from dhkit.symbolic.ring import Element, Elements, Ring, translated
 
 _Formula = Callable[[Element, Element, Element, Element], tuple[Element, Element]]
-"""Returns cosine and sine of a + b from cosine and sine of a, and of b."""
+"""Function that returns cosine and sine of a + b from cosine c and sine s of a, and cosine x and sine y of b."""
 
 _FORMULAS: tuple[tuple[str, _Formula], ...] = (
     ("sum_of_angles_split", lambda c, s, x, y: (c + x, s + y)),
@@ -29,9 +29,11 @@ _FORMULAS: tuple[tuple[str, _Formula], ...] = (
     ("sum_formula_sign", lambda c, s, x, y: (c * x - s * y, c * x + s * y)),
     ("angle_difference", lambda c, s, x, y: (c * x + s * y, c * y - s * x)),
 )
+"""Wrong formulas for the cosine and sine of a sum of two angles, with their mistakes."""
 
 
 def _right(c: Element, s: Element, x: Element, y: Element) -> tuple[Element, Element]:
+    """Return cos(a + b) = cos a cos b - sin a sin b and sin(a + b) = sin a cos b + cos a sin b."""
     return c * x - s * y, s * x + c * y
 
 
@@ -41,17 +43,18 @@ def sums_of_angles(arm: ExactArm, right: Make, is_kinematic: bool = False) -> It
     Parameters
     ----------
     arm
-        Arm whose angles are meant.
+        Arm to whose joints the angles belong.
     right
-        Returns a quantity's right value in the robot's own joint variables.
+        Function that returns a quantity's right value in the robot's own joint variables.
     is_kinematic
         Whether the quantities are transforms and the Jacobian.
     """
-    if any(len(run) > 1 for run in parallel_runs(arm)):
-        for written in (_in_sums, shortened):
-            for identity, formula in _FORMULAS:
-                change = partial(_with_formula, arm, right, formula, written)
-                yield Variant(MadeAt(identity), change, rarity=1, is_kinematic=is_kinematic)
+    if not any(len(run) > 1 for run in parallel_runs(arm)):
+        return
+    for written in (_in_sums, shortened):
+        for identity, formula in _FORMULAS:
+            change = partial(_with_formula, arm, right, formula, written)
+            yield Variant(MadeAt(identity), change, rarity=1, is_kinematic=is_kinematic)
 
 
 def derivatives_of_cosines(truth: Truth) -> Variant:
@@ -63,10 +66,11 @@ def derivatives_of_cosines(truth: Truth) -> Variant:
         right = kinematic_quantity(kinematics, quantity)
         wrong = right.copy()
         if quantity == "J":
-            for place, element in np.ndenumerate(_in_sums(arm, kinematics.T[:3, 3])):
+            position = _in_sums(arm, kinematics.T[:3, 3])
+            for (row,), element in np.ndenumerate(position):
                 for joint in range(arm.n):
                     derivative = _without_minus(element, joint)
-                    wrong[place[0], joint] = _in_angles(arm, derivative, _right)
+                    wrong[row, joint] = _in_angles(arm, derivative, _right)
         return wrong - right
 
     return Variant(MadeAt("derivative_of_cosine"), change, is_kinematic=True)
@@ -80,13 +84,18 @@ def _without_minus(element: Element, joint: int) -> Element:
     terms: dict[tuple[int, ...], Fraction] = {}
     for monomial, coefficient in element.terms.items():
         for sine, cosine, joints in ring.turning:
+            if joint not in joints:
+                continue
             for old, new in ((sine, cosine), (cosine, sine)):
-                if joint in joints and monomial[old]:
-                    powers = list(monomial)
-                    powers[old] -= 1
-                    powers[new] += 1
-                    term = coefficient * monomial[old]
-                    terms[tuple(powers)] = terms.get(tuple(powers), Fraction(0)) + term
+                # d/dq of c x^k is k c x^(k-1) y, for sine x and cosine y, and the reverse.
+                k = monomial[old]
+                if not k:
+                    continue
+                exponents = list(monomial)
+                exponents[old] -= 1
+                exponents[new] += 1
+                term = tuple(exponents)
+                terms[term] = terms.get(term, Fraction(0)) + k * coefficient
     return ring.from_terms(terms)
 
 
@@ -106,7 +115,7 @@ def _with_formula(
 
 
 def _in_angles(arm: ExactArm, element: Element, formula: _Formula) -> Element:
-    """Return an element written in sums of angles in single angles, by a formula for the sums."""
+    """Return an element in single angles that is written in sums of angles, by a formula for the sums."""
     ring = arm.ring
     single: dict[int, Element] = {}
     for sine, cosine, joints in element.ring.turning:
@@ -120,15 +129,21 @@ def _in_angles(arm: ExactArm, element: Element, formula: _Formula) -> Element:
 
 def _in_sums(arm: ExactArm, array: Elements) -> Elements:
     """Return elements written in sums of the angles of parallel axes, each with a sine and cosine of its own."""
-    angles = {joint: run[: k + 1] for run in parallel_runs(arm) for k, joint in enumerate(run)}
+    angles: dict[int, tuple[int, ...]] = {}
+    for run in parallel_runs(arm):
+        for k, joint in enumerate(run):
+            angles[joint] = run[: k + 1]
     ring = Ring(arm.ring.kinds, arm.ring.given, angles)
-    turned: dict[int, Element] = {}
+
+    # In the new ring a joint has the angle a = b + q, and the joint before it b:
+    #   cos q = cos(a - b) = cos a cos b + sin a sin b,    sin q = sin(a - b) = sin a cos b - cos a sin b
+    single: dict[int, Element] = {}
     for run in parallel_runs(arm):
         for previous, joint in pairwise(run):
-            c = ring.cosine(joint)
-            s = ring.sine(joint)
-            x = ring.cosine(previous)
-            y = ring.sine(previous)
-            turned[arm.ring.place("cosine", joint)] = c * x + s * y
-            turned[arm.ring.place("sine", joint)] = s * x - c * y
-    return translated_array(array, turned, ring)
+            cos_a = ring.cosine(joint)
+            sin_a = ring.sine(joint)
+            cos_b = ring.cosine(previous)
+            sin_b = ring.sine(previous)
+            single[arm.ring.place("cosine", joint)] = cos_a * cos_b + sin_a * sin_b
+            single[arm.ring.place("sine", joint)] = sin_a * cos_b - cos_a * sin_b
+    return translated_array(array, single, ring)

@@ -1,4 +1,4 @@
-"""Mistakes on one robot, each with what it adds to every quantity; computed when asked for."""
+"""Mistakes on one robot, each with its change of every quantity, which is computed when asked for."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dhkit.symbolic.ring import Element, Elements, element_array
 from dhkit.symbolic.textbook import velocity_torques
 
 Make = Callable[[str], Elements]
-"""Returns what a mistake adds to a quantity, in the robot's own joint variables and in the quantity's shape."""
+"""Function that returns what a mistake adds to a quantity, in the robot's joint variables and the quantity's shape."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,18 +30,31 @@ class Change:
         """Return the change of M, h, g, tau, K, V or L."""
         ring = self.K.ring
         n = ring.n
+
+        # p_i = dK/dqd_i
         momenta = element_array([self.K.by_rate(i) for i in range(n)])
         match quantity:
             case "M":
-                return np.array([[p.by_rate(j) for j in range(n)] for p in momenta], dtype=object).reshape(n, n)
+                # M_ij = dp_i/dqd_j
+                M = np.empty((n, n), dtype=object)
+                for i, momentum in enumerate(momenta):
+                    for j in range(n):
+                        M[i, j] = momentum.by_rate(j)
+                return M
             case "h":
                 return velocity_torques(ring, self.K, momenta)
             case "g":
+                # g_i = dV/dq_i
                 return element_array([self.V.by_position(i) for i in range(n)])
             case "tau":
+                # tau = M qdd + h + g
                 accelerations = element_array([ring.acceleration(i) for i in range(n)])
                 return self.of("M") @ accelerations + self.of("h") + self.of("g")
-        return element_array({"K": self.K, "V": self.V}.get(quantity, self.K - self.V))
+            case "K":
+                return element_array(self.K)
+            case "V":
+                return element_array(self.V)
+        return element_array(self.K - self.V)
 
 
 def make_lazily(change: Callable[..., Change], *arguments: object) -> Make:
@@ -57,14 +70,14 @@ class Variant:
     Attributes
     ----------
     made
-        Identity of the mistake, and the link where it is made.
+        Identifier of the mistake, and the link where it is made.
     make
-        Returns what the mistake adds to a quantity, in the robot's own joint variables.
+        Function that returns what the mistake adds to a quantity, in the robot's own joint variables.
     place
         Link, joint or parameters in words; empty if the mistake is made throughout.
     rarity
-        How rare such mistakes are: 0 in a textbook's derivation, 1 in formulas, 2 for those that are merely possible.
-        Of several mistakes that explain an answer the least rare is named.
+        Rank of the mistake among those that explain an answer, of which the one with the lowest rank is named: 0 for
+        mistakes in a textbook's derivation, 1 for mistakes in formulas, 2 for those that are merely possible.
     is_kinematic
         Whether the mistake is made in transforms and the Jacobian, not in the dynamics.
     """
@@ -78,12 +91,12 @@ class Variant:
 
     @property
     def identity(self) -> str:
-        """Identity of the mistake."""
+        """Identifier of the mistake."""
         return self.made.identity
 
     @property
     def name(self) -> str:
-        """Identity of the mistake, with the place."""
+        """Identifier of the mistake, with the place."""
         return f"{self.identity} ({self.place})" if self.place else self.identity
 
     def adds_to(self, quantity: str, coordinates: Coordinates) -> Elements:
@@ -103,7 +116,7 @@ def nothing(lag: Lagrangian, quantity: str) -> Elements:
 
 
 def changed_only(lag: Lagrangian, changed: str, change: Callable[[], Elements]) -> Make:
-    """Return a change of one vector of torques, and of tau, their sum."""
+    """Return the function of a mistake that changes one vector of torques, and tau, which contains it."""
 
     def make(quantity: str) -> Elements:
         return change() if quantity in (changed, "tau") else nothing(lag, quantity)

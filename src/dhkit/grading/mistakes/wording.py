@@ -20,7 +20,7 @@ _CHRISTOFFEL = {
     "mass_rate_omitted": "of the Christoffel symbols the two terms that are added",
     "velocity_torques_doubled": "the Christoffel symbols lack their factor 1/2",
 }
-"""By mistake in Euler and Lagrange's equation: its effect on the entries of C."""
+"""Effect on the entries of C of mistakes in Euler and Lagrange's equation, by the mistakes."""
 
 
 def merge(diagnoses: Sequence[Diagnosis]) -> list[Diagnosis]:
@@ -29,13 +29,24 @@ def merge(diagnoses: Sequence[Diagnosis]) -> list[Diagnosis]:
     for diagnosis in diagnoses:
         same.setdefault((diagnosis.mistake, diagnosis.sentence), []).append(diagnosis)
     merged = []
-    for first, *others in same.values():
-        places = [place for one in (first, *others) for place in one.where.split(", ")]
-        entries = tuple(dict.fromkeys(entry for one in (first, *others) for entry in one.entries))
-        # Links and parameters come after the quantities.
-        ordered = sorted(dict.fromkeys(places), key=lambda place: not place[:1].isalpha() or " " in place)
-        merged.append(replace(first, where=", ".join(ordered), entries=entries) if others else first)
+    for group in same.values():
+        first = group[0]
+        if len(group) == 1:
+            merged.append(first)
+            continue
+        places: list[str] = []
+        entries: list[str] = []
+        for diagnosis in group:
+            places += diagnosis.where.split(", ")
+            entries += diagnosis.entries
+        ordered = sorted(dict.fromkeys(places), key=_is_after_quantities)
+        merged.append(replace(first, where=", ".join(ordered), entries=tuple(dict.fromkeys(entries))))
     return merged
+
+
+def _is_after_quantities(place: str) -> bool:
+    """Whether a place is a link or a parameter, which are listed after the quantities."""
+    return not place[:1].isalpha() or " " in place
 
 
 def _entry_names(quantity: JudgedQuantity, indices: Sequence[Index]) -> tuple[str, ...]:
@@ -49,25 +60,36 @@ def diagnosis_of(
     """Return the diagnosis of mistakes that all give the same answers, the likeliest first."""
     first = variants[0]
     quantities = list(dict.fromkeys(quantities))
-    names = (name for quantity in quantities for name in _entry_names(quantity, indices or quantity.wrong_indices))
+
+    # The entries, and the places: quantities or entries, then the link.
+    names: list[str] = []
+    for quantity in quantities:
+        names += _entry_names(quantity, indices or quantity.wrong_indices)
     entries = tuple(dict.fromkeys(names))
-    places = [quantity.name for quantity in quantities] if not indices else entries
-    where = ", ".join([*places, *([first.place] if first.place else [])])
+    places = list(entries) if indices else [quantity.name for quantity in quantities]
+    if first.place:
+        places.append(first.place)
+
+    # The sentence: mistakes that are as frequent as the first are alternatives.
     of_C = all(quantity.name == "C" for quantity in quantities)
     distinct: dict[str, Variant] = {}
     for variant in variants:
         if variant.rarity == first.rarity:
             distinct.setdefault(variant.identity, variant)
     if len(distinct) > 1:
-        listed = "; or: ".join(_clause(variant, of_C) for variant in [*distinct.values()][:_MAX_ALTERNATIVES])
+        alternatives = list(distinct.values())[:_MAX_ALTERNATIVES]
+        listed = "; or: ".join(_clause(variant, of_C) for variant in alternatives)
         sentence = f"One of these: {listed}."
     else:
-        sentence = sentence_of(first.identity, first.place, _CHRISTOFFEL.get(first.identity, "") if of_C else "")
-    equivalent = tuple(dict.fromkeys(v.name for v in variants if v.name != first.name))
-    return Diagnosis(first.identity, sentence, where, entries, hint_of(first.identity), equivalent)
+        detail = _CHRISTOFFEL.get(first.identity, "") if of_C else ""
+        sentence = sentence_of(first.identity, first.place, detail)
+
+    equivalent = tuple(dict.fromkeys(variant.name for variant in variants if variant.name != first.name))
+    return Diagnosis(first.identity, sentence, ", ".join(places), entries, hint_of(first.identity), equivalent)
 
 
 def _clause(variant: Variant, of_C: bool) -> str:
+    """Return the sentence of a mistake as a clause, with its place."""
     sentence = LIBRARY[variant.identity].sentence
     if of_C and variant.identity in _CHRISTOFFEL:
         sentence = f"{sentence}: {_CHRISTOFFEL[variant.identity]}"
@@ -80,7 +102,7 @@ def diagnosis_of_slip(quantity: JudgedQuantity, index: Index, slip: Slip) -> Dia
     if slip.identity != "term_missing":
         sentence = sentence_of(slip.identity, detail=slip.detail)
         return Diagnosis(slip.identity, sentence, entry, (entry,), hint_of(slip.identity), second_hint=slip.right)
-    # The right term would be the answer: what is said first is where it comes from.
+    # The right term would be the answer: the first hint says only where it comes from.
     sentence = sentence_of(slip.identity, detail=f"one with {slip.kind}" if slip.kind else "")
     hint = f"Look again at the terms with {slip.kind}: is each there?" if slip.kind else hint_of(slip.identity)
     return Diagnosis(slip.identity, sentence, entry, (entry,), hint, second_hint=slip.detail)
