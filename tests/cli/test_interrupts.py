@@ -90,11 +90,19 @@ def test_a_check_that_is_ended_leaves_nothing(name, tmp_path):
     (tmp_path / "student.py").write_text(WAITS.replace("MARK", mark))
     command = [sys.executable, "-m", "dhkit", "check", "planar2r", str(tmp_path / "student.py"), "--seconds", "3600"]
     process = subprocess.Popen(
-        command, env=os.environ | {"TMPDIR": str(tmp_path)}, stderr=subprocess.PIPE, text=True, start_new_session=True
+        command,
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # tests under nohup ignore it
     )
-    wait_for(sleeping, "the call of the program")
-    process.send_signal(getattr(signal, name))
-    _, err = process.communicate(timeout=HANGS)
+    try:
+        wait_for(sleeping, "the call of the program")
+        process.send_signal(getattr(signal, name))
+        _, err = process.communicate(timeout=HANGS)
+    finally:
+        process.kill()
     if name != "SIGKILL":
         assert (process.returncode, err) == (130, "dhkit: interrupted\n")
         assert not list(tmp_path.glob("dhkit-program-*"))
