@@ -74,7 +74,7 @@ def smallest_measures(derivation, T):
                 least, shares = np.minimum(least, measure), shares * np.minimum(measure / 0.1, 1.0)
             least = np.where(least < NEAR, 0.1 * shares, least)
             rows = np.flatnonzero(solved)
-            result[rows, derivation._named(values)[rows]] = least[rows]
+            result[rows, derivation._branch_index(values)[rows]] = least[rows]
     return result
 
 

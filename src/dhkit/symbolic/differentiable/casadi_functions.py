@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dhkit.description import Convention, Description, Robot, description_of
 from dhkit.display import repr_line
@@ -47,7 +47,7 @@ class CasadiFunctions:
     Raises
     ------
     DescriptionError
-        By the functions of dynamics: a link without a body.
+        A link has no body; raised when a function of dynamics is first used.
     TypeError
         ``friction`` is neither a bool nor a :class:`Friction`, or another layer is not a bool.
 
@@ -183,16 +183,15 @@ class CasadiFunctions:
             return table
         mass, com, inertia = self._load_symbols.values()
         load = _payload_moments(self._description, mass, com, inertia)
-        return table.with_load(load, -self._lifted(mass))
 
-    def _lifted(self, mass: casadi.SX) -> Any:
-        """Return the work of gravity on a mass from the world's origin to frame 0, J."""
+        # V = -m g . p, with p the origin of frame 0 in the world
         numbers = self._description.numbers
-        return mass * float(numbers.gravity @ numbers.T_world_base[:3, 3])
+        g_p = float(numbers.gravity @ numbers.T_world_base[:3, 3])
+        return table.with_load(load, -(mass * g_p))
 
     @cached_property
     def _load(self) -> casadi.SX:
-        """J^T wrench - friction, n x 1."""
+        """Torques of the layers, J^T wrench - friction, n x 1, N m and N."""
         import casadi
 
         description = self._description
@@ -213,7 +212,9 @@ class CasadiFunctions:
         outputs: Mapping[str, casadi.SX],
         more: Mapping[str, casadi.SX] | None = None,
     ) -> casadi.Function:
-        return _function(name, {**states, **self._load_symbols, **(more or {})}, outputs)
+        """Return a function of states, the payload if there is one, and further inputs."""
+        inputs = {**states, **self._load_symbols, **(more or {})}
+        return _function(name, inputs, outputs)
 
     # Value semantics
 
@@ -222,11 +223,15 @@ class CasadiFunctions:
 
     def __repr__(self) -> str:
         layers = [str(self._friction)] if self._friction is not None else []
-        layers += ["payload"] * self._payload + ["wrench"] * self._wrench
+        if self._payload:
+            layers.append("payload")
+        if self._wrench:
+            layers.append("wrench")
         return repr_line("CasADi functions", self._description.name, ", ".join(layers))
 
 
 def _function(name: str, inputs: Mapping[str, casadi.SX], outputs: Mapping[str, casadi.SX]) -> casadi.Function:
+    """Return a function with named inputs and outputs."""
     import casadi
 
     # With "cse" CasADi computes equal products once.
@@ -251,24 +256,38 @@ def _payload_moments(description: Description, mass: casadi.SX, com: casadi.SX, 
     R, p = _tool_in_joint_frame(description)
     xx, yy, zz, xy, yz, xz = (inertia[i] for i in range(6))
     tensor: list[Vector3] = [(xx, xy, xz), (xy, yy, yz), (xz, yz, zz)]
-    half = [_rotate(R, row) for row in tensor]
-    turned = [_rotate(R, (column[0], column[1], column[2])) for column in zip(*half, strict=True)]
-    return Moments.of_body(mass, plus(p, _rotate(R, (com[0], com[1], com[2]))), turned)
+
+    # c' = p + R c, I' = R I R^T: I is symmetric, so that the rows R I_i are the columns of R I.
+    com_in_joint_frame = plus(p, _rotate(R, (com[0], com[1], com[2])))
+    columns = [_rotate(R, row) for row in tensor]
+    inertia_in_joint_frame = [_rotate(R, row) for row in _transposed(columns)]
+    return Moments.of_body(mass, com_in_joint_frame, inertia_in_joint_frame)
 
 
 def _rotate(R: list[Vector3], a: Vector3) -> Vector3:
+    """Return R a."""
     return dot(R[0], a), dot(R[1], a), dot(R[2], a)
 
 
+def _transposed(rows: list[Vector3]) -> list[Vector3]:
+    """Return the columns of a 3 x 3 matrix."""
+    return [(column[0], column[1], column[2]) for column in zip(*rows, strict=True)]
+
+
 def _tool_in_joint_frame(description: Description) -> tuple[list[Vector3], Vector3]:
+    """Return rotation, row by row, and position, m, of the tool in the joint frame of the last link."""
     numbers = description.numbers
     T = numbers.T_last_tool.tolist()
-    rows: list[Vector3] = [(row[0], row[1], row[2]) for row in T[:3]]
+    R: list[Vector3] = [(row[0], row[1], row[2]) for row in T[:3]]
     x, y, z = (row[3] for row in T[:3])
+    p: Vector3 = (x, y, z)
     if description.convention is Convention.MODIFIED:
-        return rows, (x, y, z)
-    # The transform from the joint frame to DH frame n is Tx(a) Rx(alpha).
-    a, c, s = (float(column[-1]) for column in (numbers.a, numbers.cos_alpha, numbers.sin_alpha))
-    behind: list[Vector3] = [(1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)]
-    columns = [_rotate(behind, (column[0], column[1], column[2])) for column in zip(*rows, strict=True)]
-    return [(r[0], r[1], r[2]) for r in zip(*columns, strict=True)], plus((a, 0.0, 0.0), _rotate(behind, (x, y, z)))
+        return R, p
+
+    # DH frame n in the joint frame is Tx(a) Rx(alpha): R' = Rx R, p' = a x + Rx p.
+    a = float(numbers.a[-1])
+    c = float(numbers.cos_alpha[-1])
+    s = float(numbers.sin_alpha[-1])
+    Rx: list[Vector3] = [(1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)]
+    columns = [_rotate(Rx, column) for column in _transposed(R)]
+    return _transposed(columns), plus((a, 0.0, 0.0), _rotate(Rx, p))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from dhkit.symbolic.differentiable.equation_frames import EquationFrame, equation_frames, link_velocities
 from dhkit.symbolic.differentiable.inertial_table import InertialTable
@@ -14,49 +14,56 @@ from dhkit.symbolic.differentiable.vectors import ZERO_VECTOR, Scalar, Vector3, 
 if TYPE_CHECKING:
     import casadi
 
-_Wrench = tuple[Vector3, Vector3]
+_Wrench: TypeAlias = tuple[Vector3, Vector3]
 """Force, N, and moment about a joint's origin, N m."""
-_Matrix3 = tuple[Vector3, Vector3, Vector3]
+_Matrix3: TypeAlias = tuple[Vector3, Vector3, Vector3]
+"""A 3 x 3 matrix, row by row."""
 
 
 def composite_mass_matrix(table: InertialTable, q: casadi.SX) -> casadi.SX:
     """Return M with drives, n x n, kg m^2, kg m and kg, by composite rigid bodies (Walker & Orin 1982, method 3)."""
     frames = equation_frames(table, q)
-    entries: list[list[Scalar]] = [[0.0] * table.n for _ in frames]
+    M: list[list[Scalar]] = [[0.0] * table.n for _ in frames]
     for j, composite in _composites(frames):
+        # M_ij is the torque at joint i, i <= j, for a unit acceleration of joint j: the wrench's component along z_i.
         wrench = _unit_acceleration_wrench(frames[j], composite)
         for i, (force, moment) in _wrench_at_each_joint(frames, j, wrench):
-            entries[i][j] = entries[j][i] = (force if frames[i].prismatic else moment)[2]
-        entries[j][j] = entries[j][j] + table.armature[j]
+            M[i][j] = M[j][i] = (force if frames[i].prismatic else moment)[2]
+        M[j][j] = M[j][j] + table.armature[j]
     for i, j, inertia in table.couplings:
-        entries[i][j] = entries[j][i] = entries[i][j] + inertia
-    return _matrix(entries)
+        M[i][j] = M[j][i] = M[i][j] + inertia
+    return _matrix(M)
 
 
 def composite_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.SX:
-    """Return the Christoffel C, n x n, so that C_ij = sum over all mass of J_i . dJ_j/dt dm.
+    """Return the Coriolis matrix of the Christoffel symbols, n x n.
 
-    J_j(r) is the velocity of a point at r per unit rate of joint j. The part that depends on the velocities V of the
-    links that a joint carries is summed over them as two integrals over mass, of V and of r V^T: 12 numbers, where the
-    Coriolis inertia of Echeandia & Wensing 2021 has 36.
+    C_ij is the integral over all mass of J_i . dJ_j/dt, where J_j(r) is the velocity of a point at r per unit rate of
+    joint j. The part that depends on the velocities V of the links that a joint carries is summed over them as two
+    integrals over mass, of V and of r V^T: 12 numbers, where the Coriolis inertia of Echeandia & Wensing 2021 has 36.
     """
     frames = equation_frames(table, q)
     velocities = link_velocities(frames, qd)
-    entries: list[list[Scalar]] = [[0.0] * table.n for _ in frames]
+    C: list[list[Scalar]] = [[0.0] * table.n for _ in frames]
     rates = _VelocityMoments.none()
     for j, composite in _composites(frames):
         frame = frames[j]
-        (w, v) = velocities[j]
+        w, v = velocities[j]
         rates = rates.joined(_VelocityMoments.of_link(frame.moments, w, v))
+
+        # Column j, i <= j: the integral of dJ_j/dt and of r x dJ_j/dt, along joint i.
         column = _column_rate(frame, composite, rates, w, v)
         for i, (force, moment) in _wrench_at_each_joint(frames, j, column):
-            entries[i][j] = (force if frames[i].prismatic else moment)[2]
+            C[i][j] = (force if frames[i].prismatic else moment)[2]
+
+        # Row j, i < j: the integral of J_j . dJ_i/dt.
         couples = dict(_couple_at_each_joint(frames, j, rates.couple(frame.prismatic)))
-        for i, wrench in _wrench_at_each_joint(frames, j, _unit_acceleration_wrench(frame, composite)):
+        row = _unit_acceleration_wrench(frame, composite)
+        for i, wrench in _wrench_at_each_joint(frames, j, row):
             if i < j:
-                entries[j][i] = _row_rate(frames[i], wrench, couples[i], *velocities[i])
+                C[j][i] = _row_rate(frames[i], wrench, couples[i], *velocities[i])
         rates = rates.about_previous(frame)
-    return _matrix(entries)
+    return _matrix(C)
 
 
 @dataclass(frozen=True)
@@ -76,9 +83,12 @@ class _VelocityMoments:
     @classmethod
     def of_link(cls, link: Moments, w: Vector3, v: Vector3) -> _VelocityMoments:
         """Return the integrals over a link that turns with w, rad/s, and whose origin moves with v, m/s."""
+        # V = v + w x r, so the integral of V is m v + w x h, and that of r_i V is h_i v + w x (row i of S);
+        # h is the integral of r, S that of r r^T.
+        momentum = plus(times(link.mass, v), cross(w, link.first))
         rows = zip(link.first, link.tensor, strict=True)
-        x, y, z = (plus(times(first, v), cross(w, row)) for first, row in rows)
-        return cls(plus(times(link.mass, v), cross(w, link.first)), (x, y, z))
+        x, y, z = (plus(times(h_i, v), cross(w, S_i)) for h_i, S_i in rows)
+        return cls(momentum, (x, y, z))
 
     def joined(self, other: _VelocityMoments) -> _VelocityMoments:
         """Return the sum with the integrals over other links, given about the same origin and in the same axes."""
@@ -87,16 +97,21 @@ class _VelocityMoments:
 
     def couple(self, prismatic: bool) -> Vector3:
         """Return the integral of V x J_j over the mass; J_j is z x r for a revolute joint and z for a prismatic one."""
+        # V x z
         if prismatic:
             return self.momentum[1], -self.momentum[0], 0.0
+        # V x (z x r) = z (V . r) - r (V . z); its z component is V_x r_x + V_y r_y.
         return -self.G[0][2], -self.G[1][2], self.G[0][0] + self.G[1][1]
 
     def about_previous(self, frame: EquationFrame) -> _VelocityMoments:
         """Return the integrals about the previous joint's origin, in the axes of its link's equations."""
+        # Turned axes: R G R^T, first the rows, then the columns.
         p = frame.to_previous(self.momentum)
-        half = [frame.to_previous(row) for row in self.G]
-        columns = [frame.to_previous((c[0], c[1], c[2])) for c in zip(*half, strict=True)]
+        rows_turned = [frame.to_previous(row) for row in self.G]
+        columns = [frame.to_previous((c[0], c[1], c[2])) for c in zip(*rows_turned, strict=True)]
         rows = [(r[0], r[1], r[2]) for r in zip(*columns, strict=True)]
+
+        # Moved origin: the integral of (r + lever) V^T is R G R^T + lever p^T.
         x, y, z = (plus(row, times(lever, p)) for row, lever in zip(rows, frame.lever, strict=True))
         return _VelocityMoments(p, (x, y, z))
 
@@ -113,33 +128,59 @@ def _composites(frames: list[EquationFrame]) -> Iterator[tuple[int, Moments]]:
 
 def _unit_acceleration_wrench(frame: EquationFrame, body: Moments) -> _Wrench:
     """Return the wrench on a body at rest that a unit acceleration of the joint that carries it needs."""
+    # Force: the integral of J_j; moment: that of r x J_j.
     x, y, _ = body.first
     if frame.prismatic:
+        # J_j = z: force m z, moment h x z
         return (0.0, 0.0, body.mass), (y, -x, 0.0)
+    # J_j = z x r: force z x h, moment J z = (tr(S) 1 - S) z
     return (-y, x, 0.0), (-body.xz, -body.yz, body.xx + body.yy)
 
 
 def _column_rate(frame: EquationFrame, body: Moments, rates: _VelocityMoments, w: Vector3, v: Vector3) -> _Wrench:
-    """Return the integral, over the mass that a joint carries, of the time derivative of its Jacobian column J_j(r)."""
-    axis_rate = (w[1], -w[0], 0.0)  # w x z
+    """Return the integrals of dJ_j/dt and of r x dJ_j/dt over the mass that joint j carries.
+
+    The joint's link turns with w, rad/s, and its origin moves with v, m/s.
+    """
+    z_dot = (w[1], -w[0], 0.0)  # w x z
     if frame.prismatic:
-        return times(body.mass, axis_rate), cross(body.first, axis_rate)
-    # z x (V - v) + (w x z) x r
-    slip = (v[1], -v[0], 0.0)
+        # J_j = z
+        return times(body.mass, z_dot), cross(body.first, z_dot)
+
+    # J_j = z x r, so dJ_j/dt = z x (V - v) + z_dot x r, with r from the joint's origin. With p and G the integrals of
+    # V and r V^T, and -z x v = (v_y, -v_x, 0):
+    #   force  = z x p - m z x v + z_dot x h
+    #   moment = integral of r x (z x V) - h x (z x v) + J z_dot
+    minus_z_v = (v[1], -v[0], 0.0)
     p = rates.momentum
     G = rates.G
-    force = plus((-p[1], p[0], 0.0), plus(times(body.mass, slip), cross(axis_rate, body.first)))
-    moment = plus((-G[2][0], -G[2][1], G[0][0] + G[1][1]), cross(body.first, slip))
-    return force, plus(moment, _inertia_times(body, axis_rate))
+    z_p = (-p[1], p[0], 0.0)
+    r_z_V = (-G[2][0], -G[2][1], G[0][0] + G[1][1])  # r x (z x V) = z (r . V) - V (r . z)
+    force = plus(z_p, plus(times(body.mass, minus_z_v), cross(z_dot, body.first)))
+    moment = plus(r_z_V, cross(body.first, minus_z_v))
+    return force, plus(moment, _inertia_times(body, z_dot))
 
 
 def _row_rate(frame: EquationFrame, wrench: _Wrench, couple: Vector3, w: Vector3, v: Vector3) -> Scalar:
-    """Return the power of a wrench along the time derivative of a joint's Jacobian column."""
+    """Return the integral of J_j . dJ_i/dt over the mass that a later joint j carries.
+
+    Parameters
+    ----------
+    frame
+        Joint i's frame; its link turns with w, rad/s, and its origin moves with v, m/s.
+    wrench
+        The integrals of J_j and of r x J_j, r from joint i's origin.
+    couple
+        The integral of V x J_j.
+    """
     force, moment = wrench
-    axis_rate = (w[1], -w[0], 0.0)
+    z_dot = (w[1], -w[0], 0.0)  # w x z
     if frame.prismatic:
-        return dot(axis_rate, force)
-    return dot(axis_rate, moment) + dot((v[1], -v[0], 0.0), force) + couple[2]
+        return dot(z_dot, force)
+
+    # J_j . (z x (V - v) + z_dot x r) = z . (V x J_j) - (z x v) . J_j + z_dot . (r x J_j)
+    minus_z_v = (v[1], -v[0], 0.0)
+    return dot(z_dot, moment) + dot(minus_z_v, force) + couple[2]
 
 
 def _inertia_times(body: Moments, w: Vector3) -> Vector3:
@@ -163,12 +204,14 @@ def _wrench_at_each_joint(frames: list[EquationFrame], j: int, wrench: _Wrench) 
 
 
 def _couple_at_each_joint(frames: list[EquationFrame], j: int, couple: Vector3) -> Iterator[tuple[int, Vector3]]:
+    """Yield a free vector of joint j's equation axes in those of every joint from j down to the first."""
     for i in reversed(range(j + 1)):
         yield i, couple
         couple = frames[i].to_previous(couple)
 
 
 def _matrix(entries: list[list[Scalar]]) -> casadi.SX:
+    """Return a matrix from its rows."""
     import casadi
 
     return casadi.SX(casadi.vertcat(*(casadi.horzcat(*row) for row in entries)))

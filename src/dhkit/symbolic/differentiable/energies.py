@@ -16,39 +16,46 @@ def kinetic_energy(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.
     """Return the kinetic energy of links and drives, 1 x 1, J, for q and qd (n x 1).
 
     Each link adds (m v^2 + w . (J w) + 2 v . (w x m c)) / 2, with v the velocity of the joint frame's origin (Siciliano
-    et al., Robotics, 2009, section 7.1.1).
+    et al., Robotics, 2009, section 7.1.1), each drive I qd_i^2 / 2, and each drive that moves joints i and j together
+    I qd_i qd_j.
     """
     import casadi
 
     # Each link adds to 2 K:  m v^2 + w . (J w) + 2 v . (w x m c); stored are second moments, so that
     #     J = trace(S) 1 - S  and  w . (J w) = (S_yy + S_zz) w_x^2 + ... - 2 (S_xy w_x w_y + ...).
     frames = equation_frames(table, q)
-    twice: Scalar = casadi.SX(0)
+    twice_K: Scalar = casadi.SX(0)
     for i, (frame, (w, v)) in enumerate(zip(frames, link_velocities(frames, qd), strict=True)):
-        own = frame.moments
-        (xx, xy, xz), (_, yy, yz), (_, _, zz) = own.tensor
+        link = frame.moments
+
+        # w . (J w) with J = tr(S) 1 - S
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = link.tensor
         x, y, z = w
-        spinning = (yy + zz) * (x * x) + (xx + zz) * (y * y) + (xx + yy) * (z * z)
+        squares = (yy + zz) * (x * x) + (xx + zz) * (y * y) + (xx + yy) * (z * z)
         products = xy * (x * y) + xz * (x * z) + yz * (y * z)
-        carried = dot(v, cross(w, own.first))
-        twice += own.mass * dot(v, v) + spinning - 2 * products + 2 * carried + table.armature[i] * (qd[i] * qd[i])
+
+        # v . (w x m c)
+        mixed = dot(v, cross(w, link.first))
+
+        twice_K += link.mass * dot(v, v) + squares - 2 * products + 2 * mixed + table.armature[i] * (qd[i] * qd[i])
     for i, j, inertia in table.couplings:
-        twice += 2 * inertia * (qd[i] * qd[j])
-    return casadi.SX(twice / 2)
+        twice_K += 2 * inertia * (qd[i] * qd[j])
+    return casadi.SX(twice_K / 2)
 
 
 def potential_energy(table: InertialTable, q: casadi.SX) -> casadi.SX:
     """Return the potential energy V = -sum(m g . c) of the moving links, 1 x 1, J; 0 at the world's origin."""
     import casadi
 
-    gravity: Vector3 = table.gravity
-    energy: Scalar = casadi.SX(table.potential)
-    height: Scalar = 0.0  # g . p, p the joint's origin, m^2/s^2
+    # V = -sum of (m g . p + g . m c), with p the origin of the link's joint frame and c the centre of mass from there
+    V: Scalar = casadi.SX(table.potential)
+    g: Vector3 = table.gravity
+    g_p: Scalar = 0.0
     for frame in equation_frames(table, q):
-        height = height + dot(gravity, frame.lever)
-        gravity = frame.from_twisted(frame.to_twisted(gravity))
-        energy -= frame.moments.mass * height + dot(gravity, frame.moments.first)
-    return casadi.SX(energy)
+        g_p = g_p + dot(g, frame.lever)
+        g = frame.from_twisted(frame.to_twisted(g))
+        V -= frame.moments.mass * g_p + dot(g, frame.moments.first)
+    return casadi.SX(V)
 
 
 def lagrange_mass_matrix(table: InertialTable, q: casadi.SX) -> casadi.SX:
@@ -60,16 +67,17 @@ def lagrange_mass_matrix(table: InertialTable, q: casadi.SX) -> casadi.SX:
 
 
 def lagrange_coriolis_matrix(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.SX:
-    """Return the Christoffel C = (Mdot + A - A^T) / 2 with A = d(M qd)/dq, n x n; C qd is in N m and N.
+    """Return the Coriolis matrix of the Christoffel symbols, n x n; C qd is in N m and N.
 
-    Sum over k of (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i) qd_k / 2 (Siciliano et al. 2009, eq. 7.45).
+    C_ij = sum over k of (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i) qd_k / 2 (Siciliano et al. 2009, eq. 7.45).
     """
     import casadi
 
+    # C = (dM/dt + A - A^T) / 2 with A = d(M qd)/dq, A_ij = sum over k of dM_ik/dq_j qd_k
     M = lagrange_mass_matrix(table, q)
-    rate = casadi.reshape(casadi.jtimes(casadi.vec(M), q, qd), table.n, table.n)
+    dM_dt = casadi.reshape(casadi.jtimes(casadi.vec(M), q, qd), table.n, table.n)
     A = casadi.jacobian(M @ qd, q)
-    return (rate + A - A.T) / 2
+    return (dM_dt + A - A.T) / 2
 
 
 def lagrange_gravity_torque(table: InertialTable, q: casadi.SX) -> casadi.SX:
@@ -91,6 +99,10 @@ def lagrange_torque(table: InertialTable, q: casadi.SX, qd: casadi.SX, qdd: casa
     import casadi
 
     L = kinetic_energy(table, q, qd) - potential_energy(table, q)
-    momentum = casadi.gradient(L, qd)
-    along = casadi.vertcat(qd, qdd)
-    return casadi.jtimes(momentum, casadi.vertcat(q, qd), along) - casadi.gradient(L, q)
+
+    # p = dL/dqd depends on the state x = (q, qd), which changes by (qd, qdd): dp/dt = dp/dx (qd, qdd)
+    p = casadi.gradient(L, qd)
+    state = casadi.vertcat(q, qd)
+    state_rate = casadi.vertcat(qd, qdd)
+    dp_dt = casadi.jtimes(p, state, state_rate)
+    return dp_dt - casadi.gradient(L, q)

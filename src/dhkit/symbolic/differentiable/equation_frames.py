@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from dhkit.symbolic.differentiable.inertial_table import InertialTable
 from dhkit.symbolic.differentiable.joint_frames import JointRow
@@ -61,26 +61,28 @@ class EquationFrame:
 
 def equation_frames(table: InertialTable, q: casadi.SX) -> list[EquationFrame]:
     """Return the equation frames of all joints at joint positions q, n x 1, rad and m."""
+    no_rotation = (1.0, 0.0)
     frames: list[EquationFrame] = []
-    # Sum of joint angles since the axes were first parallel; cosine and sine of the sum of the table's own angles.
-    angles: tuple[Scalar, Scalar, Scalar] = (0.0, 1.0, 0.0)
-    link_rotation = (1.0, 0.0)  # cosine and sine from the axes of link i-1's equations to the link itself
+    angle = _ZERO_ANGLE
+    link_rotation = no_rotation  # cosine and sine from the axes of link i-1's equations to the link itself
     for i, (row, link) in enumerate(zip(table.rows, table.links, strict=True)):
+        # The translation of Rx(alpha) Tx(a) Tz(d), in the axes of link i-1's equations.
         d = row.d + q[i] if row.prismatic else row.d
         lever = about_z(*link_rotation, (row.a, -row.sin_alpha * d, row.cos_alpha * d))
-        angles = _summed_angles(row, angles, q[i])
-        rotation = _cos_sin(angles)
+
+        angle = _with_joint(angle, row, q[i])
+        rotation = angle.cosine_and_sine()
         stays_twisted = i + 1 == len(table.rows) or is_zero(table.rows[i + 1].sin_alpha)
         if stays_twisted:
-            shown = (1.0, 0.0)
+            equation_rotation = no_rotation
             moments = link.about_z(*rotation)
             link_rotation = rotation
         else:
-            shown = rotation
+            equation_rotation = rotation
             moments = link
-            link_rotation = (1.0, 0.0)
-            angles = (0.0, 1.0, 0.0)
-        frames.append(EquationFrame(row.prismatic, row.cos_alpha, row.sin_alpha, lever, shown, moments))
+            link_rotation = no_rotation
+            angle = _ZERO_ANGLE
+        frames.append(EquationFrame(row.prismatic, row.cos_alpha, row.sin_alpha, lever, equation_rotation, moments))
     return frames
 
 
@@ -90,43 +92,59 @@ def link_velocities(frames: list[EquationFrame], qd: casadi.SX) -> list[tuple[Ve
     Parameters
     ----------
     frames
-        Of all joints.
+        The equation frames of all joints.
     qd
-        Joint velocities, n x 1.
+        Joint velocities, n x 1, rad/s and m/s.
     """
     w = ZERO_VECTOR
     v = ZERO_VECTOR
     velocities = []
     for i, frame in enumerate(frames):
+        # v_i = v_(i-1) + w_(i-1) x lever, then the joint's own motion along or about z.
         v = frame.to_twisted(plus(v, cross(w, frame.lever)))
         w = frame.to_twisted(w)
         if frame.prismatic:
-            v = v[0], v[1], v[2] + qd[i]
+            v = (v[0], v[1], v[2] + qd[i])
         else:
-            w = w[0], w[1], w[2] + qd[i]
+            w = (w[0], w[1], w[2] + qd[i])
+
         w = frame.from_twisted(w)
         v = frame.from_twisted(v)
         velocities.append((w, v))
     return velocities
 
 
-def _summed_angles(row: JointRow, angles: tuple[Scalar, Scalar, Scalar], q: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+class _Angle(NamedTuple):
+    """The angle from the twisted axes to a link: the sum of a joint part and a part from the table."""
+
+    joints: Scalar
+    """Sum of joint angles since the axes were first parallel, rad; the float 0.0 without a revolute joint."""
+    cos_table: Scalar
+    """Cosine of the sum of the table's own angles."""
+    sin_table: Scalar
+    """Sine of the same sum."""
+
+    def cosine_and_sine(self) -> tuple[Scalar, Scalar]:
+        """Return the angle's cosine and sine, by the addition theorem."""
+        import casadi
+
+        if isinstance(self.joints, float):
+            return self.cos_table, self.sin_table
+        c = casadi.cos(self.joints)
+        s = casadi.sin(self.joints)
+        return c * self.cos_table - s * self.sin_table, s * self.cos_table + c * self.sin_table
+
+
+_ZERO_ANGLE = _Angle(0.0, 1.0, 0.0)
+
+
+def _with_joint(angle: _Angle, row: JointRow, q: Scalar) -> _Angle:
     """Return a link's angle in its twisted axes: the angle before, reversed for opposed axes, plus the joint's own."""
-    angle, c, s = angles
+    joints, c, s = angle
     if is_zero(row.sin_alpha) and float(row.cos_alpha) < 0:
-        angle = -angle
+        joints = -joints
         s = -s
-    c, s = c * row.cos_theta - s * row.sin_theta, s * row.cos_theta + c * row.sin_theta
-    return (angle if row.prismatic else q + angle), c, s
 
-
-def _cos_sin(angles: tuple[Scalar, Scalar, Scalar]) -> tuple[Scalar, Scalar]:
-    """Return cosine and sine of a sum: joint angles are added, the table's own enter by the addition theorem."""
-    import casadi
-
-    angle, c, s = angles
-    if isinstance(angle, float):
-        return c, s
-    cos_q = casadi.cos(angle)
-    sin_q = casadi.sin(angle)
-    return cos_q * c - sin_q * s, sin_q * c + cos_q * s
+    cos_table = c * row.cos_theta - s * row.sin_theta
+    sin_table = s * row.cos_theta + c * row.sin_theta
+    return _Angle(joints if row.prismatic else q + joints, cos_table, sin_table)

@@ -13,38 +13,50 @@ if TYPE_CHECKING:
     import casadi
 
 SINGULAR = 1e-14
-"""M counts as singular when a pivot is below this share of its largest diagonal entry: rounding leaves as much."""
+"""Smallest pivot of a regular M, relative to the largest entry of its diagonal: rounding leaves as much of a zero."""
 
 
 def solve_for_acceleration(M: casadi.SX, torque: casadi.SX) -> casadi.SX:
     """Return qdd of M qdd = torque, n x 1, SI units, by factors L^T D L (Featherstone 2008, section 6.5, full matrix).
 
-    D_i is the inertia that joint i feels while the joints behind it swing freely; where one is not above ``SINGULAR``
+    D_i is the inertia that joint i feels while the joints after it swing freely; where one is not above ``SINGULAR``
     times the largest M_ii all entries are NaN. Only the upper triangle of M is read.
     """
     import casadi
 
     n = M.shape[0]
-    least = SINGULAR * reduce(casadi.fmax, [M[k, k] for k in range(n)])
-    pivots = [casadi.SX(0)] * n
-    regular = casadi.SX(1)
-    A = [[M[min(i, j), max(i, j)] for j in range(n)] for i in range(n)]
+    smallest_pivot = SINGULAR * reduce(casadi.fmax, [M[k, k] for k in range(n)])
+
+    # Symmetric: row i of A from the upper triangle of M.
+    A = []
+    for i in range(n):
+        row = [M[min(i, j), max(i, j)] for j in range(n)]
+        A.append(row)
     b = [torque[i] for i in range(n)]
-    factors = [[casadi.SX(0)] * n for _ in range(n)]
+
+    # Elimination from the last joint to the first. When row k is reached, A_kk = D_k. With L_ki = A_ki / D_k:
+    #   A_ij <- A_ij - L_ki A_kj,   b_i <- b_i - L_ki b_k   for j <= i < k
+    is_regular = casadi.SX(1)
+    D_inverse = [casadi.SX(0)] * n
+    L = [[casadi.SX(0)] * n for _ in range(n)]
     for k in reversed(range(n)):
-        regular = casadi.logic_and(regular, A[k][k] > least)
-        pivots[k] = 1 / A[k][k]
+        is_regular = casadi.logic_and(is_regular, A[k][k] > smallest_pivot)
+        D_inverse[k] = 1 / A[k][k]
         for i in range(k):
-            factors[k][i] = A[k][i] * pivots[k]
+            L[k][i] = A[k][i] * D_inverse[k]
             for j in range(i + 1):
-                A[i][j] = A[i][j] - factors[k][i] * A[k][j]
-            b[i] = b[i] - factors[k][i] * b[k]
+                A[i][j] = A[i][j] - L[k][i] * A[k][j]
+            b[i] = b[i] - L[k][i] * b[k]
+
+    # Substitution from the first joint to the last: x_k = b_k / D_k - sum over i < k of L_ki x_i
     x: list[casadi.SX] = []
     for k in range(n):
-        x.append(b[k] * pivots[k] - sum((factors[k][i] * x[i] for i in range(k)), casadi.SX(0)))
+        known = sum((L[k][i] * x[i] for i in range(k)), casadi.SX(0))
+        x.append(b[k] * D_inverse[k] - known)
+
     # A sum with NaN is NaN, and one choice serves all entries.
-    poison = casadi.if_else(regular, 0.0, casadi.SX.nan())
-    return casadi.vertcat(*x) + poison
+    zero_or_nan = casadi.if_else(is_regular, 0.0, casadi.SX.nan())
+    return casadi.vertcat(*x) + zero_or_nan
 
 
 def recursive_forward_dynamics(table: InertialTable, q: casadi.SX, qd: casadi.SX, tau: casadi.SX) -> casadi.SX:

@@ -43,7 +43,8 @@ class SymbolicTable:
     def of(cls, description: Robot) -> SymbolicTable:
         """Return the table of an arm, rounded once from its exact numbers."""
         description = description_of(description)
-        return cls._filled(description, (_table_numbers(description) + 0.0).tolist())
+        numbers = _table_numbers(description) + 0.0  # -0.0 + 0.0 is 0.0
+        return cls._filled(description, numbers.tolist())
 
     @classmethod
     def parametric(cls, description: Robot) -> tuple[SymbolicTable, casadi.SX]:
@@ -57,13 +58,14 @@ class SymbolicTable:
 
     @classmethod
     def _filled(cls, description: Description, entries: Sequence[Entry]) -> SymbolicTable:
+        """Return the table of entries in the order of :func:`_table_numbers`."""
         n = description.n
         return cls(
-            description.convention,
-            tuple(bool(x) for x in description.numbers.prismatic),
-            tuple(tuple(entries[6 * i : 6 * i + 6]) for i in range(n)),
-            tuple(entries[6 * n : 6 * n + 12]),
-            tuple(entries[6 * n + 12 :]),
+            convention=description.convention,
+            prismatic=tuple(bool(x) for x in description.numbers.prismatic),
+            rows=tuple(tuple(entries[6 * i : 6 * i + 6]) for i in range(n)),
+            base=tuple(entries[6 * n : 6 * n + 12]),
+            tool=tuple(entries[6 * n + 12 :]),
         )
 
     @property
@@ -77,11 +79,14 @@ class SymbolicTable:
 
         a, d, cos_alpha, sin_alpha, cos_theta, sin_theta = self.rows[i]
         cos_q, sin_q = (1.0, 0.0) if self.prismatic[i] else (casadi.cos(q), casadi.sin(q))
+
         # The table's own angle enters by the addition theorem: an offset of 90 degrees is exact and costs nothing.
         c = cos_q * cos_theta - sin_q * sin_theta
         s = sin_q * cos_theta + cos_q * sin_theta
         if self.prismatic[i]:
             d = d + q
+
+        # Standard: Rz(theta) Tz(d) Tx(a) Rx(alpha). Modified: Rx(alpha) Tx(a) Rz(theta) Tz(d).
         if self.convention is Convention.STANDARD:
             return _matrix(
                 [c, -s * cos_alpha, s * sin_alpha, a * c],
@@ -112,7 +117,7 @@ class SymbolicTable:
 
 
 def joint_symbols(name: str, n: int) -> casadi.SX:
-    """Return n symbols without unit, n x 1."""
+    """Return n symbols, n x 1."""
     import casadi
 
     return casadi.SX.sym(name, n)
@@ -130,7 +135,7 @@ def _table_numbers(description: Description) -> Array:
 def table_pattern(description: Description) -> tuple[str, Array]:
     """Return the pattern of an arm's frames as text, and the values of its table's symbols, shape (symbols,), m and 1.
 
-    Arms of equal pattern (convention, kinds of joints, which numbers are 0, 1 or -1) have equal expressions.
+    Arms of equal pattern (convention, kinds of joints, places of the numbers 0, 1 and -1) have equal expressions.
     """
     pattern = _pattern(description)
     return f"{description.convention.value} {description.kinds} {pattern.code}", pattern.parameters[0]
@@ -151,13 +156,17 @@ def jacobian(table: SymbolicTable, q: casadi.SX, frame: ReferenceAxes = "world")
     frames = table.world_to_frames(q)
     tool = frames[-1] @ table.last_to_tool
     columns = []
-    for T, slides in zip(carrying(table.convention, frames), table.prismatic, strict=True):
-        axis = T[:3, 2]
-        linear = axis if slides else casadi.cross(axis, tool[:3, 3] - T[:3, 3])
-        columns.append(casadi.vertcat(linear, casadi.SX(3, 1) if slides else axis))
+    for T, is_prismatic in zip(carrying(table.convention, frames), table.prismatic, strict=True):
+        z = T[:3, 2]
+        p = T[:3, 3]
+        if is_prismatic:
+            columns.append(casadi.vertcat(z, casadi.SX(3, 1)))
+        else:
+            columns.append(casadi.vertcat(casadi.cross(z, tool[:3, 3] - p), z))
     J = casadi.horzcat(*columns)
     if frame == "world":
         return J
+
     R_tool_world = tool[:3, :3].T
     return casadi.vertcat(R_tool_world @ J[:3, :], R_tool_world @ J[3:, :])
 
@@ -174,7 +183,9 @@ def jacobian_dot(table: SymbolicTable, q: casadi.SX, qd: casadi.SX, frame: Refer
 
 
 def _matrix(*rows: Sequence[Any]) -> casadi.SX:
+    """Return a rigid transform, 4 x 4, from its first three rows."""
     import casadi
 
-    matrix: casadi.SX = casadi.vertcat(*(casadi.horzcat(*row) for row in (*rows, (0, 0, 0, 1))))
+    all_rows = [*rows, (0, 0, 0, 1)]
+    matrix: casadi.SX = casadi.vertcat(*(casadi.horzcat(*row) for row in all_rows))
     return matrix

@@ -14,8 +14,8 @@ from dhkit.description import Array, Numbers
 if TYPE_CHECKING:
     import casadi
 
-_NARROWEST = 1e-9
-"""Smallest width, rad/s or m/s: its square neither underflows nor makes the quotient overflow."""
+_SMALLEST_WIDTH = 1e-9
+"""Smallest positive width, rad/s or m/s: its square neither underflows nor makes the quotient overflow."""
 
 
 @dataclass(frozen=True)
@@ -36,10 +36,10 @@ class Friction:
     """Rate at which the direction factor s reaches 1/sqrt(2), rad/s or m/s; 0: a step with stiction."""
 
     def __post_init__(self) -> None:
-        known = isinstance(self.width, Real) and math.isfinite(self.width)
-        if not known or (self.width != 0 and self.width < _NARROWEST):
+        is_finite = isinstance(self.width, Real) and math.isfinite(self.width)
+        if not is_finite or (self.width != 0 and self.width < _SMALLEST_WIDTH):
             raise ValueError(
-                f"friction: width is {self.width!r}; expected 0, or a finite number from {_NARROWEST:g} on"
+                f"friction: width is {self.width!r}; expected 0, or a finite number from {_SMALLEST_WIDTH:g} on"
             )
 
     @classmethod
@@ -78,16 +78,16 @@ def friction_torque(qd: casadi.SX, parameters: casadi.SX, *, smooth: bool) -> ca
     import casadi
 
     n = qd.numel()
+    width = parameters[3 * n]
     torques = []
     for i in range(n):
-        speed = qd[i]
-        width = parameters[3 * n]
+        v = qd[i]
+        viscous = parameters[i]
+        c_pos = parameters[n + 2 * i]
+        c_neg = parameters[n + 2 * i + 1]
 
-        # Direction s from -1 to 1. Dry friction is c_pos for s = 1, c_neg for s = -1 and 0 for s = 0:
-        #     (c_pos - c_neg) / 2 s + (c_pos + c_neg) / 2 s^2.
-        s = speed / casadi.sqrt(speed * speed + width * width) if smooth else casadi.sign(speed)
-        positive = parameters[n + 2 * i]
-        negative = parameters[n + 2 * i + 1]
-        dry = (positive - negative) / 2 * s + (positive + negative) / 2 * (s * s)
-        torques.append(parameters[i] * speed + dry)
+        # Direction s from -1 to 1; dry friction is c_pos at s = 1, c_neg at s = -1, 0 at s = 0.
+        s = v / casadi.sqrt(v * v + width * width) if smooth else casadi.sign(v)
+        dry = (c_pos - c_neg) / 2 * s + (c_pos + c_neg) / 2 * (s * s)
+        torques.append(viscous * v + dry)
     return casadi.vertcat(*torques)

@@ -35,7 +35,7 @@ class InertialTable:
     armature: tuple[Scalar, ...]
     """Rotor inertias at the joint side, gear^2 times rotor inertia, kg m^2 or kg."""
     couplings: tuple[tuple[int, int, Scalar], ...]
-    """Joints i < j, from 0, and the drives' inertia that both turn, kg m^2, kg m or kg, where it is not 0."""
+    """Joints i < j, from 0, and the nonzero inertia of drives that move both together, kg m^2, kg m or kg."""
     gravity: Vector3
     """Free-fall acceleration in frame 0, m/s^2."""
     potential: Scalar
@@ -51,7 +51,8 @@ class InertialTable:
             A link without a body.
         """
         description = description_of(description)
-        return cls._filled(description, (_numbers(description) + 0.0).tolist())
+        numbers = _numbers(description) + 0.0  # -0.0 + 0.0 is 0.0
+        return cls._filled(description, numbers.tolist())
 
     @classmethod
     def parametric(cls, *descriptions: Description) -> tuple[InertialTable, casadi.SX]:
@@ -64,17 +65,22 @@ class InertialTable:
 
     @classmethod
     def _filled(cls, description: Description, entries: Sequence[Scalar]) -> InertialTable:
+        """Return the table of entries in the order of :func:`_numbers`."""
         n = description.n
         prismatic = description.numbers.prismatic.tolist()
+        joints = entries[: 6 * n]
+        moments = entries[6 * n : 16 * n]
+        armature = entries[16 * n : 17 * n]
         x, y, z, potential, *coupling = entries[17 * n :]
+
         pairs = zip(combinations(range(n), 2), coupling, strict=True)
         return cls(
-            tuple(JointRow(prismatic[i], *entries[6 * i : 6 * i + 6]) for i in range(n)),
-            tuple(Moments.of_entries(entries[6 * n + 10 * i : 6 * n + 10 * i + 10]) for i in range(n)),
-            tuple(entries[16 * n : 17 * n]),
-            tuple((i, j, entry) for (i, j), entry in pairs if not is_zero(entry)),
-            (x, y, z),
-            potential,
+            rows=tuple(JointRow(prismatic[i], *joints[6 * i : 6 * i + 6]) for i in range(n)),
+            links=tuple(Moments.of_entries(moments[10 * i : 10 * i + 10]) for i in range(n)),
+            armature=tuple(armature),
+            couplings=tuple((i, j, inertia) for (i, j), inertia in pairs if not is_zero(inertia)),
+            gravity=(x, y, z),
+            potential=potential,
         )
 
     @property
@@ -126,46 +132,63 @@ def inertial_pattern(*descriptions: Description) -> tuple[str, Array]:
 
 def _pattern(descriptions: Sequence[Description]) -> NumberPattern:
     # A batch repeats few arms: each is worked out once.
-    rows = {id(description): _numbers(description) for description in {id(x): x for x in descriptions}.values()}
-    return NumberPattern.of(np.stack([rows[id(description)] for description in descriptions]))
+    numbers: dict[int, Array] = {}
+    for description in descriptions:
+        if id(description) not in numbers:
+            numbers[id(description)] = _numbers(description)
+    return NumberPattern.of(np.stack([numbers[id(description)] for description in descriptions]))
 
 
 def _numbers(description: Description) -> Array:
     """Return an arm's numbers, shape (17 n + 4 + n (n - 1) / 2,).
 
-    Six a joint, ten a link, armatures, gravity, the base's energy, and the couplings, row by row.
+    Six numbers a joint, ten a link, armatures, gravity, the base's energy, and the couplings, row by row.
     """
     require_bodies(description)
     numbers = description.numbers
     rows = joint_rows(description)
     # Regrouped in exact arithmetic: moments that cancel become 0, and the result is rounded once.
     base, links = regroup(exact_moments(description), rows)
+
+    # In the axes of frame 0: g_0 = R^T g. The mass at frame 0's origin p, and the base's first moments h there, have
+    #   V = -m g . p - g_0 . h
     gravity = numbers.T_world_base[:3, :3].T @ numbers.gravity
     mass = base.mass + sum(link.mass for link in links)
-    energy = -(gravity @ np.array(base.first, dtype=float)) - float(mass) * (
-        numbers.gravity @ numbers.T_world_base[:3, 3]
-    )
-    joints = list(chain.from_iterable(row.entries for row in rows))
+    first = np.array(base.first, dtype=float)
+    energy = -(gravity @ first) - float(mass) * (numbers.gravity @ numbers.T_world_base[:3, 3])
+
+    joints: list[float] = []
+    for row in rows:
+        joints += row.entries
+    moments: list[float] = []
+    for link in links:
+        moments += [float(entry) for entry in link.entries]
     coupling = numbers.coupling[np.triu_indices(description.n, 1)]
-    moments = [float(entry) for link in links for entry in link.entries]
     return np.array([*joints, *moments, *numbers.armature, *gravity, energy, *coupling], dtype=float)
 
 
 def exact_moments(description: Description) -> list[Moments]:
     """Return the links' moments in their joint frames, as exact fractions."""
     numbers = description.numbers
-    standard = description.convention is Convention.STANDARD
+    is_standard = description.convention is Convention.STANDARD
     moments = []
     for i in range(description.n):
-        inertia = [[Fraction(x) for x in row] for row in numbers.inertia[i].tolist()]
-        x, y, z = (Fraction(x) for x in numbers.com[i].tolist())
-        com: Vector3 = (x, y, z)
-        if standard:
-            # The transform from the joint frame to DH frame i is Tx(a) Rx(alpha).
+        mass = Fraction(float(numbers.mass[i]))
+        com = _exact_vector(numbers.com[i])
+        inertia = [_exact_vector(row) for row in numbers.inertia[i]]
+        if is_standard:
+            # DH frame i in the joint frame is Tx(a) Rx(alpha): c' = a x + Rx c, I' = Rx I Rx^T.
+            a = Fraction(float(numbers.a[i]))
             c = Fraction(float(numbers.cos_alpha[i]))
             s = Fraction(float(numbers.sin_alpha[i]))
-            com = plus((Fraction(float(numbers.a[i])), 0, 0), about_x(c, s, com))
-            half = [about_x(c, s, (row[0], row[1], row[2])) for row in inertia]
-            inertia = [list(about_x(c, s, (col[0], col[1], col[2]))) for col in zip(*half, strict=True)]
-        moments.append(Moments.of_body(Fraction(float(numbers.mass[i])), com, inertia))
+            com = plus((a, 0, 0), about_x(c, s, com))
+            rows = [about_x(c, s, row) for row in inertia]
+            inertia = [about_x(c, s, (column[0], column[1], column[2])) for column in zip(*rows, strict=True)]
+        moments.append(Moments.of_body(mass, com, inertia))
     return moments
+
+
+def _exact_vector(vector: Array) -> Vector3:
+    """Return three doubles, shape (3,), as exact fractions."""
+    x, y, z = (Fraction(x) for x in vector.tolist())
+    return (x, y, z)

@@ -26,29 +26,31 @@ class JointRow:
 
     @property
     def entries(self) -> tuple[Scalar, ...]:
-        """a, d, cos alpha, sin alpha, cos theta, sin theta."""
-        return self.a, self.d, self.cos_alpha, self.sin_alpha, self.cos_theta, self.sin_theta
+        """The six numbers a, d, cos alpha, sin alpha, cos theta, sin theta, as a flat table has them."""
+        return (self.a, self.d, self.cos_alpha, self.sin_alpha, self.cos_theta, self.sin_theta)
 
 
 def joint_rows(description: Description) -> list[JointRow]:
-    """Return an arm's joint frames; a standard table's row gives its a and alpha to the joint behind it."""
+    """Return an arm's joint frames; a and alpha of a standard table's row belong to the next joint's transform."""
     numbers = description.numbers
-    columns = (numbers.a, numbers.cos_alpha, numbers.sin_alpha)
-    a, cos_alpha, sin_alpha = (column.tolist() for column in columns)
+    a = numbers.a.tolist()
+    cos_alpha = numbers.cos_alpha.tolist()
+    sin_alpha = numbers.sin_alpha.tolist()
     if description.convention is Convention.STANDARD:
         a = [0.0, *a[:-1]]
         cos_alpha = [1.0, *cos_alpha[:-1]]
         sin_alpha = [0.0, *sin_alpha[:-1]]
-    return [
-        JointRow(*entries)
-        for entries in zip(
-            numbers.prismatic.tolist(),
-            a,
-            numbers.d.tolist(),
-            cos_alpha,
-            sin_alpha,
-            numbers.cos_theta.tolist(),
-            numbers.sin_theta.tolist(),
-            strict=True,
+
+    rows = []
+    for i in range(description.n):
+        row = JointRow(
+            prismatic=bool(numbers.prismatic[i]),
+            a=a[i],
+            d=float(numbers.d[i]),
+            cos_alpha=cos_alpha[i],
+            sin_alpha=sin_alpha[i],
+            cos_theta=float(numbers.cos_theta[i]),
+            sin_theta=float(numbers.sin_theta[i]),
         )
-    ]
+        rows.append(row)
+    return rows

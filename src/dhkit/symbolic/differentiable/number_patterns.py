@@ -1,4 +1,4 @@
-"""Pattern of an arm's numbers: constants of an expression (0, 1, -1), and symbols that arms give values."""
+"""The split of an arm's numbers into constants of an expression (0, 1, -1) and symbols that arms give values."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CONSTANTS = (0.0, 1.0, -1.0)
 
 @dataclass(frozen=True, eq=False)
 class NumberPattern:
-    """The numbers of one or several arms, and which of them are symbols in expressions that all these arms share.
+    """The numbers of one or several arms, some of them symbols in expressions that all these arms share.
 
     A number is a constant where it is the same 0, 1 or -1 in all arms. Arms of equal :attr:`code` have equal
     expressions, and share their compiled kernels.
@@ -29,7 +29,7 @@ class NumberPattern:
     numbers
         Shape (arms, N), one row an arm, without negative zeros.
     is_symbol
-        Shape (N,).
+        Mask of the numbers that are symbols, shape (N,).
     """
 
     numbers: Array
@@ -38,8 +38,10 @@ class NumberPattern:
     @classmethod
     def of(cls, numbers: Array) -> NumberPattern:
         """Return the pattern of numbers, shape (arms, N)."""
-        numbers = numbers + 0.0
-        return cls(numbers, ~(np.isin(numbers[0], CONSTANTS) & (numbers == numbers[0]).all(axis=0)))
+        numbers = numbers + 0.0  # -0.0 + 0.0 is 0.0
+        is_shared = (numbers == numbers[0]).all(axis=0)
+        is_constant = np.isin(numbers[0], CONSTANTS) & is_shared
+        return cls(numbers, ~is_constant)
 
     @property
     def code(self) -> str:
@@ -57,6 +59,9 @@ class NumberPattern:
         import casadi
 
         symbols = casadi.SX.sym("parameter", int(self.is_symbol.sum()))
-        remaining = iter(casadi.vertsplit(symbols) if symbols.numel() else ())
-        pairs = zip(self.numbers[0].tolist(), self.is_symbol, strict=True)
-        return [next(remaining) if is_symbol else number for number, is_symbol in pairs], symbols
+        entries: list[Any] = self.numbers[0].tolist()
+        if symbols.numel():
+            places = np.flatnonzero(self.is_symbol).tolist()
+            for place, symbol in zip(places, casadi.vertsplit(symbols), strict=True):
+                entries[place] = symbol
+        return entries, symbols

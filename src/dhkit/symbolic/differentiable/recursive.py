@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from dhkit.symbolic.differentiable.equation_frames import EquationFrame, equation_frames
 from dhkit.symbolic.differentiable.inertial_table import InertialTable
 from dhkit.symbolic.differentiable.moments import Moments
-from dhkit.symbolic.differentiable.vectors import Scalar, Vector3, cross, plus, times
+from dhkit.symbolic.differentiable.vectors import ZERO_VECTOR, Scalar, Vector3, cross, plus, times
 
 if TYPE_CHECKING:
     import casadi
@@ -37,8 +37,11 @@ class _AngularMotion:
     @cached_property
     def U(self) -> tuple[Vector3, Vector3, Vector3]:
         """The matrix U, row by row, 1/s^2."""
-        # [wd]x + [w]x [w]x has w_i w_j off its diagonal, and -w_j^2 - w_k^2 on it. Of the latter and of U_zy the
-        # differences to stored entries are used: U_xx = U_zz + w_x^2 - w_z^2 and U_zy = 2 w_y w_z - U_yz.
+        # [wd]x + [w]x [w]x =
+        #   -(y^2 + z^2)   xy - wd_z      xz + wd_y
+        #   xy + wd_z      -(x^2 + z^2)   yz - wd_x
+        #   xz - wd_y      yz + wd_x      -(x^2 + y^2)      with (x, y, z) = w
+        # so that U_xx = U_zz + x^2 - z^2 and U_zy = 2 y z - U_yz.
         x, y, z = self.w
         xy = x * y
         xx = x * x
@@ -59,12 +62,17 @@ class _AngularMotion:
         """Return the same motion in the twisted axes of the next joint."""
         c = frame.cos_alpha
         s = frame.sin_alpha
-        axis = self.times((0.0, -s, c))
-        return _AngularMotion(frame.to_twisted(self.w), c * self.wd_z - s * self.wd_y, frame.to_twisted(axis))
+        w = frame.to_twisted(self.w)
+
+        # The new z axis is (0, -s, c) in the old axes: wd_z' = c wd_z - s wd_y, and the last column of U' is U z'.
+        wd_z = c * self.wd_z - s * self.wd_y
+        column = self.times((0.0, -s, c))
+        return _AngularMotion(w, wd_z, frame.to_twisted(column))
 
     def with_joint_motion(self, qd: Scalar, qdd: Scalar) -> _AngularMotion:
         """Return the motion with that of a revolute joint about z added: rates rad/s and rad/s^2."""
-        return _AngularMotion((self.w[0], self.w[1], self.w[2] + qd), self.wd_z + qdd, self.column)
+        x, y, z = self.w
+        return _AngularMotion((x, y, z + qd), self.wd_z + qdd, self.column)
 
     def in_link_axes(self, frame: EquationFrame) -> _AngularMotion:
         """Return the same motion, given in twisted axes, in the axes of the link's equations."""
@@ -72,11 +80,10 @@ class _AngularMotion:
 
     def moment(self, link: Moments) -> Vector3:
         """Return the integral of r x U r over a link's mass, N m: the moment that its rotation needs."""
-        # With second moments S = integral of r r^T:  integral of (r x U r)_x = sum_k S_yk U_zk - S_zk U_yk, and so on.
-        # Where a difference of diagonal entries of U occurs, it is written by w.
-        U_xx, U_xy, U_xz = self.U[0]
-        U_yx, U_yy, U_yz = self.U[1]
-        U_zx, U_zy, U_zz = self.U[2]
+        # With S the integral of r r^T and A = U S, the integral of U r r^T, the moment is
+        #   (A_zy - A_yz, A_xz - A_zx, A_yx - A_xy)
+        # in which U_xx - U_zz = x^2 - z^2, and U_yx S_xx - U_xy S_yy = (S_xx + S_yy) wd_z + (S_xx - S_yy) x y.
+        (U_xx, U_xy, U_xz), (U_yx, U_yy, U_yz), (U_zx, U_zy, U_zz) = self.U
         x, y, z = self.w
         S = link
         return (
@@ -99,35 +106,43 @@ def recursive_inverse_dynamics(
     # Outwards: angular motion and acceleration of each link, and the force and moment that it needs,
     #     f = m a + U h,    n = integral of r x U r + h x a,    h = m c.
     frames = equation_frames(table, q)
-    motion = _AngularMotion((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))
-    a = times(-1.0, table.gravity)  # gravity acts like an acceleration of the base upwards
-    wrenches = []
+
+    # From the base to the last link: a is the acceleration of each joint's origin minus gravity.
+    motion = _AngularMotion(ZERO_VECTOR, 0.0, ZERO_VECTOR)
+    a = times(-1.0, table.gravity)
+    link_forces: list[Vector3] = []
+    link_moments: list[Vector3] = []
     for i, frame in enumerate(frames):
+        # a_i = a_(i-1) + U_(i-1) lever, and for a prismatic joint 2 w x z qd + z qdd
         a = frame.to_twisted(plus(a, motion.times(frame.lever)))
         motion = motion.in_twisted_axes(frame)
         if frame.prismatic:
-            double = qd[i] + qd[i]
-            a = a[0] + double * motion.w[1], a[1] - double * motion.w[0], a[2] + qdd[i]
+            two_qd = qd[i] + qd[i]
+            a = (a[0] + two_qd * motion.w[1], a[1] - two_qd * motion.w[0], a[2] + qdd[i])
         else:
             motion = motion.with_joint_motion(qd[i], qdd[i])
         a = frame.from_twisted(a)
         motion = motion.in_link_axes(frame)
-        own = frame.moments
-        force = plus(times(own.mass, a), motion.times(own.first))
-        moment = plus(motion.moment(own), cross(own.first, a))
-        wrenches.append((force, moment))
 
-    # Inwards: each joint carries its link and all links after it, tau_i = n_z if revolute, f_z if prismatic.
-    f: Vector3 = (0.0, 0.0, 0.0)
-    n: Vector3 = (0.0, 0.0, 0.0)
+        # Newton: F = m a + U h. Euler about the joint's origin: N = integral of r x U r + h x a. h is the first moment.
+        link = frame.moments
+        link_forces.append(plus(times(link.mass, a), motion.times(link.first)))
+        link_moments.append(plus(motion.moment(link), cross(link.first, a)))
+
+    # From the last link to the base: force f and moment n that joint i transmits, and their components along z.
+    f = ZERO_VECTOR
+    n = ZERO_VECTOR
     tau = [0.0] * table.n
     for i in reversed(range(table.n)):
         frame = frames[i]
-        f = plus(wrenches[i][0], f)
-        n = plus(wrenches[i][1], n)
+        f = plus(link_forces[i], f)
+        n = plus(link_moments[i], n)
         tau[i] = (f if frame.prismatic else n)[2] + table.armature[i] * qdd[i]
+
         f = frame.to_previous(f)
-        n = plus(frame.to_previous(n), cross(frame.lever, f))
+        n = frame.to_previous(n)
+        n = plus(n, cross(frame.lever, f))
+
     for i, j, inertia in table.couplings:
         tau[i] = tau[i] + inertia * qdd[j]
         tau[j] = tau[j] + inertia * qdd[i]

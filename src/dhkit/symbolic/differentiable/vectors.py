@@ -1,6 +1,6 @@
 """Vectors of three floats, exact fractions or CasADi expressions.
 
-They are plain tuples, no CasADi matrices, so that a product with an exact 0 or 1 never becomes an expression.
+They are plain tuples, not CasADi matrices, so that a product with an exact 0 or 1 never becomes an expression.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ Scalar: TypeAlias = Any
 Vector3: TypeAlias = tuple[Scalar, Scalar, Scalar]
 
 _NUMBER = (float, int)
+"""Types of the numbers that products and sums look at; exact fractions are multiplied and added as they are."""
 ZERO_VECTOR: Vector3 = (0.0, 0.0, 0.0)
 
 
@@ -62,6 +63,7 @@ def about_x_back(c: Scalar, s: Scalar, a: Vector3) -> Vector3:
 
 
 def _rotate(c: Scalar, s: Scalar, x: Scalar, y: Scalar) -> tuple[Scalar, Scalar]:
+    """Return (c x - s y, s x + c y)."""
     return _difference(_product(c, x), _product(s, y)), _sum(_product(s, x), _product(c, y))
 
 
@@ -69,6 +71,7 @@ def _rotate(c: Scalar, s: Scalar, x: Scalar, y: Scalar) -> tuple[Scalar, Scalar]
 
 
 def _product(a: Scalar, b: Scalar) -> Scalar:
+    """Return a b, where 0 and 1 are left out."""
     for x, y in ((a, b), (b, a)):
         if isinstance(x, _NUMBER):
             if x == 0:
@@ -79,15 +82,21 @@ def _product(a: Scalar, b: Scalar) -> Scalar:
 
 
 def _sum(a: Scalar, b: Scalar) -> Scalar:
+    """Return a + b, where 0 is left out."""
     if isinstance(a, _NUMBER) and a == 0:
         return b
-    return a if isinstance(b, _NUMBER) and b == 0 else a + b
+    if isinstance(b, _NUMBER) and b == 0:
+        return a
+    return a + b
 
 
 def _difference(a: Scalar, b: Scalar) -> Scalar:
+    """Return a - b, where 0 is left out."""
     if isinstance(b, _NUMBER) and b == 0:
         return a
-    return -b if isinstance(a, _NUMBER) and a == 0 else a - b
+    if isinstance(a, _NUMBER) and a == 0:
+        return -b
+    return a - b
 
 
 def is_zero(x: Scalar) -> bool:

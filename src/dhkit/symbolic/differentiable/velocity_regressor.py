@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from dhkit.description import INERTIA_PLACES, Convention
@@ -30,8 +30,8 @@ def velocity_regressor(
 ) -> casadi.SX:
     """Return Y with Y theta = M(q) qdd_r + C(q, qd) qd_r + g(q), n x 10 n, without the drives' inertia.
 
-    What is quadratic in the rates in the regressor of inverse dynamics (Atkeson, An & Hollerbach 1986, eq. 8) is
-    replaced by the symmetric bilinear form of qd and qd_r. That is C(q, qd) qd_r with C of the Christoffel symbols,
+    Terms that are quadratic in the rates in the regressor of inverse dynamics (Atkeson, An & Hollerbach 1986, eq. 8)
+    are replaced by the symmetric bilinear form of qd and qd_r. That is C(q, qd) qd_r with C of the Christoffel symbols,
     which are symmetric in the two rates that they are multiplied by.
 
     Parameters
@@ -50,8 +50,11 @@ def velocity_regressor(
     columns: list[tuple[Vector3, Vector3]] = []
     for i in range(table.n):
         step = _FrameStep.of(table, i, q[i])
-        motion = step.carried(motion, qd[i], qd_r[i], qdd_r[i])
-        columns = [step.carried_column(column) for column in columns] + [step.own_column]
+        motion = step.next_motion(motion, qd[i], qd_r[i], qdd_r[i])
+        columns = [step.moved_column(column) for column in columns]
+        columns.append(step.own_column)
+
+        # The torque at joint j that link i needs is the power along column j of link i's Jacobian.
         for j, (v, w) in enumerate(columns):
             Y[j, 10 * i : 10 * i + 10] = casadi.horzcat(*motion.power(v, w))
     return Y
@@ -75,21 +78,32 @@ class _BilinearMotion:
 
         U = [wd]x + ([w]x [w_r]x + [w_r]x [w]x) / 2.
         """
-        both = plus(cross(self.w, cross(self.w_r, r)), cross(self.w_r, cross(self.w, r)))
-        return plus(cross(self.wd, r), times(0.5, both))
+        twice_centripetal = plus(cross(self.w, cross(self.w_r, r)), cross(self.w_r, cross(self.w, r)))
+        return plus(cross(self.wd, r), times(0.5, twice_centripetal))
 
     def power(self, v: Vector3, w: Vector3) -> list[Scalar]:
         """Return, for each of the link's ten parameters, the power needed to move with v (of its origin) and w.
 
         Force m a + U (m c) and moment m c x a + I wd + (w x I w_r + w_r x I w) / 2 about the frame's origin.
         """
-        first = [dot(v, self.relative_acceleration(unit)) + dot(w, cross(unit, self.a)) for unit in _UNITS]
-        second = []
-        turned, turned_r = cross(w, self.w), cross(w, self.w_r)  # w . (w_i x I w_r) = (w x w_i) . I w_r
+        # m:       v . a
+        of_mass = dot(v, self.a)
+
+        # m c:     v . U e_k + w . (e_k x a)  for each axis e_k
+        of_first = [dot(v, self.relative_acceleration(unit)) + dot(w, cross(unit, self.a)) for unit in _UNITS]
+
+        # I:       w . I wd + (w x w_i) . I w_r / 2 + (w x w_r) . I w_i / 2,  with w_i the link's own angular velocity
+        of_second = []
+        w_cross_own = cross(w, self.w)
+        w_cross_r = cross(w, self.w_r)
         for i, j in INERTIA_PLACES.values():
-            terms = [_entry(i, j, w, self.wd), 0.5 * _entry(i, j, turned, self.w_r)]
-            second.append(sum([*terms, 0.5 * _entry(i, j, turned_r, self.w)]))
-        return [dot(v, self.a), *first, *second]
+            terms = [
+                _entry(i, j, w, self.wd),
+                0.5 * _entry(i, j, w_cross_own, self.w_r),
+                0.5 * _entry(i, j, w_cross_r, self.w),
+            ]
+            of_second.append(sum(terms))
+        return [of_mass, *of_first, *of_second]
 
 
 def _entry(i: int, j: int, a: Vector3, b: Vector3) -> Scalar:
@@ -117,16 +131,28 @@ class _FrameStep:
         """Return the step over joint i, counted from 0, at its position q in rad or m."""
         import casadi
 
-        a, d, cos_alpha, sin_alpha, c, s = table.rows[i]
+        a, d, cos_alpha, sin_alpha, cos_theta, sin_theta = table.rows[i]
         if table.prismatic[i]:
             d = d + q
+            c = cos_theta
+            s = sin_theta
         else:
             cos_q = casadi.cos(q)
             sin_q = casadi.sin(q)
-            c, s = cos_q * c - sin_q * s, sin_q * c + cos_q * s
+            c = cos_q * cos_theta - sin_q * sin_theta
+            s = sin_q * cos_theta + cos_q * sin_theta
+
+        # In the next frame's axes. Standard, Rz(theta) Tz(d) Tx(a) Rx(alpha): the axis is Rx^T z.
+        # Modified, Rx(alpha) Tx(a) Rz(theta) Tz(d): the axis is z.
         standard = table.convention is Convention.STANDARD
-        lever: Vector3 = (a, sin_alpha * d, cos_alpha * d) if standard else (a * c, -a * s, d)
-        axis: Vector3 = (0.0, sin_alpha, cos_alpha) if standard else (0.0, 0.0, 1.0)
+        lever: Vector3
+        axis: Vector3
+        if standard:
+            lever = (a, sin_alpha * d, cos_alpha * d)
+            axis = (0.0, sin_alpha, cos_alpha)
+        else:
+            lever = (a * c, -a * s, d)
+            axis = (0.0, 0.0, 1.0)
         return cls(table.prismatic[i], standard, (cos_alpha, sin_alpha), (c, s), lever, axis)
 
     def to_own_axes(self, x: Vector3) -> Vector3:
@@ -140,30 +166,43 @@ class _FrameStep:
         """The joint's own column of the Jacobian: velocity of the next frame's origin, and angular velocity."""
         if self.prismatic:
             return self.axis, ZERO_VECTOR
+        if self.standard:
+            return cross(self.axis, self.lever), self.axis
         # In the modified convention the frame's origin lies on the axis.
-        return (cross(self.axis, self.lever) if self.standard else ZERO_VECTOR), self.axis
+        return ZERO_VECTOR, self.axis
 
-    def carried_column(self, column: tuple[Vector3, Vector3]) -> tuple[Vector3, Vector3]:
+    def moved_column(self, column: tuple[Vector3, Vector3]) -> tuple[Vector3, Vector3]:
         """Return an earlier joint's column, given for the previous frame, for this frame."""
         v = self.to_own_axes(column[0])
         w = self.to_own_axes(column[1])
         return plus(v, cross(w, self.lever)), w
 
-    def carried(self, before: _BilinearMotion, v: Scalar, v_r: Scalar, dv_r: Scalar) -> _BilinearMotion:
-        """Return this link's motion from the previous link's, the joint's rates v, v_r and acceleration dv_r."""
-        motion = _BilinearMotion(*(self.to_own_axes(x) for x in (before.w, before.w_r, before.wd, before.a)))
-        # v w_r x z + v_r w x z: twice the bilinear form of v w x z.
-        turning = plus(times(v, cross(motion.w_r, self.axis)), times(v_r, cross(motion.w, self.axis)))
-        driven = times(dv_r, self.axis)
-        if self.prismatic:
-            a = plus(plus(motion.a, motion.relative_acceleration(self.lever)), plus(turning, driven))
-            return _BilinearMotion(motion.w, motion.w_r, motion.wd, a)
-        after = _BilinearMotion(
-            plus(motion.w, times(v, self.axis)),
-            plus(motion.w_r, times(v_r, self.axis)),
-            plus(motion.wd, plus(times(0.5, turning), driven)),
-            motion.a,
+    def next_motion(self, before: _BilinearMotion, qd: Scalar, qd_r: Scalar, qdd_r: Scalar) -> _BilinearMotion:
+        """Return this link's motion from the previous link's, the joint's rates qd, qd_r and acceleration qdd_r."""
+        z = self.axis
+        motion = _BilinearMotion(
+            w=self.to_own_axes(before.w),
+            w_r=self.to_own_axes(before.w_r),
+            wd=self.to_own_axes(before.wd),
+            a=self.to_own_axes(before.a),
         )
-        # The lever turns with this link in the standard convention, with the link before in the modified one.
-        swung = (after if self.standard else motion).relative_acceleration(self.lever)
-        return _BilinearMotion(after.w, after.w_r, after.wd, plus(after.a, swung))
+
+        # Twice the bilinear form of qd w x z: qd w_r x z + qd_r w x z
+        twice_w_z = plus(times(qd, cross(motion.w_r, z)), times(qd_r, cross(motion.w, z)))
+        driven = times(qdd_r, z)
+
+        if self.prismatic:
+            # a + U lever + 2 qd w x z + qdd z
+            a = plus(plus(motion.a, motion.relative_acceleration(self.lever)), plus(twice_w_z, driven))
+            return _BilinearMotion(motion.w, motion.w_r, motion.wd, a)
+
+        # w + qd z, and wd + qd w x z + qdd z
+        after = _BilinearMotion(
+            w=plus(motion.w, times(qd, z)),
+            w_r=plus(motion.w_r, times(qd_r, z)),
+            wd=plus(motion.wd, plus(times(0.5, twice_w_z), driven)),
+            a=motion.a,
+        )
+        # The lever rotates with this link in the standard convention, with the link before in the modified one.
+        carrier = after if self.standard else motion
+        return replace(after, a=plus(after.a, carrier.relative_acceleration(self.lever)))

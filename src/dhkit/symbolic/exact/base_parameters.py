@@ -1,10 +1,11 @@
 """Base parameters: the fewest combinations of inertial parameters that the torques depend on.
 
-First, moments that are symmetric about a revolute joint's axis, and all second moments of a prismatic joint's link, are
-added to the link before (Gautier & Khalil, 1990, "Direct calculation of minimum set of inertial parameters of serial
-robots"), exactly, with symbols. Then parameters that have no effect, or that depend on others, are found as zero or
-linearly dependent columns of the regressor at random lengths and angles, and are grouped exactly. Substitution proves
-that the grouped equations equal the full ones.
+1. Moments that are symmetric about a revolute joint's axis, and all second moments of a prismatic joint's link, are
+   added to the link before (Gautier & Khalil, 1990, "Direct calculation of minimum set of inertial parameters of serial
+   robots"), exactly, with symbols.
+2. Parameters that have no effect, or that depend on others, are found as zero or linearly dependent columns of the
+   regressor at random lengths and angles, and are grouped exactly.
+3. Substitution proves that the grouped equations equal the full ones.
 """
 
 from __future__ import annotations
@@ -26,11 +27,16 @@ from dhkit.symbolic.exact.exact_arm import ExactArm, ExactRow
 from dhkit.symbolic.exact.lagrangian import Lagrangian, Proof, lagrangian
 from dhkit.symbolic.ring import Constant, Element, Elements, Ring, RingError, translated
 from dhkit.symbolic.ring.bounds import BOUNDS
+from dhkit.symbolic.ring.notation import constants_of, generators_of
 
 _SECOND = {"XX": (0, 0), "XY": (0, 1), "XZ": (0, 2), "YY": (1, 1), "YZ": (1, 2), "ZZ": (2, 2)}
+"""Khalil's names of second moments, with their places in the inertia matrix."""
 _MOMENT = {"MX": 0, "MY": 1, "MZ": 2}
-_READABLE, _LONGEST_DEFINITION = 30, 200
-"""Number of definitions, and characters of a definition, that a notebook shows."""
+"""Khalil's names of first moments, with their axes."""
+_READABLE = 30
+"""Largest number of terms of a definition that a notebook shows; of a longer one it shows the number of terms."""
+_LONGEST_DEFINITION = 200
+"""Largest number of characters of a definition that a notebook shows."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,9 +44,9 @@ class BaseParameters:
     """The fewest combinations of inertial parameters that determine an arm's torques.
 
     Names follow Khalil: inertia ``XX2`` ... ``ZZ2`` about the origin of link 2's joint frame, first moments ``MX2
-    MY2 MZ2``, mass ``M2``, rotor inertia at the joint side ``Ia2``, and that which two joints turn ``Ic23``. The
-    joint frame moves with the link and has its z axis along the joint; in the modified convention it is the DH
-    frame.
+    MY2 MZ2``, mass ``M2``, rotor inertia at the joint side ``Ia2``, and that of a drive that two joints move together
+    ``Ic23``. The joint frame moves with the link and has its z axis along the joint; in the modified convention it is
+    the DH frame.
 
     Attributes
     ----------
@@ -68,11 +74,10 @@ class BaseParameters:
         return repr_line("BaseParameters", f"{self.full.description.name}, {len(self)}", ", ".join(self.names))
 
     def _repr_html_(self) -> str:
-        shown = {name: self.definitions[name] for name in self.names[:MOST_ROWS]}
-        rows = [
-            (name, str(element) if len(element) <= _READABLE else counted(len(element), "term"))
-            for name, element in shown.items()
-        ]
+        rows = []
+        for name in self.names[:MOST_ROWS]:
+            element = self.definitions[name]
+            rows.append((name, str(element) if len(element) <= _READABLE else counted(len(element), "term")))
         caption = f"Base parameters of {self.full.description.name}"
         return html_table(("parameter", "stands for"), rows, caption, count=len(self), longest=_LONGEST_DEFINITION)
 
@@ -82,10 +87,11 @@ class BaseParameters:
         M and g are compared; C consists of derivatives of M.
         """
         short = self.lagrangian
-        ring = self.full.arm.ring
-        places = {short.arm.ring.place("constant", name): element for name, element in self.definitions.items()}
-        back = _mapped(np.column_stack([short.M, short.g]), ring, places)
-        difference = back - np.column_stack([self.full.M, self.full.g])
+        full = self.full
+        definitions = {short.arm.ring.place("constant", name): element for name, element in self.definitions.items()}
+
+        substituted = _substitute(np.column_stack([short.M, short.g]), full.arm.ring, definitions)
+        difference = substituted - np.column_stack([full.M, full.g])
         return Proof("M and g in base parameters are those in all parameters", difference)
 
 
@@ -110,14 +116,17 @@ def base_parameters(description: Description) -> BaseParameters:
     >>> bool(base.prove())
     True
     """
+    # Grouping may divide by a sum of lengths whose reciprocal the ring does not have: derive again in one that has it.
     needed: tuple[Expression, ...] = ()
     for _ in range(description.n):
         full = lagrangian(description, "inertial", needed)
-        if (terms := sum(len(element) for element in full.M.flat)) > BOUNDS.inertial_terms:
+        terms = sum(len(element) for element in full.M.flat)
+        if terms > BOUNDS.inertial_terms:
             raise RingError(
                 f"{description.name}: M of {terms} terms is too long for base parameters; "
                 f"at most {BOUNDS.inertial_terms}"
             )
+
         definitions = _regroup(full.arm)
         try:
             definitions = independent(_equations(full.arm, definitions), definitions)
@@ -133,52 +142,64 @@ def _regroup(arm: ExactArm) -> dict[str, Element]:
     bodies = composite.joint_bodies(arm)
     steps = composite.joint_steps(arm)
     for j in range(arm.n - 1, 0, -1):
-        moving, bodies[j] = _split(arm.ring, arm.ring.kinds[j], bodies[j])
-        bodies[j - 1] = bodies[j - 1] + moving.moved(_at_rest(arm, j, steps[j]))
+        shared, bodies[j] = _split(arm.ring, arm.ring.kinds[j], bodies[j])
+        bodies[j - 1] = bodies[j - 1] + shared.moved(_at_zero(arm, j, steps[j]))
+
     definitions: dict[str, Element] = {}
     end = _ending(arm)
     for j, body in enumerate(bodies, start=1):
         definitions |= {f"{key}{j}{end}": body.second[place] for key, place in _SECOND.items()}
-        definitions |= {f"{key}{j}{end}": body.moment[k] for key, k in _MOMENT.items()}
-        definitions |= {f"M{j}{end}": body.mass, f"Ia{j}{end}": arm.armature[j - 1]}
-    definitions |= {f"Ic{i + 1}{j + 1}{end}": inertia for i, j, inertia in arm.couplings}
+        definitions |= {f"{key}{j}{end}": body.moment[axis] for key, axis in _MOMENT.items()}
+        definitions[f"M{j}{end}"] = body.mass
+        definitions[f"Ia{j}{end}"] = arm.armature[j - 1]
+    for i, j, inertia in arm.couplings:
+        definitions[f"Ic{i + 1}{j + 1}{end}"] = inertia
     return {name: element for name, element in definitions.items() if element}
 
 
 def _ending(arm: ExactArm) -> str:
     """Return the ending of base parameters' names: an underscore where a parameter of the file has such a name."""
-    names = {f"{key}{j}" for key in (*_SECOND, *_MOMENT, "M", "Ia") for j in range(1, arm.n + 1)}
-    names |= {f"Ic{i + 1}{j + 1}" for i, j, _ in arm.couplings}
+    names = {f"Ic{i + 1}{j + 1}" for i, j, _ in arm.couplings}
+    for j in range(1, arm.n + 1):
+        names |= {f"{key}{j}" for key in (*_SECOND, *_MOMENT, "M", "Ia")}
     return "" if names.isdisjoint(arm.ring.constants) else "_"
 
 
 def _split(ring: Ring, kind: str, body: RigidBody) -> tuple[RigidBody, RigidBody]:
-    """Return the part of a link that the link before may hold as well, and the rest."""
+    """Return the part of a link that moves the link before in the same way, for every joint value, and the rest."""
     zero = ring.zero
     moment = np.array([zero] * 3, dtype=object)
     second = np.full((3, 3), zero, dtype=object)
+
+    # Prismatic: the link does not turn in the link before, so that its inertia may be that link's.
     if kind != "R":
         return RigidBody(zero, moment, body.second), RigidBody(body.mass, body.moment, second)
+
+    # Revolute: a body that is symmetric about z looks the same for every angle: M, MZ, and YY in both XX and YY.
+    # Left are XX - YY, XY, XZ, YZ, ZZ, MX and MY.
     moment[2] = body.moment[2]
     second[0, 0] = second[1, 1] = body.second[1, 1]
-    moving = RigidBody(body.mass, moment, second)
-    return moving, RigidBody(zero, body.moment - moment, body.second - second)
+    symmetric = RigidBody(body.mass, moment, second)
+    return symmetric, RigidBody(zero, body.moment - moment, body.second - second)
 
 
-def _at_rest(arm: ExactArm, j: int, step: JointTransform) -> JointTransform:
-    """Return a joint's step with its variable at zero, on which moved moments do not depend."""
+def _at_zero(arm: ExactArm, j: int, step: JointTransform) -> JointTransform:
+    """Return a joint's step with its variable at zero, on which shared moments do not depend."""
     ring = arm.ring
     if ring.kinds[j] == "R":
-        places = {ring.place("sine", j): ring.zero, ring.place("cosine", j): ring.one}
+        zero_position = {ring.place("sine", j): ring.zero, ring.place("cosine", j): ring.one}
     else:
-        places = {ring.place("position", j): ring.zero}
-    return JointTransform(_mapped(step.R, ring, places), _mapped(step.p, ring, places))
+        zero_position = {ring.place("position", j): ring.zero}
+    R = _substitute(step.R, ring, zero_position)
+    p = _substitute(step.p, ring, zero_position)
+    return JointTransform(R, p)
 
 
-def _mapped(elements: Elements, ring: Ring, places: Mapping[int, Element]) -> Elements:
+def _substitute(elements: Elements, ring: Ring, replacements: Mapping[int, Element]) -> Elements:
+    """Return an array of elements in another ring; see :func:`dhkit.symbolic.ring.translated`."""
     array = np.empty(elements.shape, dtype=object)
     for place, element in np.ndenumerate(elements):
-        array[place] = translated(element, ring, places)
+        array[place] = translated(element, ring, replacements)
     return array
 
 
@@ -187,60 +208,64 @@ def _equations(arm: ExactArm, definitions: Mapping[str, Element]) -> Lagrangian:
     ring = Ring(arm.ring.kinds, [*_kept(arm), *(Constant(name) for name in definitions)])
     end = _ending(arm)
 
-    def named(name: str) -> Element:
+    def parameter(name: str) -> Element:
+        """Return a base parameter; 0 for one that has no effect or was grouped with others."""
         return ring.constant(f"{name}{end}") if f"{name}{end}" in definitions else ring.zero
 
-    def body(j: int) -> RigidBody:
-        second = np.empty((3, 3), dtype=object)
-        for key, (row, column) in _SECOND.items():
-            second[row, column] = second[column, row] = named(f"{key}{j}")
-        return RigidBody(named(f"M{j}"), np.array([named(f"{key}{j}") for key in _MOMENT], dtype=object), second)
+    # Values of the base parameters: their definitions, which do not depend on the state.
+    generator_values = arm.ring.values(arm.values, np.zeros(arm.n))
+    base_values = {name: float(element.value(generator_values)) for name, element in definitions.items()}
+    kept_values = {text: arm.values[text] for text in ring.constants if text in arm.values}
 
-    numbers = arm.ring.values(arm.values, np.zeros(arm.n))
     short = replace(
         arm,
         ring=ring,
         rows=tuple(_row(row, ring) for row in arm.rows),
         bodies=(),
         gear=(ring.one,) * arm.n,
-        rotor=tuple(named(f"Ia{j}") for j in range(1, arm.n + 1)),
-        couplings=tuple((i, j, named(f"Ic{i + 1}{j + 1}")) for i, j, _ in arm.couplings),
-        gravity=_mapped(arm.gravity, ring, {}),
-        origin=_mapped(arm.origin, ring, {}),
-        tool=_mapped(arm.tool, ring, {}),
-        parameters=arm.parameters | {name: float(element.value(numbers)) for name, element in definitions.items()},
-        values={text: arm.values[text] for text in ring.constants if text in arm.values}
-        | {name: float(element.value(numbers)) for name, element in definitions.items()},
+        rotor=tuple(parameter(f"Ia{j}") for j in range(1, arm.n + 1)),
+        couplings=tuple((i, j, parameter(f"Ic{i + 1}{j + 1}")) for i, j, _ in arm.couplings),
+        gravity=_substitute(arm.gravity, ring, {}),
+        origin=_substitute(arm.origin, ring, {}),
+        tool=_substitute(arm.tool, ring, {}),
+        parameters=arm.parameters | base_values,
+        values=kept_values | base_values,
         inertial=tuple(definitions),
     )
-    bodies = [body(j) for j in range(1, arm.n + 1)]
+
+    bodies = []
+    for j in range(1, arm.n + 1):
+        mass = parameter(f"M{j}")
+        moment = np.array([parameter(f"{key}{j}") for key in _MOMENT], dtype=object)
+        second = np.empty((3, 3), dtype=object)
+        for key, (row, column) in _SECOND.items():
+            second[row, column] = second[column, row] = parameter(f"{key}{j}")
+        bodies.append(RigidBody(mass, moment, second))
+
     M = composite.mass_matrix(short, bodies)
     V = composite.potential_energy(short, bodies)
     return Lagrangian(short, M, V, Named(definitions))
 
 
 def _row(row: ExactRow, ring: Ring) -> ExactRow:
+    """Return a row of the table in another ring."""
     a, d, ca, sa, c, s = (translated(x, ring, {}) for x in (row.a, row.d, *row.alpha, *row.theta))
     return ExactRow(a, d, (ca, sa), (c, s))
 
 
 def _kept(arm: ExactArm) -> list[Constant]:
-    """Return the constants that do not depend on an inertial parameter: those of table and gravity."""
+    """Return the constants that do not depend on an inertial parameter: those of table, placement and gravity."""
     geometry = [*arm.gravity, *arm.origin, *arm.tool]
     for row in arm.rows:
         geometry += [row.a, row.d, *row.alpha, *row.theta]
     inertial = [*arm.gear, *arm.rotor, *(inertia for *_, inertia in arm.couplings)]
     for body in chain.from_iterable(arm.bodies):
         inertial += [body.mass, *body.moment, *body.second.flat]
-    names = _constants(inertial) - _constants(geometry)
-    return [constant for constant in arm.ring.given if constant.text not in names and not constant.symbols & names]
+
+    dropped = _constants(inertial) - _constants(geometry)
+    return [c for c in arm.ring.given if dropped.isdisjoint({c.text, *c.symbols})]
 
 
 def _constants(elements: Sequence[Element]) -> set[str]:
-    return {
-        generator.text
-        for element in elements
-        for monomial in element.terms
-        for generator, exponent in zip(element.ring.generators, monomial, strict=True)
-        if exponent and generator.kind == "constant"
-    }
+    """Return the texts of the constants that occur in elements."""
+    return {generator.text for generator in constants_of(generators_of(elements))}

@@ -23,12 +23,12 @@ from dhkit.expressions import ZERO, Expression, exact_angle
 from dhkit.symbolic.exact.naming import BodyNumbers, LinkNumbers, Naming, Symbols
 from dhkit.symbolic.ring import Element, Elements, Ring
 from dhkit.symbolic.ring.constants import Constants, value_of
-from dhkit.symbolic.ring.reading import Direction
+from dhkit.symbolic.ring.reading import Direction, sum_of_angles
 
 
 @dataclass(frozen=True, eq=False)
 class ExactRow:
-    """A row of the table with the joint variable: lengths, and cosine and sine of the angles."""
+    """A row of the table with the joint variable: lengths, m, and cosine and sine of the angles."""
 
     a: Element
     d: Element
@@ -60,7 +60,7 @@ class ExactArm:
     Attributes
     ----------
     description, symbols
-        The robot, and which of its numbers are symbols.
+        The robot, and the choice of its numbers that are symbols.
     ring
         The ring of all elements.
     rows
@@ -114,7 +114,7 @@ class ExactArm:
 
     @property
     def armature(self) -> tuple[Element, ...]:
-        """Rotor inertias at the joint side, gear^2 times rotor inertia, kg m^2 or kg."""
+        """Rotor inertias at the joint side, gear^2 times rotor inertia, shape (n,), kg m^2 or kg."""
         return tuple(gear * gear * rotor for gear, rotor in zip(self.gear, self.rotor, strict=True))
 
     @property
@@ -149,16 +149,24 @@ class ExactArm:
         ValueError, TypeError
             A joint vector has another shape, or is not numeric.
         """
-        named = (
-            ("q", q),
-            ("qd", np.zeros(self.n) if qd is None else qd),
-            ("qdd", np.zeros(self.n) if qdd is None else qdd),
+        zero = np.zeros(self.n)
+        states = np.broadcast_arrays(
+            joint_array(self.description, q, "q"),
+            joint_array(self.description, zero if qd is None else qd, "qd"),
+            joint_array(self.description, zero if qdd is None else qdd, "qdd"),
         )
-        states = np.broadcast_arrays(*(joint_array(self.description, state, name) for name, state in named))
         batch = states[0].shape[:-1]
-        shape = () if isinstance(elements, Element) else np.shape(elements)
-        listed = [elements] if isinstance(elements, Element) else np.asarray(elements, dtype=object).ravel().tolist()
-        values = {ring: ring.values(self.values, *states) for ring in {element.ring for element in listed}}
+
+        if isinstance(elements, Element):
+            shape: tuple[int, ...] = ()
+            listed = [elements]
+        else:
+            shape = np.shape(elements)
+            listed = np.asarray(elements, dtype=object).ravel().tolist()
+
+        # Elements in other angles are of other rings; the generators' values are computed once a ring.
+        rings = {element.ring for element in listed}
+        values = {ring: ring.values(self.values, *states) for ring in rings}
         numbers = np.empty((*batch, len(listed)))
         for k, element in enumerate(listed):
             numbers[..., k] = element.value(values[element.ring])
@@ -178,7 +186,7 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
     description
         The robot.
     symbols
-        ``"none"``: numbers only. ``"file"``: the file's parameters, those that are not made of others. ``"inertial"``:
+        ``"none"``: numbers only. ``"file"``: the file's parameters that do not depend on others. ``"inertial"``:
         each link's mass ``m2``, first moments ``rx2 ry2 rz2`` and second moments about its frame's origin ``Ixx2`` ...
         ``Ixz2``, its drive's ``Jm2`` and ``G2``, lengths ``a2 d2`` where they are not zero, and gravity ``g``.
     needed
@@ -195,46 +203,53 @@ def exact_arm(description: Description, symbols: Symbols = "file", needed: tuple
         return exact_arm(description_of(description), symbols, needed)
     if symbols not in ("none", "file", "inertial"):
         raise ValueError(f"symbols is {symbols!r}; expected 'none', 'file' or 'inertial'")
+
+    # All numbers of the description as expressions in the symbols.
     bodies = require_bodies(description)
     naming = Naming(description, symbols)
     links = [naming.link(i, own) for i, own in enumerate(bodies)]
     gravity = naming.gravity()
-    placement = description.base.placement
-    xyz = [naming.known(x) for x in placement.xyz]
-    rpy = [exact_angle(naming.known(x)) for x in placement.rpy]
-
+    base = description.base.placement
+    base_xyz = [naming.known(x) for x in base.xyz]
+    base_rpy = [exact_angle(naming.known(x)) for x in base.rpy]
     tool = [naming.known(x) for x in description.tool.placement.xyz]
     viscous = [naming.known(joint.drive.viscous) if joint.drive else ZERO for joint in description.joints]
     couplings = [(*coupling.joints, naming.coupling(coupling)) for coupling in description.couplings]
-    expressions = [*gravity, *xyz, *tool, *viscous, *(inertia for *_, inertia in couplings), *needed]
-    angles = [*rpy]
+
+    # The ring that contains them.
+    shared_inertias = [inertia for *_, inertia in couplings]
+    expressions = [*gravity, *base_xyz, *tool, *viscous, *shared_inertias, *needed]
+    angles = [*base_rpy]
     for link in links:
-        expressions += link.row[:2]
+        a, d, alpha, theta = link.row
+        expressions += [a, d]
         for body in link.bodies:
-            expressions += [body.mass, *body.com, *(body.inertia or body.second or ())]
+            expressions += [body.mass, *body.com, *_tensor(body)]
         expressions += [link.gear, link.rotor]
-        angles += link.row[2:]
+        angles += [alpha, theta]
     constants = Constants.of(expressions, angles)
     ring = Ring(description.kinds, list(constants.found.values()))
-    rotation = _rotation(ring, rpy)
+
+    # The same numbers as elements of the ring. A vector v of the world is R^T v in the axes of frame 0.
+    R = _rotation(ring, base_rpy)
     return ExactArm(
-        description,
-        symbols,
-        ring,
-        tuple(_row(ring, i, link) for i, link in enumerate(links)),
-        tuple(tuple(_body(ring, body) for body in link.bodies) for link in links),
-        tuple(ring.read(link.gear) for link in links),
-        tuple(ring.read(link.rotor) for link in links),
-        tuple(ring.read(x) for x in viscous),
-        tuple((i - 1, j - 1, ring.read(inertia)) for i, j, inertia in couplings),
-        rotation,
-        rotation.T @ np.array([ring.read(x) for x in gravity], dtype=object),
-        rotation.T @ np.array([ring.read(x) for x in xyz], dtype=object),
-        np.array([ring.read(x) for x in tool], dtype=object),
-        {text: value_of(constant, naming.values) for text, constant in constants.found.items()},
-        {name: float(naming.values[name]) for name in _symbols(constants)},
-        tuple(constants.notes),
-        tuple(naming.inertial),
+        description=description,
+        symbols=symbols,
+        ring=ring,
+        rows=tuple(_row(ring, i, link) for i, link in enumerate(links)),
+        bodies=tuple(_bodies(ring, link) for link in links),
+        gear=tuple(ring.read(link.gear) for link in links),
+        rotor=tuple(ring.read(link.rotor) for link in links),
+        viscous=tuple(ring.read(x) for x in viscous),
+        couplings=tuple((i - 1, j - 1, ring.read(inertia)) for i, j, inertia in couplings),
+        base=R,
+        gravity=R.T @ np.array([ring.read(x) for x in gravity], dtype=object),
+        origin=R.T @ np.array([ring.read(x) for x in base_xyz], dtype=object),
+        tool=np.array([ring.read(x) for x in tool], dtype=object),
+        values={text: value_of(constant, naming.values) for text, constant in constants.found.items()},
+        parameters={name: float(naming.values[name]) for name in _symbols(constants)},
+        notes=tuple(constants.notes),
+        inertial=tuple(naming.inertial),
     )
 
 
@@ -254,29 +269,45 @@ def _row(ring: Ring, i: int, link: LinkNumbers) -> ExactRow:
     theta = ring.direction(link.row[3])
     if ring.kinds[i] != "R":
         return ExactRow(a, d + ring.position(i), alpha, theta)
-    c = ring.cosine(i)
-    s = ring.sine(i)
-    return ExactRow(a, d, alpha, (c * theta[0] - s * theta[1], s * theta[0] + c * theta[1]))
+    return ExactRow(a, d, alpha, sum_of_angles((ring.cosine(i), ring.sine(i)), theta))
 
 
-def _body(ring: Ring, body: BodyNumbers) -> ExactBody:
-    mass = ring.read(body.mass)
-    com = np.array([ring.read(x) for x in body.com], dtype=object)
-    moment = np.array([mass * x for x in com], dtype=object)
-    steiner = point_inertia(com, moment)
-    tensor = _symmetric_matrix([ring.read(x) for x in (body.inertia or body.second or ())])
-    if body.second is None:
-        return ExactBody(body.name, mass, com, tensor, moment, tensor + steiner)
-    return ExactBody(body.name, mass, com, tensor - steiner, moment, tensor)
+def _bodies(ring: Ring, link: LinkNumbers) -> tuple[ExactBody, ...]:
+    """Return a link's bodies in the ring, with inertias about the centre of mass and about the frame's origin."""
+    bodies = []
+    for body in link.bodies:
+        mass = ring.read(body.mass)
+        com = np.array([ring.read(x) for x in body.com], dtype=object)
+        moment = np.array([mass * x for x in com], dtype=object)
+        tensor = _symmetric_matrix([ring.read(x) for x in _tensor(body)])
+
+        # Steiner: I_origin = I_com + m (c^2 1 - c c^T); the numbers have one of the two.
+        steiner = point_inertia(com, moment)
+        if body.second is None:
+            bodies.append(ExactBody(body.name, mass, com, tensor, moment, tensor + steiner))
+        else:
+            bodies.append(ExactBody(body.name, mass, com, tensor - steiner, moment, tensor))
+    return tuple(bodies)
 
 
-def point_inertia(lever: Elements, moment: Elements) -> Elements:
-    """Return m (c^2 1 - c c^T), shape (3, 3), from a position c and the first moment m c, both shape (3,)."""
-    square = lever @ moment
-    return np.array([[(square if i == j else 0 * square) - lever[i] * moment[j] for j in range(3)] for i in range(3)])
+def _tensor(body: BodyNumbers) -> tuple[Expression, ...]:
+    """Return the inertia that is given of a body, about the centre of mass or the frame's origin."""
+    return body.inertia or body.second or ()
+
+
+def point_inertia(c: Elements, h: Elements) -> Elements:
+    """Return m (c^2 1 - c c^T), shape (3, 3), from a position c and the first moment h = m c, both shape (3,)."""
+    square = c @ h
+    zero = 0 * square
+    inertia = np.empty((3, 3), dtype=object)
+    for i in range(3):
+        for j in range(3):
+            inertia[i, j] = (square if i == j else zero) - c[i] * h[j]
+    return inertia
 
 
 def _symmetric_matrix(entries: Sequence[Element]) -> Elements:
+    """Return a symmetric matrix, shape (3, 3), from its entries in the order of ``INERTIA_PLACES``."""
     tensor = np.empty((3, 3), dtype=object)
     for (i, j), entry in zip(INERTIA_PLACES.values(), entries, strict=True):
         tensor[i, j] = tensor[j, i] = entry
@@ -284,7 +315,7 @@ def _symmetric_matrix(entries: Sequence[Element]) -> Elements:
 
 
 def _rotation(ring: Ring, rpy: Sequence[Expression]) -> Elements:
-    """Return Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Return Rz(yaw) Ry(pitch) Rx(roll), shape (3, 3)."""
     one = ring.one
     zero = ring.zero
     (cr, sr), (cp, sp), (cy, sy) = (ring.direction(angle) for angle in rpy)

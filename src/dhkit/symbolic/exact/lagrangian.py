@@ -115,7 +115,7 @@ class Lagrangian:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Numbers that are symbols because they cannot be written exactly."""
+        """One sentence for each number that is a symbol because it cannot be written exactly."""
         return self.arm.notes
 
     @property
@@ -132,17 +132,21 @@ class Lagrangian:
         c_ijk = (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i) / 2 (Siciliano et al., Robotics, 2009, eq. 7.45).
         """
         n = self.n
-        rates = np.empty((n, n, n), dtype=object)
+
+        # dM[i, j, k] = dM_ij/dq_k, symmetric in i and j
+        dM = np.empty((n, n, n), dtype=object)
         for i in range(n):
             for j in range(i, n):
                 for k in range(n):
-                    rates[i, j, k] = rates[j, i, k] = self.M[i, j].by_position(k)
-        symbols = np.empty((n, n, n), dtype=object)
+                    dM[i, j, k] = dM[j, i, k] = self.M[i, j].by_position(k)
+
+        # c_ijk is symmetric in j and k
+        c = np.empty((n, n, n), dtype=object)
         for i in range(n):
             for j in range(n):
                 for k in range(j, n):
-                    symbols[i, j, k] = symbols[i, k, j] = (rates[i, j, k] + rates[i, k, j] - rates[j, k, i]) * _HALF
-        return symbols
+                    c[i, j, k] = c[i, k, j] = (dM[i, j, k] + dM[i, k, j] - dM[j, k, i]) * _HALF
+        return c
 
     @cached_property
     def C(self) -> Elements:
@@ -168,11 +172,12 @@ class Lagrangian:
     def tau(self) -> Elements:
         """Joint torques M qdd + C qd + g, shape (n,), N m or N."""
         ring = self.arm.ring
-        accelerations = np.array([ring.acceleration(i) for i in range(self.n)], dtype=object)
-        return self.M @ accelerations + self.h + self.g  # type: ignore[no-any-return]
+        qdd = np.array([ring.acceleration(i) for i in range(self.n)], dtype=object)
+        return self.M @ qdd + self.h + self.g  # type: ignore[no-any-return]
 
     @property
     def _rates(self) -> Elements:
+        """Joint rates qd as elements, shape (n,)."""
         return np.array([self.arm.ring.rate(i) for i in range(self.n)], dtype=object)
 
     def replaced(self, **quantities: Any) -> Lagrangian:
@@ -193,10 +198,15 @@ class Lagrangian:
                 raise ValueError(f"no quantity {name!r}; expected {', '.join(QUANTITIES)}")
             shape = np.shape(getattr(self, name))
             entries = np.ravel(np.asarray(given, dtype=object)) if shape else [given]
-            own = all(isinstance(entry, Element) and entry.ring == self.arm.ring for entry in entries)
-            if np.shape(given) != shape or not own:
+            in_ring = all(isinstance(entry, Element) and entry.ring == self.arm.ring for entry in entries)
+            if np.shape(given) != shape or not in_ring:
                 raise ValueError(f"{name}: expected an array of shape {shape} of elements of these equations' ring")
-        other = Lagrangian(self.arm, quantities.pop("M", self.M), quantities.pop("V", self.V), self.definitions)
+
+        M = quantities.pop("M", self.M)
+        V = quantities.pop("V", self.V)
+        other = Lagrangian(self.arm, M, V, self.definitions)
+
+        # The others are cached properties: a value in the instance's dictionary takes the place of the computation.
         vars(other).update(quantities)
         return other
 
@@ -220,7 +230,8 @@ class Lagrangian:
         RingError
             An entry is too long to be read.
         """
-        return str(format_function("equations_text")(format_function("readable")(self, what)))
+        quantities = format_function("readable")(self, what)
+        return str(format_function("equations_text")(quantities))
 
     def latex(self, what: str | Sequence[str] = ("M", "C", "g")) -> str:
         """Return some of M, C, h, g, tau, K and V in LaTeX, for a page that loads amsmath.
@@ -230,11 +241,13 @@ class Lagrangian:
         RingError
             An entry is too long to be read.
         """
-        return str(format_function("equations_latex")(format_function("readable")(self, what)))
+        quantities = format_function("readable")(self, what)
+        return str(format_function("equations_latex")(quantities))
 
     def sympy(self, what: str | Sequence[str] = tuple(QUANTITIES)) -> dict[str, object]:
         """Return sympy matrices M and C, columns h, g and tau, and expressions K and V by name, not simplified."""
-        matrices: dict[str, object] = format_function("equations_sympy")(format_function("quantities")(self, what))
+        quantities = format_function("quantities")(self, what)
+        matrices: dict[str, object] = format_function("equations_sympy")(quantities)
         return matrices
 
     def __str__(self) -> str:
@@ -253,8 +266,12 @@ class Lagrangian:
 
     def prove_skew_symmetry(self) -> Proof:
         """Decide whether dM/dt - 2 C is skew-symmetric, for every state."""
-        rate = np.array([[entry.by_time() for entry in row] for row in self.M], dtype=object)
-        N = rate - 2 * self.C
+        dM_dt = np.empty_like(self.M)
+        for place, entry in np.ndenumerate(self.M):
+            dM_dt[place] = entry.by_time()
+
+        # N is skew-symmetric exactly if N + N^T = 0.
+        N = dM_dt - 2 * self.C
         return Proof("dM/dt - 2 C is skew-symmetric", N + N.T)
 
     def prove_euler_lagrange(self, other: TextbookDerivation | None = None) -> Proof:
@@ -273,13 +290,13 @@ class Lagrangian:
             raise RingError(
                 "base parameters: prove the full equations (base.full), and that both are equal (base.prove())"
             )
-        route = other or derive(self.description, symbols=self.arm.symbols)
-        if route.arm.ring != self.arm.ring:
+        textbook = other or derive(self.description, symbols=self.arm.symbols)
+        if textbook.arm.ring != self.arm.ring:
             raise RingError(
-                f"the other derivation is of {route.arm.description.name} with symbols {route.arm.symbols!r}; expected "
-                f"{self.description.name} with {self.arm.symbols!r}"
+                f"the other derivation is of {textbook.arm.description.name} with symbols {textbook.arm.symbols!r}; "
+                f"expected {self.description.name} with {self.arm.symbols!r}"
             )
-        return Proof("M qdd + C qd + g = d/dt dL/dqd - dL/dq", self.tau - route.tau)
+        return Proof("M qdd + C qd + g = d/dt dL/dqd - dL/dq", self.tau - textbook.tau)
 
 
 @takes_robot

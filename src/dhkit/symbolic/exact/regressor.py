@@ -20,10 +20,11 @@ class Regressor:
     lagrangian
         The equations.
     names
-        The parameters theta: of every link ``m2``, first moments ``rx2`` ..., second moments about its DH frame
-        ``Ixx2`` ..., its drive's rotor inertia ``Jm2``, and that which two joints turn ``Jc23``; or base parameters.
+        The parameters theta. For each link: mass ``m2``, first moments ``rx2`` ..., second moments about its DH
+        frame's origin ``Ixx2`` ..., and its drive's rotor inertia ``Jm2``; then inertias of drives that move two joints
+        together, ``Jc23``. Or base parameters.
     Y
-        Shape (n, parameters); elements that do not contain the parameters.
+        Matrix, shape (n, parameters), of elements that do not contain the parameters.
     """
 
     lagrangian: Lagrangian
@@ -66,5 +67,10 @@ def regressor(equations: Lagrangian) -> Regressor:
             f"the equations of {equations.description.name} have no inertial parameters; derive them with"
             " symbols='inertial'"
         )
-    Y = np.array([[torque.by_constant(name) for name in names] for torque in equations.tau], dtype=object)
+
+    # tau is linear in theta, so Y_ik = dtau_i/dtheta_k.
+    Y = np.empty((equations.n, len(names)), dtype=object)
+    for i, torque in enumerate(equations.tau):
+        for k, name in enumerate(names):
+            Y[i, k] = torque.by_constant(name)
     return Regressor(equations, names, Y)

@@ -9,11 +9,17 @@ from dhkit.symbolic.ring import Direction, Element, Elements, Ring
 
 def identity(ring: Ring) -> Elements:
     """Return the transform that moves nothing, shape (4, 4)."""
-    return np.array([[ring.one if i == j else ring.zero for j in range(4)] for i in range(4)], dtype=object)
+    T = np.full((4, 4), ring.zero, dtype=object)
+    for i in range(4):
+        T[i, i] = ring.one
+    return T
 
 
 def rotation(ring: Ring, first: int, second: int, direction: Direction) -> Elements:
-    """Return the rotation by an angle (its cosine and sine) from one axis to another, shape (4, 4)."""
+    """Return the rotation by an angle (its cosine and sine) from one axis towards another, shape (4, 4).
+
+    Axes count from 0: from y (1) to z (2) is a rotation about x.
+    """
     T = identity(ring)
     c, s = direction
     T[first, first] = c
@@ -32,7 +38,10 @@ def translation(ring: Ring, axis: int, length: Element) -> Elements:
 
 def inverse(T: Elements) -> Elements:
     """Return the inverse of a rigid transform, shape (4, 4)."""
+    R = T[:3, :3]
+    p = T[:3, 3]
+    # The inverse of x -> R x + p is x -> R^T x - R^T p.
     result = T.copy()
-    result[:3, :3] = T[:3, :3].T
-    result[:3, 3] = -(T[:3, :3].T @ T[:3, 3])
+    result[:3, :3] = R.T
+    result[:3, 3] = -(R.T @ p)
     return result

@@ -23,22 +23,26 @@ from dhkit.symbolic.exact.transforms import identity, inverse, rotation, transla
 from dhkit.symbolic.ring import Direction, Element, Elements, Ring
 from dhkit.symbolic.ring.constants import Constants, value_of
 from dhkit.symbolic.ring.notation import distinct
+from dhkit.symbolic.ring.reading import sum_of_angles
 from dhkit.symbolic.ring.ring import Constant
 
 _POSITION = ("px", "py", "pz")
-_ROTATION = tuple(f"r{i}{j}" for i in "123" for j in "123")
+_ROTATION = ("r11", "r12", "r13", "r21", "r22", "r23", "r31", "r32", "r33")
 POSE = (*_POSITION, *_ROTATION)
 """Names of the entries of the tool's pose in the world."""
 INNER = tuple(name.replace("p", "h").replace("r", "h") for name in POSE)
 """Names of the entries of the pose without base and tool."""
 _DEFINED = (
     *INNER,
-    *(f"{letter}{axis}" for letter in "wano" for axis in "xyz"),
+    *("wx", "wy", "wz"),
+    *("ax", "ay", "az"),
+    *("nx", "ny", "nz"),
+    *("ox", "oy", "oz"),
     *("x", "y", "u", "v", "cphi", "sphi"),
 )
 """Names that steps may define."""
 ZERO_LENGTH = Fraction(1, 10**12)
-"""rad, and lengths over the reach."""
+"""Tolerance within which a length, as a share of the reach, or an angle, rad, is rounding of 0 or of k pi/2."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,17 +54,17 @@ class ExactChain:
     description
         The robot.
     ring
-        Of all elements: sines and cosines of theta_i, values of prismatic joints, lengths, the pose's entries, and the
-        quantities that steps define.
+        The ring of all elements: sines and cosines of theta_i, values of prismatic joints, lengths, the pose's entries,
+        and the quantities that steps define.
     names
         The names of the pose's entries and of defined quantities in the ring: their own, unless the robot file has
         parameters of those names.
     first, last
         The constant ends E and F, shape (4, 4), m.
     a, alpha
-        Of the links C_1 ... C_(n-1): lengths, m, and cosine and sine of the twists.
+        Lengths, m, and cosines and sines of the twists, of the links C_1 ... C_(n-1).
     d
-        Lengths of the joints, m; with the joint's value where it slides.
+        Lengths of the joints, m; of a prismatic joint, with its value added.
     offsets
         Offset of each joint: theta_i minus the joint value; of a prismatic joint, its constant angle.
     values
@@ -91,46 +95,59 @@ class ExactChain:
     def of(cls, description: Description, *, named: bool, in_joint_values: bool = False) -> ExactChain:
         """Return an arm's chain; lengths that are numbers get names (a2, d3) if ``named``, else all are numbers."""
         naming = Naming(description, "inertial" if named else "none")
-        joints = description.joints
-        is_standard = description.convention is Convention.STANDARD
-        lengths = [(naming.length(f"a{i}", j.a), naming.length(f"d{i}", j.d)) for i, j in enumerate(joints, start=1)]
-        angles = [tuple(exact_angle(naming.known(x)) for x in (j.alpha, j.theta)) for j in joints]
-        ends = [description.base.placement, description.tool.placement]
-        fixed = [[naming.known(x) for x in end.xyz] for end in ends]
-        turned = [[exact_angle(naming.known(x)) for x in end.rpy] for end in ends]
-        constants = Constants.of(
-            [*chain.from_iterable(lengths), *chain.from_iterable(fixed)],
-            [*chain.from_iterable(angles), *chain.from_iterable(turned)],
-        )
-        taken = set(chain.from_iterable(constant.symbols for constant in constants.found.values()))
+
+        # The numbers of table, base and tool as expressions. Symbols get their names in this order.
+        a_lengths: list[Expression] = []
+        d_lengths: list[Expression] = []
+        alphas: list[Expression] = []
+        thetas: list[Expression] = []
+        for i, joint in enumerate(description.joints, start=1):
+            a_lengths.append(naming.length(f"a{i}", joint.a))
+            d_lengths.append(naming.length(f"d{i}", joint.d))
+            alphas.append(exact_angle(naming.known(joint.alpha)))
+            thetas.append(exact_angle(naming.known(joint.theta)))
+        base = _known_placement(naming, description.base.placement)
+        tool = _known_placement(naming, description.tool.placement)
+
+        # Constants are found, and printed, row by row.
+        lengths: list[Expression] = []
+        angles: list[Expression] = []
+        for a_i, d_i, alpha_i, theta_i in zip(a_lengths, d_lengths, alphas, thetas, strict=True):
+            lengths += [a_i, d_i]
+            angles += [alpha_i, theta_i]
+        constants = Constants.of([*lengths, *base.xyz, *tool.xyz], [*angles, *base.rpy, *tool.rpy])
+        taken = frozenset[str]().union(*(constant.symbols for constant in constants.found.values()))
         names = distinct([*POSE, *_DEFINED], taken)
+
         # The pose and defined quantities come first, so that they are written first.
         ring = Ring(description.kinds, [*map(Constant, names.values()), *constants.found.values()])
-        placed = []
-        for xyz, rpy in zip(fixed, turned, strict=True):
-            placed.append(_placed(ring, [ring.read(x) for x in xyz], [ring.direction(x) for x in rpy]))
-        base, tool = placed
-        a = [ring.read(row[0]) for row in lengths]
-        alpha = [ring.direction(row[0]) for row in angles]
-        outer = 0 if not is_standard else len(joints) - 1
-        link = translation(ring, 0, a[outer]) @ rotation(ring, 1, 2, alpha[outer])
-        del a[outer], alpha[outer]
-        d = [ring.read(row[1]) for row in lengths]
-        slides = [kind == "P" for kind in description.kinds]
+        T_base = _transform(ring, base)
+        T_tool = _transform(ring, tool)
+        a = [ring.read(x) for x in a_lengths]
+        alpha = [ring.direction(x) for x in alphas]
+        d = [ring.read(x) for x in d_lengths]
+        for i, kind in enumerate(description.kinds):
+            if kind == "P":
+                d[i] = d[i] + ring.position(i)
+
+        # The link of the last row (standard) or of the first one (modified) is not between joints.
+        is_standard = description.convention is Convention.STANDARD
+        outer = description.n - 1 if is_standard else 0
+        outer_link = translation(ring, 0, a.pop(outer)) @ rotation(ring, 1, 2, alpha.pop(outer))
         return cls(
-            description,
-            ring,
-            names,
-            base if is_standard else base @ link,
-            link @ tool if is_standard else tool,
-            tuple(a),
-            tuple(alpha),
-            tuple(d_i + ring.position(i) if slides[i] else d_i for i, d_i in enumerate(d)),
-            tuple(row[1] for row in angles),
-            {text: value_of(constant, naming.values) for text, constant in constants.found.items()},
-            {name: float(naming.values[name]) for name in sorted(taken)},
-            tuple(constants.notes),
-            in_joint_values,
+            description=description,
+            ring=ring,
+            names=names,
+            first=T_base if is_standard else T_base @ outer_link,
+            last=outer_link @ T_tool if is_standard else T_tool,
+            a=tuple(a),
+            alpha=tuple(alpha),
+            d=tuple(d),
+            offsets=tuple(thetas),
+            values={text: value_of(constant, naming.values) for text, constant in constants.found.items()},
+            lengths={name: float(naming.values[name]) for name in sorted(taken)},
+            notes=tuple(constants.notes),
+            in_joint_values=in_joint_values,
         )
 
     @property
@@ -151,11 +168,8 @@ class ExactChain:
         offset = self.ring.direction(self.offsets[i - 1])
         if self.description.kinds[i - 1] != "R":
             return offset
-        c = self.ring.cosine(i - 1)
-        s = self.ring.sine(i - 1)
-        if not self.in_joint_values:
-            return c, s
-        return c * offset[0] - s * offset[1], s * offset[0] + c * offset[1]
+        own = (self.ring.cosine(i - 1), self.ring.sine(i - 1))
+        return sum_of_angles(own, offset) if self.in_joint_values else own
 
     def joint(self, i: int) -> Elements:
         """Return J_i, i from 1, shape (4, 4)."""
@@ -181,7 +195,7 @@ class ExactChain:
 
     @cached_property
     def tool_pose(self) -> Elements:
-        """The tool in the world by the table's own transforms, base A_1 ... A_n tool, shape (4, 4), m."""
+        """The tool in the world in the joints, base A_1 ... A_n tool = E J_1 C_1 ... J_n F, shape (4, 4), m."""
         T = self.first
         for i in range(1, self.n + 1):
             T = T @ self.joint(i) @ (self.link(i) if i < self.n else self.last)
@@ -189,7 +203,7 @@ class ExactChain:
 
     @cached_property
     def given_pose(self) -> Elements:
-        """The pose that is given, shape (4, 4), of symbols."""
+        """The given pose, shape (4, 4), of symbols."""
         T = identity(self.ring)
         T[:3, 3] = [self.symbol(name) for name in _POSITION]
         T[:3, :3] = np.array([self.symbol(name) for name in _ROTATION], dtype=object).reshape(3, 3)
@@ -207,40 +221,50 @@ def without_rounding(description: Description) -> tuple[Description, list[str]]:
     """
     notes: list[str] = []
 
+    def rounded(
+        name: str, value: Expression, number: Fraction | None, near: Expression, tolerance: float | Fraction
+    ) -> Expression:
+        """Return ``near`` with a note if the number is not 0 and within the tolerance of it, else the value."""
+        if not number or abs(near.value() - number) > tolerance:
+            return value
+        notes.append(f"{name}, {float(number)!r}, is read as {near}")
+        return near
+
     def length(name: str, value: Expression) -> Expression:
-        return nearest(name, value, value.rational, ZERO, (description.reach or 1.0) * ZERO_LENGTH)
+        tolerance = (description.reach or 1.0) * ZERO_LENGTH
+        return rounded(name, value, value.rational, ZERO, tolerance)
 
     def angle(name: str, value: Expression) -> Expression:
         number = exact_angle(value).rational
-        return nearest(name, value, number, PI * Fraction(round(2 * (number or 0) / PI_DIGITS), 2), ZERO_LENGTH)
-
-    def nearest(
-        name: str, value: Expression, number: Fraction | None, known: Expression, tolerance: float | Fraction
-    ) -> Expression:
-        if not number or abs(known.value() - number) > tolerance:
-            return value
-        notes.append(f"{name}, {float(number)!r}, is read as {known}")
-        return known
+        quarter_turns = round(2 * (number or 0) / PI_DIGITS)
+        return rounded(name, value, number, PI * Fraction(quarter_turns, 2), ZERO_LENGTH)
 
     def end(name: str, placement: Placement) -> Placement:
-        x, y, z = (length(f"{axis} of the {name}", v) for axis, v in zip("xyz", placement.xyz, strict=True))
-        angles = zip(("roll", "pitch", "yaw"), placement.rpy, strict=True)
-        roll, pitch, yaw = (angle(f"{turn} of the {name}", v) for turn, v in angles)
-        return Placement((x, y, z), (roll, pitch, yaw))
+        (x, y, z) = placement.xyz
+        (roll, pitch, yaw) = placement.rpy
+        xyz = (length(f"x of the {name}", x), length(f"y of the {name}", y), length(f"z of the {name}", z))
+        rpy = (
+            angle(f"roll of the {name}", roll),
+            angle(f"pitch of the {name}", pitch),
+            angle(f"yaw of the {name}", yaw),
+        )
+        return Placement(xyz, rpy)
 
-    joints = tuple(
-        replace(
+    joints = []
+    for i, joint in enumerate(description.joints, start=1):
+        without = replace(
             joint,
             a=length(f"a{i}", joint.a),
             alpha=angle(f"alpha{i}", joint.alpha),
             d=length(f"d{i}", joint.d),
             theta=angle(f"theta{i}", joint.theta),
         )
-        for i, joint in enumerate(description.joints, start=1)
-    )
+        joints.append(without)
     base = replace(description.base, placement=end("base", description.base.placement))
     tool = replace(description.tool, placement=end("tool", description.tool.placement))
-    return (replace(description, joints=joints, base=base, tool=tool) if notes else description), notes
+    if not notes:
+        return description, notes
+    return replace(description, joints=tuple(joints), base=base, tool=tool), notes
 
 
 @takes_robot
@@ -261,19 +285,19 @@ def with_table_lengths(description: Description, lengths: Mapping[str, Fraction]
     """Return the arm with other lengths in its table; ``lengths`` by the names of :func:`table_lengths`, m."""
     naming = Naming(description, "inertial")
 
-    def other(name: str, length: Expression) -> Expression:
+    def replaced(name: str, length: Expression) -> Expression:
         new = lengths.get(naming.length(name, length).text)
         return length if new is None else exact(new)
 
     joints = tuple(
-        replace(joint, a=other(f"a{i}", joint.a), d=other(f"d{i}", joint.d))
+        replace(joint, a=replaced(f"a{i}", joint.a), d=replaced(f"d{i}", joint.d))
         for i, joint in enumerate(description.joints, start=1)
     )
     return replace(description, joints=joints)
 
 
 def is_identity(T: Elements) -> bool:
-    """Whether a transform moves nothing."""
+    """Return whether a transform moves nothing."""
     return all(entry == (1 if i == j else 0) for (i, j), entry in np.ndenumerate(T))
 
 
@@ -283,9 +307,16 @@ def undone(first: Elements, T: Elements, last: Elements) -> Elements:
     return result
 
 
-def _placed(ring: Ring, xyz: list[Element], rpy: list[Direction]) -> Elements:
-    """Return Rz(yaw) Ry(pitch) Rx(roll) with an origin, shape (4, 4)."""
-    roll, pitch, yaw = rpy
+def _known_placement(naming: Naming, placement: Placement) -> Placement:
+    """Return a placement in the symbols that are kept."""
+    x, y, z = (naming.known(length) for length in placement.xyz)
+    roll, pitch, yaw = (exact_angle(naming.known(angle)) for angle in placement.rpy)
+    return Placement((x, y, z), (roll, pitch, yaw))
+
+
+def _transform(ring: Ring, placement: Placement) -> Elements:
+    """Return Rz(yaw) Ry(pitch) Rx(roll) with an origin, shape (4, 4), m."""
+    roll, pitch, yaw = (ring.direction(angle) for angle in placement.rpy)
     T: Elements = rotation(ring, 0, 1, yaw) @ rotation(ring, 2, 0, pitch) @ rotation(ring, 1, 2, roll)
-    T[:3, 3] = xyz
+    T[:3, 3] = [ring.read(length) for length in placement.xyz]
     return T

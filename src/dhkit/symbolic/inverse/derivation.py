@@ -27,32 +27,33 @@ from dhkit.symbolic.ring import Element
 from dhkit.symbolic.ring.elements import element_array
 
 _LANGUAGES = ("c", "python", "matlab")
-_CLOSES = 1e-9
-_FOUND = 1e-6
-"""Largest error, rad and share of the reach, with which a branch closes forward kinematics, and with which joint values
-are those that a pose was computed from: near singular poses joints are less certain than poses."""
+_POSE_TOLERANCE = 1e-9
+"""Largest error of a branch's pose: of entries of the rotation, and of the position as a share of the reach."""
+_JOINT_TOLERANCE = 1e-6
+"""Largest difference, rad or share of the reach, of joint values that count as equal. It is larger than that of poses:
+near singular poses joint values are less certain."""
 IN_PLANE = 1e-9
-"""Share of the reach by which a pose may be off the plane of an arm that moves in one."""
+"""Largest distance of a pose from the plane of a planar arm, as a share of the reach."""
 _SAMPLES = 200
-"""Number of random poses at which a proof looks whether branches close and none is missing."""
+"""Number of random poses at which a proof tests whether branches close and none is missing."""
 
 
 @dataclass(frozen=True, eq=False)
 class InverseProof:
-    """Proved statements of a derivation, and those that were only sampled.
+    """The proofs of a derivation, and the results of sampling.
 
     Attributes
     ----------
     identities
-        For each step that its equations hold for the pose of the arm itself.
+        A proof for each step: its equations hold for the pose of the arm itself.
     lemmas
-        For each form of equation that its solution is right and complete.
+        A proof for each form of equation: its solution is right and complete.
     samples
         Number of random poses at which the branches were tried.
     closed
         Whether all branches closed forward kinematics there.
     complete
-        Whether the joint values that each pose was computed from were among them.
+        Whether the joint values that each pose was computed from were among the branches.
     """
 
     identities: tuple[Proof, ...]
@@ -66,7 +67,7 @@ class InverseProof:
 
     @property
     def statement(self) -> str:
-        """Proved statements, and sampled ones."""
+        """The result in words: proved, and sampled."""
         proved = f"{len(self.identities)} identities and {len(self.lemmas)} lemmas"
         failed = [proof.statement for proof in (*self.identities, *self.lemmas) if not proof]
         sampled = (
@@ -101,11 +102,11 @@ class InverseDerivation:
     conditions
         Equations that a pose has to satisfy besides: an arm in a plane.
     notes
-        What is not as in the robot file: names of lengths, numbers instead of symbols.
+        Differences from the robot file: names of lengths, numbers instead of symbols.
     sum
         The joints whose angles add up to phi, from 1, each with 1 or -1; empty without phi.
     meanings
-        What each name of the pose and of a defined quantity is if the pose is that of the arm itself.
+        Values of the pose's entries and of defined quantities in the joints, if the pose is that of the arm, by name.
 
     Examples
     --------
@@ -137,11 +138,12 @@ class InverseDerivation:
 
     @property
     def geometry(self) -> str:
-        """Arrangement of the arm's axes, in words."""
+        """The arrangement of the arm's axes in words."""
         kinds = self.description.kinds
         if self.family.name != "parallel_chain":
             return self.family.geometry
-        return f"{kinds.count('R')} parallel revolute axes{', a slide along them' * ('P' in kinds)}"
+        slide = ", a slide along them" if "P" in kinds else ""
+        return f"{kinds.count('R')} parallel revolute axes{slide}"
 
     @cached_property
     def choices(self) -> tuple[Choice, ...]:
@@ -152,7 +154,8 @@ class InverseDerivation:
     @property
     def branches(self) -> tuple[str, ...]:
         """Names of the branches, as those of ``arm.ik``."""
-        return tuple(" ".join(names) for names in product(*(in_branch_order(choice) for choice in self.choices)))
+        names_of_choices = [in_branch_order(choice) for choice in self.choices]
+        return tuple(" ".join(names) for names in product(*names_of_choices))
 
     # Reading
 
@@ -220,9 +223,10 @@ class InverseDerivation:
         bench = Workbench(self.chain, self.family.undoes_tool)
         bench.meanings = self.meanings
         for step in self.steps:
-            sides = [(self.chain.ring.constant(d.name), d.element) for d in step.definitions]
-            sides += step.form.equations if step.form else ()
-            yield _proof(bench, step.title, sides)
+            equations = [(self.chain.ring.constant(d.name), d.element) for d in step.definitions]
+            if step.form is not None:
+                equations += step.form.equations
+            yield _proof(bench, step.title, equations)
         for condition in self.conditions:
             yield _proof(bench, condition.look, [(condition.left, condition.right)])
 
@@ -234,37 +238,49 @@ class InverseDerivation:
         samples, seed
             Number and seed of the random joint values whose poses are solved.
         """
-        used = dict.fromkeys(type(step.form).__name__ for step in self.steps if step.form is not None)
         rng = np.random.default_rng(seed)
         numbers = self.description.numbers
         span = np.where(numbers.prismatic, max(self.description.reach, 1e-3), np.pi)
         q = rng.uniform(-span, span, (samples, self.n))
         T = world_to_tool(self.description, q)
         found = self.solve(T)
+
+        forms = dict.fromkeys(type(step.form).__name__ for step in self.steps if step.form is not None)
         return InverseProof(
-            tuple(self.identities()),
-            tuple(lemmas()[name] for name in used),
-            samples,
-            self._closes(found, T),
-            self._contains(found, q),
+            identities=tuple(self.identities()),
+            lemmas=tuple(lemmas()[name] for name in forms),
+            samples=samples,
+            closed=self._closes(found, T),
+            complete=self._contains(found, q),
         )
 
     def _closes(self, found: Array, T: Array) -> bool:
-        valid = np.asarray(np.isfinite(found).all(axis=-1))
-        reached = world_to_tool(self.description, np.where(valid[..., None], found, 0.0))
-        scale = self.description.reach or 1.0
-        gap = np.abs(reached - T[:, None])[..., :3, :]
-        gap[..., 3] /= scale
+        """Return whether all solutions (N, B, n) reach their poses (N, 4, 4), and each pose has one."""
         if self.family.aims:
             return True
-        error = gap[..., 3].max(axis=-1) if not self.family.undoes_tool else gap.max(axis=(-1, -2))
-        return bool(np.all(error[valid] < _CLOSES)) and bool(valid.any(axis=1).all())
+        is_solution = np.asarray(np.isfinite(found).all(axis=-1))
+        reached = world_to_tool(self.description, np.where(is_solution[..., None], found, 0.0))
+
+        # Entries of the rotation, and of the position as a share of the reach, shape (N, B, 3, 4).
+        gap = np.abs(reached - T[:, None])[..., :3, :]
+        gap[..., 3] /= self.description.reach or 1.0
+
+        # An arm that cannot reach every pose keeps the position alone.
+        error = gap.max(axis=(-1, -2)) if self.family.undoes_tool else gap[..., 3].max(axis=-1)
+        all_close = bool(np.all(error[is_solution] < _POSE_TOLERANCE))
+        all_solved = bool(is_solution.any(axis=1).all())
+        return all_close and all_solved
 
     def _contains(self, found: Array, q: Array) -> bool:
-        slides = self.description.numbers.prismatic
-        away = np.abs(found - q[:, None])
-        away = np.where(slides, away / (self.description.reach or 1.0), np.abs((away + np.pi) % (2 * np.pi) - np.pi))
-        return bool(np.all(np.nanmin(np.where(np.isnan(away), np.inf, away).max(axis=-1), axis=1) < _FOUND))
+        """Return whether the solutions (N, B, n) of each pose contain the joint values (N, n) that it was made from."""
+        difference = np.abs(found - q[:, None])
+        of_length = difference / (self.description.reach or 1.0)
+        of_angle = np.abs((difference + np.pi) % (2 * np.pi) - np.pi)
+        difference = np.where(self.description.numbers.prismatic, of_length, of_angle)
+
+        # The largest difference of a joint; a branch without a solution is infinitely far away.
+        of_branch = np.where(np.isnan(difference), np.inf, difference).max(axis=-1)
+        return bool(np.all(of_branch.min(axis=1) < _JOINT_TOLERANCE))
 
     # Numbers
 
@@ -291,21 +307,25 @@ class InverseDerivation:
         if T.shape[-2:] != (4, 4):
             raise ValueError(f"T has shape {T.shape}; expected (..., 4, 4)")
         poses = T.reshape(-1, 4, 4)
-        result = np.full((len(poses), len(self.branches), self.n), np.nan)
+        B = len(self.branches)
+        result = np.full((len(poses), B, self.n), np.nan)
+
+        # The same choice of roots may have different names at different poses.
         with np.errstate(all="ignore"):
             for values, is_solved in self.candidates(poses):
                 rows = np.flatnonzero(is_solved)
-                result[rows, self._named(values)[rows]] = self._joints(values)[rows]
-        return result.reshape((*T.shape[:-2], len(self.branches), self.n))
+                branch = self._branch_index(values)
+                result[rows, branch[rows]] = self._joints(values)[rows]
+        return result.reshape((*T.shape[:-2], B, self.n))
 
     def candidates(self, T: Array) -> Iterator[tuple[Values, Array]]:
-        """Yield for each choice of roots the values of all quantities at poses (N, 4, 4), and which are solutions."""
-        rooted = [k for k, step in enumerate(self.steps) if step.form is not None and step.form.has_two_roots]
-        for signs in product((1.0, -1.0), repeat=len(rooted)):
-            yield self._branch(T, dict(zip(rooted, signs, strict=True)))
+        """Yield for each choice of roots the values of all quantities at poses (N, 4, 4), and a solution mask (N,)."""
+        with_roots = [k for k, step in enumerate(self.steps) if step.form is not None and step.form.has_two_roots]
+        for signs in product((1.0, -1.0), repeat=len(with_roots)):
+            yield self._evaluate(T, dict(zip(with_roots, signs, strict=True)))
 
-    def _branch(self, T: Array, signs: Mapping[int, float]) -> tuple[Values, Array]:
-        """Return the values of all quantities for signs of roots, and whether they are solutions, shape (N,)."""
+    def _evaluate(self, T: Array, signs: Mapping[int, float]) -> tuple[Values, Array]:
+        """Return the values of all quantities for the roots' signs by step, and a mask (N,) of solutions."""
         count = len(T)
         values = Values(self.chain, T)
         is_solved = np.ones(count, dtype=bool)
@@ -318,9 +338,10 @@ class InverseDerivation:
             found, radicand = step.form.solve(letters, signs.get(k, 1.0))
             is_solved &= np.broadcast_to(radicand >= -ZERO_RADICAND, count)
             values.set_unknown(step.form.unknown, np.broadcast_to(found, count))
+
         for condition in self.conditions:
-            off = np.abs(values.of(condition.left) - values.of(condition.right))
-            is_solved &= np.broadcast_to(off <= IN_PLANE * (self.description.reach or 1.0), count)
+            distance = np.abs(values.of(condition.left) - values.of(condition.right))
+            is_solved &= np.broadcast_to(distance <= IN_PLANE * (self.description.reach or 1.0), count)
         return values, is_solved
 
     def _joints(self, values: Values) -> Array:
@@ -328,33 +349,40 @@ class InverseDerivation:
         q = np.stack([values.joints[i] for i in range(self.n)], axis=1)
         for i, offset in enumerate(self.chain.offsets):
             if self.description.kinds[i] == "R":
-                turned = q[:, i] - self.chain.number(offset)
-                q[:, i] = turned - 2 * np.pi * np.ceil((turned - np.pi) / (2 * np.pi))
+                # q = theta - offset, wrapped into (-pi, pi]
+                angle = q[:, i] - self.chain.number(offset)
+                q[:, i] = angle - 2 * np.pi * np.ceil((angle - np.pi) / (2 * np.pi))
         return q
 
-    def _named(self, values: Values) -> Array:
-        """Return the indices of branches by the rules that name them, shape (N,)."""
+    def _branch_index(self, values: Values) -> Array:
+        """Return the index in :attr:`branches` of the solution at each pose, shape (N,)."""
         count = len(values.joints[0])
         index = np.zeros(count, dtype=int)
         for choice in self.choices:
+            # The sign of the product of the factors names the root.
             sign = np.ones(count)
             for factor in choice.factors:
                 sign = sign * np.where(values.of(factor) < 0, -1.0, 1.0)
-            first = np.where(sign > 0, choice.names[0], choice.names[1]) == in_branch_order(choice)[0]
-            index = 2 * index + np.where(first, 0, 1)
+            name = np.where(sign > 0, choice.names[0], choice.names[1])
+
+            # Branches are numbered in binary: one digit a choice, 0 for its first name.
+            digit = np.where(name == in_branch_order(choice)[0], 0, 1)
+            index = 2 * index + digit
         return index
 
 
 class Values:
-    """Values of a ring's generators at N poses: what is given, and then what step after step finds."""
+    """Values of a ring's generators at N poses: those of constants and poses, then those that each step finds."""
 
     def __init__(self, chain: ExactChain, T: Array) -> None:
         self._chain = chain
-        ring = chain.ring
-        self._values: list[Any] = [chain.values.get(g.text, np.nan) for g in ring.generators]
+        self._values: list[Any] = [chain.values.get(g.text, np.nan) for g in chain.ring.generators]
         self.joints: dict[int, Array] = {}
-        """theta_i or q_i by joint, from 0, shape (N,) each."""
-        for name, value in zip(POSE, [*T[:, :3, 3].T, *T[:, :3, :3].reshape(-1, 9).T], strict=True):
+        """Values of theta_i or q_i by joint, from 0, shape (N,) each, rad or m."""
+
+        position = T[:, :3, 3].T
+        rotation = T[:, :3, :3].reshape(-1, 9).T
+        for name, value in zip(POSE, [*position, *rotation], strict=True):
             self.set_constant(chain.names[name], value)
 
     def set_constant(self, name: str, value: Array) -> None:
@@ -362,7 +390,7 @@ class Values:
         self._values[self._chain.ring.place("constant", name)] = value
 
     def set_unknown(self, unknown: Unknown, value: Array) -> None:
-        """Set what a step solves for."""
+        """Set the value of an unknown, shape (N,), rad or m."""
         ring = self._chain.ring
         if unknown.joint is None:
             self.set_constant(self._chain.names["cphi"], np.cos(value))
@@ -380,16 +408,14 @@ class Values:
         return np.asarray(element.value(self._values))
 
 
-_SHOULDERS = {frozenset(("left", "right")): ("left", "right")}
-
-
 def in_branch_order(choice: Choice) -> tuple[str, str]:
-    """Return the names of a choice in the order of branches: left before right."""
-    return _SHOULDERS.get(frozenset(choice.names), choice.names)
+    """Return the names of a choice in the order of branches: left before right, else as they are."""
+    return ("left", "right") if choice.names == ("right", "left") else choice.names
 
 
-def _proof(bench: Workbench, what: str, sides: Sequence[tuple[Element, Element]]) -> Proof:
-    differences = [bench.meaning(left) - bench.meaning(right) for left, right in sides]
+def _proof(bench: Workbench, what: str, equations: Sequence[tuple[Element, Element]]) -> Proof:
+    """Return the proof that both sides of equations are equal if the pose is that of the arm itself."""
+    differences = [bench.meaning(left) - bench.meaning(right) for left, right in equations]
     return Proof(f"{what}: holds for the pose of the arm itself", element_array(differences))
 
 
@@ -408,9 +434,11 @@ def inverse_derivation(description: Description) -> InverseDerivation:
     Raises
     ------
     DescriptionError
-        No closed form is known: says which axes do not meet or are not parallel, and what to use instead.
+        No closed form is known; the message names the axes that do not meet or are not parallel, and an alternative.
     """
     description, notes = without_rounding(description)
+
+    # With named lengths first; an arm may fit a family only by the values of its parameters.
     chain = ExactChain.of(description, named=True)
     family = family_of(chain)
     if family is None:
@@ -422,17 +450,32 @@ def inverse_derivation(description: Description) -> InverseDerivation:
         notes.append(
             f"{family.geometry}: only with the values of the parameters, which therefore stand as numbers here"
         )
+
     bench = Workbench(chain, family.undoes_tool)
     family.derive(bench)
-    conditions = [side for condition in bench.conditions for side in (condition.left, condition.right)]
-    steps = without_unused(bench.steps, conditions)
-    used = names_in([d.element for step in steps for d in step.definitions] + [e for s in steps for e in s.elements])
-    named = {name: value for name, value in chain.lengths.items() if name in used}
-    own = [f"{name} = {value:.6g}" for name, value in named.items() if name not in description.parameters]
+    in_conditions: list[Element] = []
+    for condition in bench.conditions:
+        in_conditions += [condition.left, condition.right]
+    steps = without_unused(bench.steps, in_conditions)
+
+    # Notes on the lengths and constant angles that the steps use.
+    in_steps: list[Element] = []
+    for step in steps:
+        in_steps += [definition.element for definition in step.definitions]
+        in_steps += step.elements
+    used = names_in(in_steps)
+    own = [name for name in chain.lengths if name in used and name not in description.parameters]
     if own:
-        notes.append(f"lengths of the table by the numbers of their rows, m: {', '.join(own)}")
+        lengths = [f"{name} = {chain.lengths[name]:.6g}" for name in own]
+        notes.append(f"lengths of the table by the numbers of their rows, m: {', '.join(lengths)}")
     # Notes on constant angles begin with the symbols that they are about.
     notes += [note for note in chain.notes if " are symbols" not in note or _subjects(note) & used]
     return InverseDerivation(
-        chain, family, tuple(steps), tuple(bench.conditions), tuple(notes), bench.sum, bench.meanings
+        chain=chain,
+        family=family,
+        steps=tuple(steps),
+        conditions=tuple(bench.conditions),
+        notes=tuple(notes),
+        sum=bench.sum,
+        meanings=bench.meanings,
     )

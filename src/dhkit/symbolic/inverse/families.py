@@ -1,4 +1,4 @@
-"""Families of arms whose inverse kinematics is derived: how each is recognized in the exact table, and its steps.
+"""Families of arms whose inverse kinematics is derived, with their tests on the exact table and their steps.
 
 The families are those of ``dhkit.kinematics.closed_form``, read anew from the table: axes i and i + 1 are parallel
 where sin(alpha_i) is 0, at right angles where cos(alpha_i) is 0, and meet where a_i is 0.
@@ -28,29 +28,29 @@ from dhkit.symbolic.inverse.turning_planes import (
 )
 
 _CHAINS = ("RR", "RRR", "RRPR", "RRRP", "PRRR", "RPRR", "RRP", "RPR", "PRR")
-"""Kinds of joints of arms in parallel planes: two or three revolute joints and at most one slide."""
+"""Kinds of joints of arms in parallel planes: two or three revolute joints and at most one prismatic one."""
 
 
 @dataclass(frozen=True)
 class Derivable:
-    """A family.
+    """A family of arms that share a derivation.
 
     Attributes
     ----------
     name
         Its identifier, as ``arm.family.name``.
     kinds
-        Kinds of joints.
+        Kinds of joints of its arms, one letter a joint.
     geometry
-        How its axes lie, in words.
+        The arrangement of its axes in words.
     fits
-        Whether an arm of these kinds belongs to it.
+        Test whether an arm of these kinds belongs to it.
     derive
-        Writes its steps on a workbench.
+        Function that writes its steps on a workbench.
     undoes_tool
-        Whether it reaches every pose.
+        Whether the constant transform after the last joint is divided out of the pose; arms that reach every pose.
     aims
-        Whether it only points at the pose's origin.
+        Whether the derivation only points the tool at the pose's origin.
     """
 
     name: str
@@ -101,4 +101,4 @@ FAMILIES = (
     ),
     Derivable("slider", ("PR",), "a revolute axis at right angles to a slide", slider_fits, slider),
 )
-"""Families in the order in which they are tried."""
+"""All families, in the order in which they are tried."""

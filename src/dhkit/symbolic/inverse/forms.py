@@ -1,4 +1,4 @@
-"""The forms of equations that derivations of inverse kinematics solve, each with its solution and the lemma behind it.
+"""The forms of equations that derivations of inverse kinematics solve, each with its solution and its lemma.
 
 A form has letters (A, B, C ...) that stand for known quantities. Its lemma, that the solution satisfies the equation
 and that there is no other one, is proved once, in a ring of the letters.
@@ -20,17 +20,17 @@ from dhkit.symbolic.ring import Element, Elements, Ring
 from dhkit.symbolic.ring.ring import Constant
 
 ZERO_RADICAND = 1e-12
-"""Share of its terms by which the radicand of a root may be negative and counts as zero."""
+"""Largest size of a negative radicand that counts as zero, as a share of the radicand's terms: they are rounded."""
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """Unknown of a step.
+    """The quantity that a step solves for.
 
     Attributes
     ----------
     name
-        theta3, q3 of a prismatic joint, or phi.
+        theta3 of a revolute joint, q3 of a prismatic one, or phi.
     joint
         The joint, from 0; None for phi, a sum of joint angles.
     symbols
@@ -43,7 +43,7 @@ class Unknown:
 
     @property
     def is_angle(self) -> bool:
-        """Whether it is an angle."""
+        """Whether the unknown is an angle, not a length."""
         return len(self.symbols) == 2
 
     @property
@@ -64,7 +64,7 @@ class Form(ABC):
     Attributes
     ----------
     unknown
-        What it is solved for.
+        The quantity that it is solved for.
     letters
         The known quantities by letter.
     """
@@ -76,17 +76,17 @@ class Form(ABC):
     statement: ClassVar[str]
     """The lemma in words."""
     text: ClassVar[tuple[str, ...]]
-    """The solution as text, in one or two alternatives; <A> stands for the letter A or what it is."""
+    """The solution as text, in one or two alternatives; <A> stands for the letter A or its value."""
     latex: ClassVar[tuple[str, ...]]
     """The same in LaTeX."""
     code: ClassVar[str]
     """The same as code, where <s> is 1 or -1, and root(x) the square root of x, or 0 if x is negative."""
     guard: ClassVar[tuple[str, str]] = ("", "")
-    """Radicand, which must not be negative, and the length that it is compared with, as code; empty without a root."""
+    """The radicand, and the quantity that its size is compared with, as code; empty without a root."""
 
     @property
     def derived(self) -> dict[str, tuple[str, Element]]:
-        """Further quantities in the solution, by their placeholders: in the letters, and what they are."""
+        """Further quantities in the solution, by their placeholders: as text in the letters, and as elements."""
         return {}
 
     @property
@@ -96,7 +96,20 @@ class Form(ABC):
 
     @abstractmethod
     def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
-        """Return the unknown and the radicand, as a share of its terms, at values of the letters; 1 without a root."""
+        """Return the unknown at values of the letters, and the radicand as a share of its terms.
+
+        Parameters
+        ----------
+        letters
+            Values of the letters, shape (N,) or ().
+        sign
+            1 or -1, the root that is taken.
+
+        Returns
+        -------
+        tuple
+            The unknown, rad or m, and the radicand over the size of its terms; 1 without a root.
+        """
 
     @staticmethod
     @abstractmethod
@@ -131,11 +144,13 @@ class Circle(Form):
 
     def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
         """Return the angle and the radicand."""
+        # x = atan2(B, A) +- atan2(R, C) with R^2 = A^2 + B^2 - C^2
         A, B, C = (letters[k] for k in "ABC")
         size = A * A + B * B
-        square = size - C * C
-        angle = np.arctan2(B, A) + sign * np.arctan2(np.sqrt(np.maximum(square, 0.0)), C)
-        return angle, square / np.maximum(size, np.finfo(float).tiny)
+        radicand = size - C * C
+        R = np.sqrt(np.maximum(radicand, 0.0))
+        angle = np.arctan2(B, A) + sign * np.arctan2(R, C)
+        return angle, radicand / np.maximum(size, np.finfo(float).tiny)
 
     @staticmethod
     def lemma() -> Proof:
@@ -145,14 +160,19 @@ class Circle(Form):
         c = ring.cosine(0)
         s = ring.sine(0)
         N = A * A + B * B
-        both = []
+
+        # The solutions hold: (x, y) = N (cos, sin) of the sum of the two arc tangents satisfies A x + B y = C N.
+        zeros = []
         for sign in (1, -1):
-            # cos and sin of the sum of the two arc tangents, times N.
             x = A * C - sign * B * R
             y = B * C + sign * A * R
-            both += [A * x + B * y - C * N, x * x + y * y - N * N]
-        held = A * c + B * s
-        return Proof(Circle.statement, _column([*both, (B * c - A * s) ** 2 - (N - held * held)]))
+            zeros.append(A * x + B * y - C * N)
+            zeros.append(x * x + y * y - N * N)
+
+        # There are no others: (B cos x - A sin x)^2 = N - (A cos x + B sin x)^2
+        left_side = A * c + B * s
+        zeros.append((B * c - A * s) ** 2 - (N - left_side * left_side))
+        return Proof(Circle.statement, _column(zeros))
 
 
 class Line(Form):
@@ -196,12 +216,12 @@ class Direction(Form):
     def derived(self) -> dict[str, tuple[str, Element]]:
         """The products with k, without a k of 1 or -1."""
         k = self.letters["k"]
-        words = "k*"
+        factor = "k*"
         if k == 1:
-            words = ""
+            factor = ""
         elif k == -1:
-            words = "-"
-        return {f"k{letter}": (f"{words}{letter}", k * self.letters[letter]) for letter in "XY"}
+            factor = "-"
+        return {f"k{letter}": (f"{factor}{letter}", k * self.letters[letter]) for letter in "XY"}
 
     @property
     def equations(self) -> tuple[tuple[Element, Element], ...]:
@@ -275,7 +295,8 @@ class CosineAndSquare(Form):
     def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
         """Return the angle and the radicand, which is a sum of squares."""
         S = letters["S"]
-        return np.arctan2(sign * np.sqrt(np.maximum(S, 0.0)), letters["X"]), S
+        sine = sign * np.sqrt(np.maximum(S, 0.0))
+        return np.arctan2(sine, letters["X"]), S
 
     @staticmethod
     def lemma() -> Proof:
@@ -332,7 +353,7 @@ class Turned(Form):
 
 
 class Square(Form):
-    """(z + M)^2 = S for a prismatic joint's value z; Q is the squared length that S is small or large against."""
+    """(z + M)^2 = S for a prismatic joint's value z; Q is the squared length that the size of S is compared with."""
 
     has_two_roots = True
     statement = "(z + M)^2 = S holds for z = -M +- sqrt(S), and for no other number"
@@ -353,9 +374,11 @@ class Square(Form):
 
     def solve(self, letters: Mapping[str, Array], sign: float) -> tuple[Array, Array]:
         """Return the value and the radicand."""
+        # z = -M +- sqrt(S)
         M = letters["M"]
         S = letters["S"]
-        return -M + sign * np.sqrt(np.maximum(S, 0.0)), S / np.maximum(letters["Q"], np.finfo(float).tiny)
+        value = -M + sign * np.sqrt(np.maximum(S, 0.0))
+        return value, S / np.maximum(letters["Q"], np.finfo(float).tiny)
 
     @staticmethod
     def lemma() -> Proof:
@@ -384,19 +407,19 @@ class Sliding(Form):
 
     @staticmethod
     def lemma() -> Proof:
-        """Nothing is to be proved."""
+        """Return a proof of 0 = 0: there is nothing to solve."""
         ring = _ring("z", {}, "")
         return Proof(Sliding.statement, _column([ring.zero]))
 
 
 @dataclass(frozen=True, eq=False)
 class Remainder(Form):
-    """An angle that is what remains of a known sum of angles: cos x = X and sin x = Y.
+    """The angle that is left of a sum of angles when all others are known: cos x = X and sin x = Y.
 
     Attributes
     ----------
     terms
-        The known angles of the sum's remainder: names with 1 or -1.
+        Names of the sum and of the known angles, each with 1 or -1, that add up to the angle.
     """
 
     terms: tuple[tuple[str, int], ...] = ()
@@ -445,17 +468,20 @@ def _ring(names: str, roots: Mapping[str, str], angle: str) -> Ring:
 
 
 def _along(names: Sequence[str]) -> Elements:
-    """Return what is zero if X sin x = Y cos x makes (X, Y) a multiple of (cos x, sin x)."""
+    """Return two elements that are zero if X sin x = Y cos x makes (X, Y) a multiple of (cos x, sin x)."""
     ring = _ring(" ".join(names), {}, "X")
     X, Y = (ring.constant(name) for name in names)
     c = ring.cosine(0)
     s = ring.sine(0)
+
+    # The components along (c, s) and (-s, c); the second one is zero by the equation.
     along = X * c + Y * s
     across = Y * c - X * s
     return _column([X - (along * c - across * s), Y - (along * s + across * c)])
 
 
 def _column(elements: Sequence[Element]) -> Elements:
+    """Return elements as an array, shape (k,)."""
     column = np.empty(len(elements), dtype=object)
     column[:] = elements
     return column

@@ -1,4 +1,4 @@
-"""Why an arm has no closed form: which of its axes do not meet or are not parallel, and by how much."""
+"""The reason for which an arm has no closed form: axes that do not meet or are not parallel, and by how much."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ def why_not(chain: ExactChain) -> str:
 
 
 def _missing(chain: ExactChain) -> str:
+    """Return the properties of a known family that the arm lacks, or the relations of its axes."""
     n = chain.n
     kinds = chain.description.kinds
     if n > 6:
@@ -34,33 +35,37 @@ def _missing(chain: ExactChain) -> str:
         found.append(_angle(chain, 2))
     if kinds == "RRPRRR" and not chain.alpha[1][0].is_zero:
         found.append(_angle(chain, 2))
-    if not (chain.alpha[3][0].is_zero and chain.alpha[4][0].is_zero):
-        found += [_angle(chain, i) for i in (4, 5) if not chain.alpha[i - 1][0].is_zero]
-    found += [
-        f"axes {i} and {i + 1} miss each other by {_length(chain, chain.a[i - 1])}" for i in (4, 5) if chain.a[i - 1]
-    ]
+
+    # A spherical wrist: axes 4, 5 and 6 at right angles in turn, through one point.
+    found += [_angle(chain, i) for i in (4, 5) if not chain.alpha[i - 1][0].is_zero]
+    apart = [i for i in (4, 5) if chain.a[i - 1]]
+    found += [f"axes {i} and {i + 1} miss each other by {_length(chain, chain.a[i - 1])}" for i in apart]
     if chain.d[4]:
         found.append(f"axes 4 and 6 meet axis 5 {_length(chain, chain.d[4])} apart")
     return ", ".join(found) or "its links have no length where two axes are parallel"
 
 
 def _number(chain: ExactChain, element: Element) -> float:
+    """Return the value of an element where all joint values are 0."""
     return float(element.value([chain.values.get(g.text, 0.0) for g in chain.ring.generators]))
 
 
 def _degrees(chain: ExactChain, i: int) -> float:
+    """Return the angle between axes i and i + 1, 0 to 90 degrees."""
     c, s = (_number(chain, x) for x in chain.alpha[i - 1])
     return float(np.degrees(np.arctan2(abs(s), abs(c))))
 
 
 def _angle(chain: ExactChain, i: int) -> str:
-    """Return how axes i and i + 1 lie to each other; neither parallel nor at right angles as is needed."""
+    """Return the angle between axes i and i + 1 in words; near 0 and 90 degrees with more digits."""
     angle = _degrees(chain, i)
-    text = f"{angle:.4g}" if min(abs(angle), abs(angle - 90)) > 1e-3 or angle in (0.0, 90.0) else f"{angle:.12g}"
+    off = min(abs(angle), abs(angle - 90))
+    text = f"{angle:.12g}" if 0.0 < off <= 1e-3 else f"{angle:.4g}"
     return f"axes {i} and {i + 1} are at {text} degrees"
 
 
 def _relation(chain: ExactChain, i: int) -> str:
+    """Return the angle and the distance between axes i and i + 1 in words."""
     length = _length(chain, chain.a[i - 1])
     return f"{_angle(chain, i)} and {length} apart"
 

@@ -8,8 +8,11 @@ from dhkit.symbolic.inverse.chain import ExactChain
 from dhkit.symbolic.ring import Element, Elements
 
 CENTRE = "the wrist centre"
+"""Name of the wrist centre in sentences."""
 TOOL = "the tool"
+"""Name of the tool's origin in sentences."""
 IN_THE_PLANE = "The arm moves in a plane: the pose has to lie in it."
+"""Sentence of the condition on poses of planar arms."""
 
 
 def parallel(chain: ExactChain, i: int) -> bool:
@@ -23,7 +26,7 @@ def perpendicular(chain: ExactChain, i: int) -> bool:
 
 
 def relative_sense(chain: ExactChain, i: int) -> Element:
-    """Return 1 or -1: whether parallel axes i and i + 1 have the same direction."""
+    """Return 1 if parallel axes i and i + 1 have the same direction, -1 if opposite ones: cos(alpha_i)."""
     return chain.alpha[i - 1][0]
 
 
@@ -34,7 +37,7 @@ def origin(T: Elements) -> Elements:
 
 
 def is_long(vector: Elements) -> bool:
-    """Whether a vector is not zero."""
+    """Return whether a vector is not zero."""
     return any(not entry.is_zero for entry in vector)
 
 
@@ -47,5 +50,6 @@ def flipped(chain: ExactChain, sense: Element) -> Elements:
 
 def sum_text(senses: Sequence[tuple[int, int]]) -> str:
     """Return a sentence on the sum phi of joint angles, each with 1 or -1."""
+    # The first joint has the sense 1: its " + " is cut off.
     terms = "".join(f" {'+' if sense > 0 else '-'} theta{i}" for i, sense in senses)
     return f"Angles about parallel axes add up: phi = {terms[3:]}."

@@ -6,22 +6,24 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
+from dhkit.symbolic.exact.transforms import identity
 from dhkit.symbolic.inverse.chain import INNER, POSE, ExactChain, is_identity, undone
 from dhkit.symbolic.inverse.forms import Form, Unknown
 from dhkit.symbolic.ring import Element, Elements
 from dhkit.symbolic.ring.elements import element_array
+from dhkit.symbolic.ring.notation import constants_of, generators_of
 from dhkit.symbolic.ring.ring import translated
 
 
 class View(Enum):
-    """Subject of the figure of a step."""
+    """The scene that the figure of a step shows."""
 
     TOP = "top"
     """The arm's plane seen along axis 1."""
     TRIANGLE = "triangle"
     """Two links and the point that they reach, seen along their axes."""
     SLIDE = "slide"
-    """A slide and the point that it reaches, seen along the axis that turns it."""
+    """A prismatic joint and the point that it reaches, seen along the axis that turns it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +33,11 @@ class Figure:
     Attributes
     ----------
     view
-        What it shows.
+        The scene that it shows.
     labels
         Names of the axes, and of the point.
     first
-        Of a triangle: the first link before it turns, x and y, m.
+        For a triangle, the first link before it turns, x and y, m.
     """
 
     view: View
@@ -68,7 +70,7 @@ class Choice:
     names
         The name of the root where the product of the factors is positive, and that of the other one.
     factors
-        Quantities of which the signs count; a factor of zero counts as positive.
+        Quantities whose signs are multiplied; a factor of zero counts as positive.
     """
 
     names: tuple[str, str]
@@ -82,17 +84,17 @@ class DerivationStep:
     Attributes
     ----------
     title
-        What it finds.
+        The quantity that it finds.
     look
-        What is looked at, in a sentence.
+        The geometric idea, in one or more sentences.
     definitions
         Quantities defined before the equation.
     form
         The equation and its solution; None for a step that only defines quantities.
     nothing
-        When there is no solution, with the distance that is missing; empty if there always is one.
+        The condition under which there is no solution, with the distance that is missing; empty if there always is one.
     singular
-        When the solution is not unique or not smooth; empty if never.
+        The condition under which the solution is not unique or not smooth; empty if it always is.
     choice
         The rule that names the roots, where there are two.
     figure
@@ -110,7 +112,7 @@ class DerivationStep:
 
     @property
     def unknown(self) -> Unknown | None:
-        """Unknown that the step solves for."""
+        """The quantity that the step solves for; None if it only defines quantities."""
         return None if self.form is None else self.form.unknown
 
     @property
@@ -119,8 +121,11 @@ class DerivationStep:
         found: list[Element] = []
         if self.form is not None:
             found += self.form.letters.values()
-            found += [side for equation in self.form.equations for side in equation]
-        return found + list(self.choice.factors if self.choice else ())
+            for left, right in self.form.equations:
+                found += [left, right]
+        if self.choice is not None:
+            found += self.choice.factors
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,15 +139,17 @@ class Condition:
 
 @dataclass(eq=False)
 class Workbench:
-    """The steps so far, and what is known.
+    """The steps so far, and the quantities that they have found.
 
     Attributes
     ----------
     chain
         The arm.
     undoes_tool
-        Whether the pose is taken back through the tool and the last link, too; arms that cannot reach every pose keep
-        them.
+        Whether the constant transform after the last joint, F, is divided out of the pose as E is; arms that cannot
+        reach every pose keep it.
+    T
+        The pose that the steps start from: E^-1 T F^-1, or E^-1 T; its entries are symbols.
     """
 
     chain: ExactChain
@@ -150,50 +157,61 @@ class Workbench:
     steps: list[DerivationStep] = field(default_factory=list)
     conditions: list[Condition] = field(default_factory=list)
     meanings: dict[str, Element] = field(default_factory=dict)
-    """Values of the names of the pose and of defined quantities if the pose is that of the arm."""
+    """Values of the pose's entries and of defined quantities in the joints, if the pose is that of the arm, by name."""
 
     sum: tuple[tuple[int, int], ...] = ()
     """The joints whose angles add up to phi, from 1, each with 1 or -1; empty without phi."""
 
     def __post_init__(self) -> None:
         chain = self.chain
-        tool = chain.tool_pose
-        self._mean(POSE, [*tool[:3, 3], *tool[:3, :3].flat])
-        last = chain.last if self.undoes_tool else None
-        if is_identity(chain.first) and (last is None or is_identity(last)):
+        self._set_meanings(POSE, _entries(chain.tool_pose))
+
+        E = chain.first
+        F = chain.last if self.undoes_tool else identity(chain.ring)
+        if is_identity(E) and is_identity(F):
             self.T = chain.given_pose
             return
-        identity = chain.part(1, 0)
-        given = undone(chain.first, chain.given_pose, identity if last is None else last)
-        inner = chain.whole if last is not None else chain.whole @ chain.last
-        self._mean(INNER, [*inner[:3, 3], *inner[:3, :3].flat])
-        values = dict(zip(INNER, [*given[:3, 3], *given[:3, :3].flat], strict=True))
+
+        # h = E^-1 T F^-1 = J_1 C_1 ... J_n, or with F kept, h = E^-1 T = J_1 C_1 ... J_n F
+        given = undone(E, chain.given_pose, F)
+        in_joints = chain.whole if self.undoes_tool else chain.whole @ chain.last
+        self._set_meanings(INNER, _entries(in_joints))
+
         what = "base and tool" if self.undoes_tool else "base"
+        after = f" and behind joint {chain.n}" if self.undoes_tool else ""
+        definitions = [Definition(chain.names[name], entry) for name, entry in zip(INNER, _entries(given), strict=True)]
         self.steps.append(
             DerivationStep(
                 f"The pose without {what}",
-                f"The constant transforms before axis 1{f' and behind joint {chain.n}' * self.undoes_tool} are taken "
-                "off: what remains, h, depends on the joints alone.",
-                tuple(Definition(self.chain.names[name], values[name]) for name in INNER),
+                f"The constant transforms before axis 1{after} are taken off: what remains, h, depends on the joints "
+                "alone.",
+                tuple(definitions),
             )
         )
-        self.T = identity.copy()
+        self.T = identity(chain.ring)
         self.T[:3, 3] = chain.named(INNER[:3])
         self.T[:3, :3] = chain.named(INNER[3:]).reshape(3, 3)
 
-    def _mean(self, names: Sequence[str], elements: Iterable[Element]) -> None:
-        self.meanings |= {self.chain.names[name]: element for name, element in zip(names, elements, strict=True)}
+    def _set_meanings(self, names: Sequence[str], elements: Iterable[Element]) -> None:
+        """Set the values of quantities in the joints; names are the usual ones."""
+        for name, element in zip(names, elements, strict=True):
+            self.meanings[self.chain.names[name]] = element
 
     def define(self, name: str, element: Element) -> tuple[Definition, Element]:
-        """Return a definition and its symbol; a quantity that is a symbol or a number already needs none."""
+        """Return the definition of a quantity by its usual name, and its symbol."""
         own = self.chain.names[name]
         self.meanings[own] = self.meaning(element)
         return Definition(own, element), self.chain.symbol(name)
 
     def define_all(self, **elements: Element) -> tuple[tuple[Definition, ...], Elements]:
         """Return definitions and their symbols, shape (k,)."""
-        pairs = [self.define(name, element) for name, element in elements.items()]
-        return tuple(definition for definition, _ in pairs), element_array([symbol for _, symbol in pairs])
+        definitions = []
+        symbols = []
+        for name, element in elements.items():
+            definition, symbol = self.define(name, element)
+            definitions.append(definition)
+            symbols.append(symbol)
+        return tuple(definitions), element_array(symbols)
 
     def add(self, step: DerivationStep) -> None:
         """Append a step."""
@@ -202,9 +220,9 @@ class Workbench:
     def meaning(self, element: Element) -> Element:
         """Return an element for the pose of the arm itself, in sines and cosines of its joints."""
         ring = self.chain.ring
-        places = {ring.place("constant", name): value for name, value in self.meanings.items()}
-        used = {k for monomial in element.terms for k, exponent in enumerate(monomial) if exponent and k in places}
-        return translated(element, ring, {k: places[k] for k in used}) if used else element
+        meanings = {ring.place("constant", name): value for name, value in self.meanings.items()}
+        replacements = {k: meanings[k] for k in element.used_generators if k in meanings}
+        return translated(element, ring, replacements) if replacements else element
 
     def unknown(self, i: int) -> Unknown:
         """Return joint i, from 1, as an unknown."""
@@ -214,24 +232,32 @@ class Workbench:
         return Unknown(f"q{i}", i - 1, (chain.ring.position(i - 1),))
 
     def phi(self, cosine: Element, sine: Element, senses: Sequence[tuple[int, int]]) -> Unknown:
-        """Return the angle phi as an unknown, with what its cosine and sine are for the arm itself."""
+        """Return the angle phi as an unknown.
+
+        Parameters
+        ----------
+        cosine, sine
+            Cosine and sine of phi in the joints.
+        senses
+            The joints whose angles add up to phi, from 1, each with 1 or -1.
+        """
         self.sum = tuple(senses)
-        self._mean(("cphi", "sphi"), (cosine, sine))
+        self._set_meanings(("cphi", "sphi"), (cosine, sine))
         return Unknown("phi", None, tuple(self.chain.named(("cphi", "sphi"))))
 
 
 def names_in(elements: Iterable[Element]) -> set[str]:
     """Return the names of the constants in elements."""
-    found = set()
-    for element in elements:
-        generators = element.ring.generators
-        used = {k for monomial in element.terms for k, exponent in enumerate(monomial) if exponent}
-        found |= {generators[k].text for k in used if generators[k].kind == "constant"}
-    return found
+    return {generator.text for generator in constants_of(generators_of(elements))}
+
+
+def _entries(T: Elements) -> list[Element]:
+    """Return the twelve entries of a pose in the order of :data:`POSE`: position, then rotation row by row."""
+    return [*T[:3, 3], *T[:3, :3].flat]
 
 
 def without_unused(steps: Sequence[DerivationStep], further: Iterable[Element] = ()) -> list[DerivationStep]:
-    """Return steps without the definitions that nothing uses."""
+    """Return steps without the definitions that neither a later step nor a further element uses."""
     kept: list[DerivationStep] = []
     used = names_in(further)
     for step in reversed(steps):

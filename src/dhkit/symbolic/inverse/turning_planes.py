@@ -35,6 +35,7 @@ from dhkit.symbolic.ring.elements import element_array
 
 
 def _spherical(chain: ExactChain) -> bool:
+    """Return whether axes 4, 5 and 6 meet in one point, each at right angles to the next."""
     meet = chain.a[3].is_zero and chain.a[4].is_zero and chain.d[4].is_zero
     return meet and perpendicular(chain, 4) and perpendicular(chain, 5)
 
@@ -43,9 +44,10 @@ def _spherical(chain: ExactChain) -> bool:
 
 
 def _wrist_centre(bench: Workbench) -> Elements:
-    """Return the wrist centre before joint 1, shape (3,), m: the origin behind joint 5, which joint 6 leaves alone."""
+    """Return the wrist centre before joint 1, shape (3,), m: the origin after joint 5, which joint 6 does not move."""
     T = bench.T
     d6 = bench.chain.d[5]
+    # w = p - d6 a, with a the axis of joint 6
     place: Elements = T[:3, 3] - T[:3, 2] * d6
     if d6.is_zero:
         return place
@@ -62,12 +64,12 @@ def _wrist_centre(bench: Workbench) -> Elements:
 
 
 def _fore_arm(chain: ExactChain) -> Elements:
-    """Return the wrist centre in the frame of axis 3 behind joint 3, shape (3,), m."""
+    """Return the wrist centre in the frame of axis 3 that joint 3 moves, shape (3,), m."""
     return origin(chain.link(3) @ chain.joint(4))
 
 
 def elbow_fits(chain: ExactChain) -> bool:
-    """Whether axes 2 and 3 are parallel before a spherical wrist."""
+    """Return whether axes 2 and 3 are parallel before a spherical wrist."""
     if not (perpendicular(chain, 1) and parallel(chain, 2) and _spherical(chain)):
         return False
     return not chain.a[1].is_zero and is_long(_fore_arm(chain)[:2])
@@ -76,21 +78,36 @@ def elbow_fits(chain: ExactChain) -> bool:
 def elbow(bench: Workbench) -> None:
     """Write the steps of the PUMA's family."""
     chain = bench.chain
+
+    # Joints 1, 2 and 3 put the wrist centre in place.
     centre = _wrist_centre(bench)
     inside = origin(chain.part(2, 3) @ chain.joint(4))
     plane = turn_the_plane(bench, centre, inside, CENTRE)
-    _two_links_in_plane(bench, plane, CENTRE, origin(chain.link(2) @ chain.joint(3) @ chain.link(3) @ chain.joint(4)))
-    turned = chain.part(2, 3)
+    both_links = origin(chain.link(2) @ chain.joint(3) @ chain.link(3) @ chain.joint(4))
+    _two_links_in_plane(bench, plane, CENTRE, both_links)
+
+    # Joints 4, 5 and 6 turn the tool. Joints 2 and 3 together turn link 3 by phi.
+    links_2_and_3 = chain.part(2, 3)
     sense = relative_sense(chain, 2)
-    definitions, (c, s) = bench.define_all(cphi=turned[0, 0], sphi=turned[1, 0])
-    bench.sum = (2, 1), (3, int(number(chain, sense)))
+    definitions, (c, s) = bench.define_all(cphi=links_2_and_3[0, 0], sphi=links_2_and_3[1, 0])
+    bench.sum = ((2, 1), (3, int(number(chain, sense))))
     bench.add(DerivationStep("The rotation of link 3", sum_text(bench.sum), definitions))
     R = rotation(chain.ring, 0, 1, (c, s))[:3, :3] @ flipped(chain, sense) @ chain.link(3)[:3, :3]
     turn_spherical_wrist(bench, _turn_1(bench) @ R)
 
 
 def _two_links_in_plane(bench: Workbench, plane: Plane, who: str, both: Elements) -> None:
-    """Add the steps for joints 2 and 3 with the elbow up or down."""
+    """Add the steps for joints 2 and 3 with the elbow up or down.
+
+    Parameters
+    ----------
+    plane
+        The point in the plane that joint 1 turns.
+    who
+        The point's name in sentences.
+    both
+        The vector from axis 2 to the point where theta2 is 0, shape (3,), m, in theta3.
+    """
     chain = bench.chain
     definitions, (x, y) = bench.define_all(x=plane.x, y=plane.y)
     bench.add(
@@ -100,6 +117,7 @@ def _two_links_in_plane(bench: Workbench, plane: Plane, who: str, both: Elements
             definitions,
         )
     )
+    # (-y, x), the left of the line to (x, y), is above the line where its component along the vertical is positive.
     above = plane.up[1] * x - plane.up[0] * y
     first = element_array([chain.a[1], chain.ring.zero])
     reach_with_two_links(bench, (2, 3), first, both[:2], (x, y), who, ("up", "down"), above)
@@ -113,7 +131,7 @@ def _turn_1(bench: Workbench) -> Elements:
 
 
 def slide_fits(chain: ExactChain) -> bool:
-    """Whether joint 3 slides at right angles to axis 2 before a spherical wrist."""
+    """Return whether joint 3 slides at right angles to axis 2 before a spherical wrist."""
     return perpendicular(chain, 1) and perpendicular(chain, 2) and _spherical(chain)
 
 
@@ -140,7 +158,7 @@ def slide(bench: Workbench) -> None:
 
 
 def parallel_fits(chain: ExactChain) -> bool:
-    """Whether axes 2, 3 and 4 are parallel, and 5 and 6 meet."""
+    """Return whether axes 2, 3 and 4 are parallel, and 5 and 6 meet."""
     if not (perpendicular(chain, 1) and parallel(chain, 2) and parallel(chain, 3)):
         return False
     if not (perpendicular(chain, 4) and perpendicular(chain, 5) and chain.a[4].is_zero):
@@ -149,13 +167,17 @@ def parallel_fits(chain: ExactChain) -> bool:
 
 
 def _parallel_senses(chain: ExactChain) -> list[tuple[int, int]]:
-    second, third = (int(number(chain, relative_sense(chain, i))) for i in (2, 3))
-    return [(2, 1), (3, second), (4, second * third)]
+    """Return joints 2, 3 and 4, each with 1 if its axis has the direction of axis 2, else -1."""
+    third_to_second = int(number(chain, relative_sense(chain, 2)))
+    fourth_to_third = int(number(chain, relative_sense(chain, 3)))
+    return [(2, 1), (3, third_to_second), (4, third_to_second * fourth_to_third)]
 
 
 def three_parallel(bench: Workbench) -> None:
     """Write the steps of the Universal Robots' family."""
     chain = bench.chain
+
+    # w = p - d6 a, with a the axis of joint 6
     T = bench.T
     d6 = chain.d[5]
     place = T[:3, 3] - T[:3, 2] * d6
@@ -170,13 +192,14 @@ def three_parallel(bench: Workbench) -> None:
                 definitions,
             )
         )
-    arm = chain.part(2, 4)
-    lever = (chain.link(4) @ chain.joint(5))[:3, 3]
-    plane = turn_the_plane(bench, point, origin(arm @ chain.joint(5)), who)
+
+    # Joint 1 puts the point into the plane; joints 5 and 6 turn the tool; the rest of its rotation is phi.
+    links_2_to_4 = chain.part(2, 4)
+    plane = turn_the_plane(bench, point, origin(links_2_to_4 @ chain.joint(5)), who)
     sense = relative_sense(chain, 2) * relative_sense(chain, 3)
     senses = _parallel_senses(chain)
     definitions, cosine, sine = turn_parallel_wrist(bench, sense)
-    phi = bench.phi(arm[0, 0], arm[1, 0], senses)
+    phi = bench.phi(links_2_to_4[0, 0], links_2_to_4[1, 0], senses)
     bench.add(
         DerivationStep(
             "phi",
@@ -186,17 +209,34 @@ def three_parallel(bench: Workbench) -> None:
             Directed(phi, {"k": chain.ring.one, "X": cosine, "Y": sine}),
         )
     )
+
+    # Joints 2, 3 and 4 put the point in place, with phi known.
+    lever = origin(chain.link(4) @ chain.joint(5))
     _reach_axis_4(bench, plane, lever, sense, senses)
 
 
 def _reach_axis_4(
     bench: Workbench, plane: Plane, lever: Elements, sense: Element, senses: list[tuple[int, int]]
 ) -> None:
-    """Add the steps for joints 2, 3 and 4, where phi is known: ``lever`` leads from axis 4 to the point."""
+    """Add the steps for joints 2, 3 and 4, where phi is known.
+
+    Parameters
+    ----------
+    plane
+        A point after joint 4 in the plane that joint 1 turns.
+    lever
+        The vector from axis 4 to the point in the frame that joint 4 moves, shape (3,), m.
+    sense
+        1 if axis 4 has the direction of axis 2, else -1.
+    senses
+        Joints 2, 3 and 4, whose angles add up to phi, each with 1 or -1.
+    """
     chain = bench.chain
     c, s = bench.chain.named(("cphi", "sphi"))
-    behind = rotation(chain.ring, 0, 1, (c, s))[:3, :3] @ flipped(chain, sense) @ lever
-    definitions, (x, y) = bench.define_all(x=plane.x - behind[0], y=plane.y - behind[1])
+
+    # Axis 4 is at (x, y) = point - Rz(phi) lever from axis 2.
+    from_axis_4 = rotation(chain.ring, 0, 1, (c, s))[:3, :3] @ flipped(chain, sense) @ lever
+    definitions, (x, y) = bench.define_all(x=plane.x - from_axis_4[0], y=plane.y - from_axis_4[1])
     bench.add(
         DerivationStep(
             "Axis 4 in the arm's plane",
@@ -208,16 +248,18 @@ def _reach_axis_4(
     first = element_array([chain.a[1], chain.ring.zero])
     both = origin(chain.link(2) @ chain.part(3, 3))
     reach_with_two_links(bench, (2, 3), first, both[:2], (x, y), "axis 4", ("up", "down"), above)
-    before = chain.part(2, 3)
-    remaining_angle(bench, 4, element_array([before[0, 0], before[1, 0]]), senses, "Joint 4 turns what remains of phi.")
+
+    links_2_and_3 = chain.part(2, 3)
+    known_angle = element_array([links_2_and_3[0, 0], links_2_and_3[1, 0]])
+    remaining_angle(bench, 4, known_angle, senses, "Joint 4 turns what remains of phi.")
 
 
 def turntable_fits(chain: ExactChain) -> bool:
-    """Whether parallel axes stand on a turntable."""
+    """Return whether parallel axes stand on a turntable, and both links that reach have a length."""
     if not (perpendicular(chain, 1) and all(parallel(chain, i) for i in range(2, chain.n))):
         return False
-    last = origin(chain.last) if chain.n == 3 else element_array([chain.a[2]])
-    return not chain.a[1].is_zero and is_long(last[:2])
+    second_link = origin(chain.last)[:2] if chain.n == 3 else element_array([chain.a[2]])
+    return not chain.a[1].is_zero and is_long(second_link)
 
 
 def yaw_two(bench: Workbench) -> None:
@@ -233,20 +275,38 @@ def yaw_three(bench: Workbench) -> None:
     plane = turn_the_plane(bench, origin(bench.T), origin(chain.part(2, 4) @ chain.last), TOOL)
     sense = relative_sense(chain, 2) * relative_sense(chain, 3)
     senses = _parallel_senses(chain)
-    # The tool's axis that is seen in the plane: z, or x if z is along the axes.
-    column = 2 if math.hypot(*(number(chain, x) for x in chain.last[:2, 2])) > 0.5 else 0
-    _known_rotation(bench, into_axis_2(bench, bench.T[:3, column]), chain.last[:3, column], sense, senses, column)
+
+    # The tool's axis that is seen in the plane: z, or x if z is along the parallel axes.
+    z_in_plane = math.hypot(number(chain, chain.last[0, 2]), number(chain, chain.last[1, 2]))
+    column = 2 if z_in_plane > 0.5 else 0
+    seen = into_axis_2(bench, bench.T[:3, column])
+    own = chain.last[:3, column]
+    _known_rotation(bench, seen, own, sense, senses, column)
     _reach_axis_4(bench, plane, origin(chain.last), sense, senses)
 
 
 def _known_rotation(
     bench: Workbench, seen: Elements, own: Elements, sense: Element, senses: list[tuple[int, int]], column: int
 ) -> None:
-    """Add the step for phi from the direction of an axis of the tool, ``own`` behind the last joint."""
+    """Add the step for phi from the direction of an axis of the tool.
+
+    Parameters
+    ----------
+    seen
+        The axis in the frame of axis 2, shape (3,), from the given pose.
+    own
+        The axis in the frame that the last joint moves, shape (3,), constant.
+    sense
+        1 if the last axis has the direction of axis 2, else -1.
+    senses
+        The joints whose angles add up to phi, each with 1 or -1.
+    column
+        The axis: 0 for x, 2 for z.
+    """
     chain = bench.chain
     joints = [i for i, _ in senses]
-    turned = chain.part(joints[0], joints[-1])
-    phi = bench.phi(turned[0, 0], turned[1, 0], senses)
+    parallel_links = chain.part(joints[0], joints[-1])
+    phi = bench.phi(parallel_links[0, 0], parallel_links[1, 0], senses)
     definitions, (ax, ay) = bench.define_all(ax=seen[0], ay=seen[1])
     U = own[0]
     V = sense * own[1]
@@ -255,16 +315,15 @@ def _known_rotation(
             "phi",
             f"{sum_text(senses)} The parallel joints turn the tool's {'xyz'[column]} axis by phi: it is seen at "
             "(ax, ay) in the plane.",
-            definitions,
-            Turned(phi, {"U": U, "V": V, "X": ax, "Y": ay}),
-            "",
-            "the tool's axis is along the parallel axes",
+            definitions=definitions,
+            form=Turned(phi, {"U": U, "V": V, "X": ax, "Y": ay}),
+            singular="the tool's axis is along the parallel axes",
         )
     )
 
 
 def pan_tilt_fits(chain: ExactChain) -> bool:
-    """Whether two axes are at right angles, and the tool is off the second."""
+    """Return whether two axes are at right angles, and the tool is off the second."""
     return perpendicular(chain, 1) and is_long(origin(chain.last)[:2])
 
 

@@ -135,7 +135,7 @@ class Graph:
     outputs: tuple[Variable, ...]
     nodes: tuple[Node, ...]
     results: tuple[tuple[int, ...], ...]
-    """Nodes of the entries of each output, row by row."""
+    """Nodes of each output's entries, row by row."""
 
     @classmethod
     def of(
@@ -164,6 +164,8 @@ class Graph:
         import casadi
 
         shapes = shapes or {}
+
+        # CasADi stores matrices column by column; ours are row by row.
         function = casadi.Function(
             "program",
             [casadi.vec(x.T) for x in map(casadi.SX, inputs.values())],
@@ -175,10 +177,10 @@ class Graph:
         nodes, results = _pruned(builder.nodes, results)
         return cls(
             name,
-            tuple(Variable(key, shapes.get(key, tuple(x.shape))) for key, x in inputs.items()),
-            tuple(Variable(key, shapes.get(key, tuple(y.shape))) for key, y in outputs.items()),
-            nodes,
-            results,
+            inputs=tuple(Variable(key, shapes.get(key, tuple(x.shape))) for key, x in inputs.items()),
+            outputs=tuple(Variable(key, shapes.get(key, tuple(y.shape))) for key, y in outputs.items()),
+            nodes=nodes,
+            results=results,
         )
 
     @property
@@ -199,7 +201,8 @@ class Graph:
     def __repr__(self) -> str:
         inputs = ", ".join(variable.name for variable in self.inputs)
         outputs = ", ".join(variable.name for variable in self.outputs)
-        return repr_line(f"Graph {self.name}", summary=f"{counted(len(self.nodes), 'node')}, ({inputs}) -> ({outputs})")
+        size = counted(len(self.nodes), "node")
+        return repr_line(f"Graph {self.name}", summary=f"{size}, ({inputs}) -> ({outputs})")
 
 
 class _Builder:
@@ -214,7 +217,7 @@ class _Builder:
         import casadi
 
         operations = _operations()
-        work: dict[int, int] = {}
+        work: dict[int, int] = {}  # node of each place in CasADi's work vector
         outputs = [[-1] * function.numel_out(k) for k in range(function.n_out())]
         for k in range(function.n_instructions()):
             code = function.instruction_id(k)
@@ -327,16 +330,19 @@ class _Builder:
 
     def _selected(self, arguments: Sequence[int]) -> int | None:
         """Return the selection that CasADi writes as (a if c else 0) + (b if not c else 0)."""
-        one, other = (self.nodes[k] for k in arguments)
-        if one.operation != "select" or other.operation != "select":
+        first, second = (self.nodes[k] for k in arguments)
+        if first.operation != "select" or second.operation != "select":
             return None
+
+        (condition_1, value_1, otherwise_1) = first.arguments
+        (condition_2, value_2, otherwise_2) = second.arguments
         zero = self.constant(0.0)
-        if one.arguments[2] != zero or other.arguments[2] != zero:
+        if otherwise_1 != zero or otherwise_2 != zero:
             return None
-        if self.nodes[other.arguments[0]] == Node("logical_not", (one.arguments[0],)):
-            return self.add(Node("select", (one.arguments[0], one.arguments[1], other.arguments[1])))
-        if self.nodes[one.arguments[0]] == Node("logical_not", (other.arguments[0],)):
-            return self.add(Node("select", (other.arguments[0], other.arguments[1], one.arguments[1])))
+        if self.nodes[condition_2] == Node("logical_not", (condition_1,)):
+            return self.add(Node("select", (condition_1, value_1, value_2)))
+        if self.nodes[condition_1] == Node("logical_not", (condition_2,)):
+            return self.add(Node("select", (condition_2, value_2, value_1)))
         return None
 
     def constant(self, value: float) -> int:
@@ -365,17 +371,18 @@ def _pruned(
             needed.update(nodes[k].arguments)
 
     order = sorted(needed)
-    place = {k: i for i, k in enumerate(order)}
+    new_number = {k: i for i, k in enumerate(order)}
 
-    def moved(node: Node) -> Node:
-        if node.operation == "input":
-            return node
-        return Node(node.operation, tuple(place[k] for k in node.arguments), node.value)
+    def renumbered(numbers: tuple[int, ...]) -> tuple[int, ...]:
+        return tuple(new_number[k] for k in numbers)
 
-    def moved_entries(entries: tuple[int, ...]) -> tuple[int, ...]:
-        return tuple(place[k] for k in entries)
-
-    return tuple(moved(nodes[k]) for k in order), tuple(map(moved_entries, results))
+    kept: list[Node] = []
+    for k in order:
+        node = nodes[k]
+        if node.operation != "input":  # whose arguments are not nodes
+            node = Node(node.operation, renumbered(node.arguments), node.value)
+        kept.append(node)
+    return tuple(kept), tuple(map(renumbered, results))
 
 
 def operation_count(graph: Graph) -> dict[str, int]:
@@ -390,7 +397,6 @@ def operation_count(graph: Graph) -> dict[str, int]:
     >>> operation_count(Graph.of("line", {"x": x}, {"y": 3 * casadi.sin(x) - 1}))
     {'additions': 1, 'multiplications': 1, 'sines and cosines': 1}
     """
-    counts = Counter(
-        _COUNTED_AS.get(x.operation, "others") for x in graph.nodes if x.operation not in ("input", "constant")
-    )
+    operations = [node.operation for node in graph.nodes if node.operation not in ("input", "constant")]
+    counts = Counter(_COUNTED_AS.get(operation, "others") for operation in operations)
     return dict(sorted(counts.items()))

@@ -35,8 +35,10 @@ def c_source(graph: Graph) -> str:
     Inputs and outputs must not overlap. The function needs only the standard mathematical functions.
     """
     used = {node.arguments[0] for node in graph.nodes if node.operation == "input"}
+    unused = [x for k, x in enumerate(graph.inputs) if x.size and k not in used]
+
     lines = [f"{_c_signature(graph)}\n{{"]
-    lines += [f"    (void){x.name};" for k, x in enumerate(graph.inputs) if x.size and k not in used]
+    lines += [f"    (void){x.name};" for x in unused]
     for k, node in enumerate(graph.nodes):
         lines += c_lines(Let(f"v{k}", _c_expression(graph, node)), "    ")
     for variable, entries in zip(graph.outputs, graph.results, strict=True):
@@ -68,24 +70,30 @@ def export_c(graphs: Sequence[Graph], folder: str | Path, name: str, remark: str
         raise ValueError(f"name is {name!r}; expected an identifier of C")
     header = Path(folder) / f"{name}.h"
     source = header.with_suffix(".c")
-    guard = f"{name.upper()}_H"
+
+    # ASCII only, and the text does not end the comment.
     comment = re.sub(r"[^ -~\n]", "?", remark).replace("*/", "* /") or name
-    shapes = "".join(_c_comment(graph) + _c_signature(graph) + ";\n\n" for graph in graphs)
+
+    guard = f"{name.upper()}_H"
+    declarations = "".join(_c_comment(graph) + _c_signature(graph) + ";\n\n" for graph in graphs)
     write_atomically(
         header,
         f"/* {comment} */\n#ifndef {guard}\n#define {guard}\n\n"
-        f'#ifdef __cplusplus\nextern "C" {{\n#endif\n\n{shapes}#ifdef __cplusplus\n}}\n#endif\n\n#endif\n',
+        f'#ifdef __cplusplus\nextern "C" {{\n#endif\n\n{declarations}#ifdef __cplusplus\n}}\n#endif\n\n#endif\n',
     )
+
     body = "\n".join(c_source(graph) for graph in graphs)
     write_atomically(source, f'/* {comment} */\n#include "{name}.h"\n\n#include <math.h>\n\n{body}')
     return source, header
 
 
 def _c_expression(graph: Graph, node: Node) -> str:
+    """Return the right side of a node's assignment; node k is the variable vk."""
     if node.operation == "constant":
         return C.number(node.value)
     if node.operation == "input":
-        return C.entry(graph.inputs[node.arguments[0]].name, node.arguments[1])
+        variable, entry = node.arguments
+        return C.entry(graph.inputs[variable].name, entry)
     arguments = [f"v{k}" for k in node.arguments]
     if node.operation in _OPERATORS:
         return _OPERATORS[node.operation].format(*arguments)
@@ -99,5 +107,7 @@ def _c_signature(graph: Graph) -> str:
 
 
 def _c_comment(graph: Graph) -> str:
-    shapes = (f"{v.name}: {' x '.join(map(str, v.shape))}" for v in (*graph.inputs, *graph.outputs) if v.size)
+    """Return a comment with the shapes of a program's inputs and outputs."""
+    variables = [variable for variable in (*graph.inputs, *graph.outputs) if variable.size]
+    shapes = [f"{variable.name}: {' x '.join(map(str, variable.shape))}" for variable in variables]
     return f"/* {'; '.join(shapes)}; row by row, SI and radians */\n"

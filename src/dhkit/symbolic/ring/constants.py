@@ -39,6 +39,7 @@ class Constants:
         """Return the constants of expressions, and of the cosines and sines of angles."""
         expressions = list(expressions)
         angles = list(angles)
+
         constants = cls()
         constants._units = _common_angles(expressions, angles)
         for angle in angles:
@@ -48,14 +49,16 @@ class Constants:
         return constants
 
     def _scan(self, expression: Expression) -> None:
+        """Add the constants of an expression, with the reciprocals of what it divides by."""
         for monomial, _ in expression.terms:
             for atom, exponent in monomial:
                 self._scan_atom(atom)
                 if exponent < 0:
-                    whole = atom.arguments[0] if atom.name == "group" else Expression.of_atom(atom)
-                    self._add(Constant(reciprocal_text(atom), 1 / whole, reciprocal_of=whole))
+                    denominator = atom.arguments[0] if atom.name == "group" else Expression.of_atom(atom)
+                    self._add(Constant(reciprocal_text(atom), 1 / denominator, reciprocal_of=denominator))
 
     def _scan_atom(self, atom: Atom) -> None:
+        """Add the constants of a name, a sum in parentheses or a function of an expression."""
         inside = atom.arguments[0] if atom.arguments else None
         if inside is None:
             self._add(Constant(atom.text, Expression.of_atom(atom) if atom.name == "pi" else None))
@@ -71,21 +74,28 @@ class Constants:
             self._add(Constant(atom.text, Expression.of_atom(atom)))
 
     def _scan_angle(self, angle: Expression) -> None:
+        """Add the constants that cosine and sine of an angle are polynomials in, term by term of the angle."""
         for monomial, coefficient in angle.terms:
             if is_exact(monomial, coefficient):
+                # A multiple of 15 degrees: only square roots.
                 self._scan(cos(PI * coefficient))
                 self._scan(sin(PI * coefficient))
                 continue
+
+            # cos(m u) and sin(m u), m whole, are polynomials in cos(u) and sin(u); too large an m gets its own symbols.
             unit = self._units[monomial]
-            one = Expression(
-                ((monomial, unit if abs(coefficient) / unit <= BOUNDS.angle_multiple else abs(coefficient)),)
-            )
-            cosine, sine = (Expression.of_atom(Atom(name, (one,))) for name in ("cos", "sin"))
+            if abs(coefficient) / unit > BOUNDS.angle_multiple:
+                unit = abs(coefficient)
+            unit_angle = Expression(((monomial, unit),))
+            cosine = Expression.of_atom(Atom("cos", (unit_angle,)))
+            sine = Expression.of_atom(Atom("sin", (unit_angle,)))
             if cosine.text in self.found:
                 continue
+
+            # sin^2 u = 1 - cos^2 u
             self._add(Constant(cosine.text, cosine))
             self._add(Constant(sine.text, sine, square=1 - cosine * cosine))
-            if not one.symbols:
+            if not unit_angle.symbols:
                 self.notes.append(f"{cosine} and {sine} are symbols, related by {cosine}^2 + {sine}^2 = 1")
 
     def _add(self, constant: Constant) -> None:
@@ -101,7 +111,10 @@ def value_of(constant: Constant, values: Mapping[str, Expression]) -> float:
 
 
 def _common_angles(expressions: Iterable[Expression], angles: Iterable[Expression]) -> dict[Monomial, Fraction]:
-    """Return, for each monomial in angles, the largest factor of which all factors that occur are whole multiples."""
+    """Return, for each monomial in angles, the largest factor of which all factors that occur are whole multiples.
+
+    For pi/7 and 3*pi/14 that is 1/14, at the monomial pi.
+    """
     multiples: dict[Monomial, set[Fraction]] = {}
 
     def collect(angle: Expression) -> None:
@@ -121,7 +134,11 @@ def _common_angles(expressions: Iterable[Expression], angles: Iterable[Expressio
         collect(angle)
     for expression in expressions:
         search(expression)
-    return {
-        monomial: Fraction(math.gcd(*(x.numerator for x in found)), math.lcm(*(x.denominator for x in found)))
-        for monomial, found in multiples.items()
-    }
+
+    # The greatest common divisor of reduced fractions a_k / b_k is gcd(a_k) / lcm(b_k).
+    units: dict[Monomial, Fraction] = {}
+    for monomial, factors in multiples.items():
+        numerators = [factor.numerator for factor in factors]
+        denominators = [factor.denominator for factor in factors]
+        units[monomial] = Fraction(math.gcd(*numerators), math.lcm(*denominators))
+    return units

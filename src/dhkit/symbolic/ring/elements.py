@@ -57,7 +57,7 @@ class Generator:
     @property
     def key(self) -> tuple[str, int | str]:
         """Key of the same generator in every ring of the arm: its kind, and its joint or, for constants, its text."""
-        return self.kind, self.text if self.joint < 0 else self.joint
+        return (self.kind, self.text if self.joint < 0 else self.joint)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,30 +154,43 @@ class Element:
         """Return this element times the denominators of all its reciprocals; it is zero exactly when this element is.
 
         The normal form does not decide equality alone: reciprocals of sums that share parameters have several forms
-        (partial fractions).
+        (partial fractions). With y = 1/d and an element a + b y, d (a + b y) = a d + b has one y less.
         """
         element = self
         for relation in self.ring.relations:
             if relation.power != 1:
                 continue
-            generator = self.ring.polynomials.generator(relation.place)
+            y = self.ring.polynomials.generator(relation.place)
             while any(monomial[relation.place] for monomial in element.terms):
-                whole = relation.polynomial + self.ring.polynomials.constant(1)
-                divisor = self.ring.polynomials.quotient(whole, generator)
-                element = _without(element, relation.place, divisor)
+                # The relation is y d - 1 = 0, so d = (relation + 1) / y.
+                y_d = relation.polynomial + self.ring.polynomials.constant(1)
+                denominator = self.ring.polynomials.quotient(y_d, y)
+                element = _times_denominator(element, relation.place, denominator)
         return element
 
     # Reading
 
     @cached_property
     def terms(self) -> Mapping[Monomial, Fraction]:
-        """The coefficients by monomial, exponents in the order of the ring's generators."""
+        """The coefficient of each monomial; exponents are in the order of the ring's generators."""
         return self.ring.polynomials.terms(self.polynomial)
+
+    @property
+    def used_generators(self) -> set[int]:
+        """Indices of the ring's generators that occur in the normal form."""
+        used: set[int] = set()
+        for monomial in self.terms:
+            used.update(k for k, exponent in enumerate(monomial) if exponent)
+        return used
 
     @cached_property
     def _products(self) -> list[tuple[float, list[tuple[int, int]]]]:
-        """Coefficient of each term, and its generators with their exponents."""
-        return [(float(c), [(k, e) for k, e in enumerate(m) if e]) for m, c in self.terms.items()]
+        """Coefficient of each term, with the indices of its generators and their exponents."""
+        products = []
+        for monomial, coefficient in self.terms.items():
+            powers = [(k, exponent) for k, exponent in enumerate(monomial) if exponent]
+            products.append((float(coefficient), powers))
+        return products
 
     def __len__(self) -> int:
         return len(self.polynomial)
@@ -201,16 +214,20 @@ class Element:
     def by_position(self, i: int) -> Element:
         """Return the partial derivative by joint i's variable."""
         ring = self.ring
-        derivative = self.ring.polynomials.derivative
+        f = self.polynomial
+        derivative = ring.polynomials.derivative
         if ring.kinds[i] != "R":
-            return Element(ring, derivative(self.polynomial, ring.place("position", i)))
-        change = ring.zero.polynomial
+            return Element(ring, derivative(f, ring.place("position", i)))
+
+        # df/dq_i = sum of df/ds c - df/dc s, over the angles that contain q_i
+        total = ring.zero.polynomial
         for sine, cosine, joints in ring.turning:
             if i in joints:
-                generator = ring.polynomials.generator
-                change = change + derivative(self.polynomial, sine) * generator(cosine)
-                change = change - derivative(self.polynomial, cosine) * generator(sine)
-        return Element(ring, change).reduced()
+                s = ring.polynomials.generator(sine)
+                c = ring.polynomials.generator(cosine)
+                total = total + derivative(f, sine) * c
+                total = total - derivative(f, cosine) * s
+        return Element(ring, total).reduced()
 
     def by_rate(self, i: int) -> Element:
         """Return the partial derivative by joint i's rate."""
@@ -224,8 +241,10 @@ class Element:
     def by_time(self) -> Element:
         """Return the time derivative: that of q is qd, that of qd is qdd."""
         ring = self.ring
-        parts = [self.by_position(i) * ring.rate(i) for i in range(ring.n)]
-        return ring.sum([*parts, *(self.by_rate(i) * ring.acceleration(i) for i in range(ring.n))])
+        # df/dt = sum of df/dq_i qd_i + df/dqd_i qdd_i
+        by_positions = [self.by_position(i) * ring.rate(i) for i in range(ring.n)]
+        by_rates = [self.by_rate(i) * ring.acceleration(i) for i in range(ring.n)]
+        return ring.sum([*by_positions, *by_rates])
 
     def value(self, values: Sequence[Any]) -> Any:
         """Return the element's value, a number or an array (...), at :meth:`PolynomialRing.values` of a state."""
@@ -249,13 +268,15 @@ class PolynomialRing(ABC):
     relations: tuple[Relation, ...]
     """Polynomials that are zero, in the order of the generators that they replace."""
     _places: dict[tuple[str, int | str], int]
+    """Index of each generator by its key."""
 
     @abstractmethod
     def expanded(self, element: Element) -> Element:
         """Return an element in the sines and cosines of the ring's own angles alone: its normal form."""
 
-    def _element(self, place: tuple[str, int | str]) -> Element:
-        return Element(self, self.polynomials.generator(self._places[place]))
+    def _element(self, key: tuple[str, int | str]) -> Element:
+        """Return the generator with this key as an element."""
+        return Element(self, self.polynomials.generator(self._places[key]))
 
     def number(self, value: int | Fraction) -> Element:
         """Return a rational number."""
@@ -311,14 +332,14 @@ class PolynomialRing(ABC):
         return Element(self, total)
 
     def from_terms(self, terms: Mapping[Monomial, Any]) -> Element:
-        """Return the element with these coefficients by monomial; exponents are in the order of :attr:`generators`."""
+        """Return the element with these coefficients of monomials; exponents are in the order of :attr:`generators`."""
         return Element(self, self.polynomials.from_terms(terms)).reduced()
 
     @cached_property
     def turning(self) -> tuple[tuple[int, int, tuple[int, ...]], ...]:
         """Indices of each angle's sine and cosine among the generators, and the joints whose variables add up to it."""
-        cosines = {g.joints: k for k, g in enumerate(self.generators) if g.kind == "cosine"}
-        return tuple((k, cosines[g.joints], g.joints) for k, g in enumerate(self.generators) if g.kind == "sine")
+        cosine_of = {g.joints: k for k, g in enumerate(self.generators) if g.kind == "cosine"}
+        return tuple((k, cosine_of[g.joints], g.joints) for k, g in enumerate(self.generators) if g.kind == "sine")
 
     @property
     def n(self) -> int:
@@ -343,7 +364,11 @@ class PolynomialRing(ABC):
     ) -> list[Any]:
         """Return the value of each generator, a number or an array (...), at states (..., n), rad, m and seconds."""
         zero = np.zeros_like(q)
-        states = {"rate": zero if qd is None else qd, "acceleration": zero if qdd is None else qdd, "position": q}
+        states = {
+            "position": q,
+            "rate": zero if qd is None else qd,
+            "acceleration": zero if qdd is None else qdd,
+        }
         values: list[Any] = []
         for g in self.generators:
             if g.kind == "constant":
@@ -370,14 +395,21 @@ def element_array(value: Any) -> Elements:
 _Scalar: TypeAlias = "Element | int | float | Fraction"
 
 
-def _without(element: Element, place: int, divisor: Any) -> Element:
-    """Multiply an element once by the denominator ``divisor`` of the reciprocal at index ``place``."""
+def _times_denominator(element: Element, place: int, denominator: Any) -> Element:
+    """Return d times an element, where the generator y at index ``place`` is the reciprocal of the denominator d."""
+    # The element is a + b y, where a does not contain y. d (a + b y) = a d + b, because d y = 1.
+    a: dict[Monomial, Fraction] = {}
+    b: dict[Monomial, Fraction] = {}
+    for monomial, coefficient in element.terms.items():
+        exponent = monomial[place]
+        if exponent:
+            b[(*monomial[:place], exponent - 1, *monomial[place + 1 :])] = coefficient
+        else:
+            a[monomial] = coefficient
+
     ring = element.ring
-    with_it = {m: c for m, c in element.terms.items() if m[place]}
-    rest = {m: c for m, c in element.terms.items() if not m[place]}
-    lowered = {(*m[:place], m[place] - 1, *m[place + 1 :]): c for m, c in with_it.items()}
-    product = ring.polynomials.from_terms(rest) * divisor
-    return Element(ring, product + ring.polynomials.from_terms(lowered)).reduced()
+    product = ring.polynomials.from_terms(a) * denominator
+    return Element(ring, product + ring.polynomials.from_terms(b)).reduced()
 
 
 def _rational(number: Any) -> Fraction:

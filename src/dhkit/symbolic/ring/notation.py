@@ -6,6 +6,8 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
+import numpy as np
+
 from dhkit.symbolic.ring import Element, Generator, Ring, angle_name
 
 
@@ -47,26 +49,33 @@ class Angle:
 @lru_cache(maxsize=64)
 def notation(ring: Ring) -> Notation:
     """Return the printed names of a ring's constants; a name that has another meaning gets an underscore."""
-    return Notation(
-        distinct(sorted(symbols_of(constants_of(ring.generators))), {*variables(ring), *entry_names(ring.n)})
-    )
+    names = sorted(symbols_of(constants_of(ring.generators)))
+    taken = {*variables(ring), *entry_names(ring.n)}
+    return Notation(distinct(names, taken))
 
 
 def variables(ring: Ring) -> set[str]:
     """Return the names of joint variables, rates and accelerations, and of sines and cosines of their sums."""
-    runs = [range(a, b) for a in range(ring.n) for b in range(a + 1, ring.n + 1)]
-    names = {f"{function}{angle_name(run)}" for function in "sc" for run in runs}
-    names |= {g.text for g in ring.generators if g.kind != "constant"}
-    return names | {f"{kind}{i + 1}" for i in range(ring.n) for kind in ("q", "qd", "qdd")}
+    names = {g.text for g in ring.generators if g.kind != "constant"}
+    for i in range(ring.n):
+        names |= {f"q{i + 1}", f"qd{i + 1}", f"qdd{i + 1}"}
+
+    # Sums of neighbouring joint variables, from joint a to joint b - 1.
+    for a in range(ring.n):
+        for b in range(a + 1, ring.n + 1):
+            index = angle_name(range(a, b))
+            names |= {f"s{index}", f"c{index}"}
+    return names
 
 
 def entry_names(n: int) -> set[str]:
     """Return the names of the entries of all quantities of n joints: M12, g1, K."""
-    vectors = {entry_name(name, (i,)) for name in ("h", "g", "tau") for i in range(n)}
-    square = {entry_name(name, (i, j)) for name in "MC" for i in range(n) for j in range(n)}
-    kinematic = {entry_name("T", (i, j)) for i in range(4) for j in range(4)}
-    kinematic |= {entry_name("J", (i, j)) for i in range(6) for j in range(n)} | {f"A{i + 1}" for i in range(n)}
-    return vectors | square | kinematic | {"K", "V"}
+    names = {"K", "V"}
+    names |= {f"A{i + 1}" for i in range(n)}
+    shapes = {"h": (n,), "g": (n,), "tau": (n,), "M": (n, n), "C": (n, n), "T": (4, 4), "J": (6, n)}
+    for quantity, shape in shapes.items():
+        names |= {entry_name(quantity, place) for place in np.ndindex(shape)}
+    return names
 
 
 def entry_name(quantity: str, place: tuple[int, ...]) -> str:
@@ -91,14 +100,14 @@ def distinct(names: Iterable[str], taken: Collection[str]) -> dict[str, str]:
     """Return distinct printed names: each name followed by underscores until it is neither taken nor another's."""
     names = list(names)
     used = {*taken, *names}
-    written = {}
+    printed_names = {}
     for name in names:
-        changed = name
-        while changed in taken or (changed != name and changed in used):
-            changed += "_"
-        used.add(changed)
-        written[name] = changed
-    return written
+        printed = name
+        while printed in taken or (printed != name and printed in used):
+            printed += "_"
+        used.add(printed)
+        printed_names[name] = printed
+    return printed_names
 
 
 def symbols_of(generators: Iterable[Generator]) -> set[str]:
@@ -113,8 +122,7 @@ def generators_of(elements: Iterable[Element]) -> list[Generator]:
     """Return the generators that occur in elements, which may be of several rings of one arm."""
     found: dict[Generator, None] = {}
     for element in elements:
-        used = {k for monomial in element.terms for k, exponent in enumerate(monomial) if exponent}
-        found |= dict.fromkeys(element.ring.generators[k] for k in sorted(used))
+        found |= dict.fromkeys(element.ring.generators[k] for k in sorted(element.used_generators))
     return list(found)
 
 

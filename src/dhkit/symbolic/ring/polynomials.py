@@ -42,10 +42,10 @@ class Polynomials(Protocol):
         """Return generator k."""
 
     def from_terms(self, terms: Mapping[Monomial, Any]) -> Any:
-        """Return the polynomial of coefficients by monomial."""
+        """Return the polynomial with this coefficient of each monomial."""
 
     def terms(self, polynomial: Any) -> Mapping[Monomial, Any]:
-        """Return the coefficients by monomial; coefficients have ``numerator`` and ``denominator``."""
+        """Return the coefficient of each monomial; coefficients have ``numerator`` and ``denominator``."""
 
     def derivative(self, polynomial: Any, k: int) -> Any:
         """Return the derivative by generator k."""
@@ -68,6 +68,8 @@ def polynomials(count: int) -> Polynomials:
 
 
 class _Flint:
+    """Polynomials of python-flint, which is written in C."""
+
     def __init__(self, count: int) -> None:
         import flint
 
@@ -103,6 +105,8 @@ class _Flint:
 
 
 class _Sympy:
+    """Polynomials of sympy, as dictionaries from monomials to coefficients."""
+
     def __init__(self, count: int) -> None:
         from sympy import QQ
         from sympy.polys.orderings import lex
@@ -128,8 +132,12 @@ class _Sympy:
 
     def reduced(self, polynomial: Any, relations: Sequence[Relation]) -> Any:
         squares = [relation for relation in relations if relation.power == 2]
+        places = [relation.place for relation in squares]
+
+        # All squares are replaced at once: x^(2 a + e) y^(2 b + f) = r_x^a r_y^b x^e y^f, with e and f 0 or 1. That is
+        # much faster than the division algorithm. A replacement may contain squares of other generators: repeat.
         while squares and polynomial:
-            low, high = self._split(polynomial, [relation.place for relation in squares])
+            low, high = self._split(polynomial, places)
             if not high:
                 break
             polynomial = self._ring.from_dict(low)
@@ -137,8 +145,11 @@ class _Sympy:
                 product = self._ring.from_dict(factor)
                 for half, relation in zip(halves, squares, strict=True):
                     if half:
-                        product *= (self._ring.gens[relation.place] ** 2 - relation.polynomial) ** half
+                        # The relation is the polynomial x^2 - r_x.
+                        r_x = self._ring.gens[relation.place] ** 2 - relation.polynomial
+                        product *= r_x**half
                 polynomial += product
+
         for relation in relations:
             if relation.power == 1 and any(monomial[relation.place] for monomial in polynomial):
                 polynomial = polynomial.rem(relation.polynomial)
@@ -148,10 +159,15 @@ class _Sympy:
     def _split(
         polynomial: Any, places: Sequence[int]
     ) -> tuple[dict[Monomial, Any], dict[Monomial, dict[Monomial, Any]]]:
-        """Return the terms without squares, and by the halves of their exponents those with them, squares taken off."""
-        exponents = itemgetter(*places, places[0])  # two or more, so that it returns a tuple
+        """Return the terms without squares, and the others by the number of squares, which are divided out.
+
+        The keys of the second dictionary are floor(exponent / 2) of the generators at ``places``.
+        """
         low: dict[Monomial, Any] = {}
         high: dict[Monomial, dict[Monomial, Any]] = {}
+
+        # The first place is asked for twice: with a single place, itemgetter would not return a tuple.
+        exponents = itemgetter(*places, places[0])
         for monomial, coefficient in polynomial.items():
             if max(exponents(monomial)) < 2:
                 low[monomial] = coefficient

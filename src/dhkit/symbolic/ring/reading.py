@@ -58,17 +58,15 @@ class ExpressionReader:
         RingError
             As for :meth:`expression`.
         """
-        c = self.ring.one
-        s = self.ring.zero
+        total = (self.ring.one, self.ring.zero)
         for monomial, coefficient in angle.terms:
             if is_exact(monomial, coefficient):
                 exact = PI * coefficient
-                cosine = self.expression(cos(exact))
-                sine = self.expression(sin(exact))
+                direction = (self.expression(cos(exact)), self.expression(sin(exact)))
             else:
-                cosine, sine = self._multiple(monomial, coefficient)
-            c, s = c * cosine - s * sine, s * cosine + c * sine
-        return c, s
+                direction = self._multiple(monomial, coefficient)
+            total = sum_of_angles(total, direction)
+        return total
 
     def _multiple(self, monomial: Monomial, coefficient: Fraction) -> Direction:
         """Return cosine and sine of a whole multiple of an angle whose cosine and sine are constants."""
@@ -77,19 +75,38 @@ class ExpressionReader:
         angle = Expression(((monomial, unit),))
         cosine = self.ring.constant(f"cos({angle.text})")
         sine = self.ring.constant(f"sin({angle.text})")
-        c = self.ring.one
-        s = self.ring.zero
+
+        (c, s) = (self.ring.one, self.ring.zero)
         for _ in range(int(abs(coefficient) / unit)):
-            c, s = c * cosine - s * sine, s * cosine + c * sine
+            (c, s) = sum_of_angles((c, s), (cosine, sine))
+
+        # cos(-x) = cos(x) and sin(-x) = -sin(x)
         return (c, s) if coefficient > 0 else (c, -s)
 
     def _power(self, atom: Atom, exponent: int) -> Element:
+        """Return an atom to a whole power, positive or negative."""
         if exponent < 0:
             return self.ring.constant(reciprocal_text(atom)) ** -exponent
         if atom.name in ("sin", "cos") and atom.arguments:
             cosine, sine = self.angle(atom.arguments[0])
             return (cosine if atom.name == "cos" else sine) ** exponent
         return self.ring.constant(atom.text) ** exponent
+
+
+def sum_of_angles(a: Direction, b: Direction) -> Direction:
+    """Return cosine and sine of the sum of two angles, from the cosine and sine of each."""
+    (c_a, s_a) = a
+    (c_b, s_b) = b
+    # cos(a + b) = cos a cos b - sin a sin b,  sin(a + b) = sin a cos b + cos a sin b
+    return c_a * c_b - s_a * s_b, s_a * c_b + c_a * s_b
+
+
+def difference_of_angles(a: Direction, b: Direction) -> Direction:
+    """Return cosine and sine of the difference of two angles, from the cosine and sine of each."""
+    (c_a, s_a) = a
+    (c_b, s_b) = b
+    # cos(a - b) = cos a cos b + sin a sin b,  sin(a - b) = sin a cos b - cos a sin b
+    return c_a * c_b + s_a * s_b, s_a * c_b - c_a * s_b
 
 
 def is_exact(monomial: Monomial, coefficient: Fraction) -> bool:

@@ -19,7 +19,7 @@ from dhkit.expressions import Expression
 from dhkit.expressions.exact import Monomial as TermMonomial
 from dhkit.symbolic.ring.elements import Element, Generator, PolynomialRing
 from dhkit.symbolic.ring.polynomials import Monomial, Relation, polynomials
-from dhkit.symbolic.ring.reading import ExpressionReader
+from dhkit.symbolic.ring.reading import Direction, ExpressionReader, difference_of_angles, sum_of_angles
 
 
 @dataclass(frozen=True)
@@ -84,43 +84,61 @@ class Ring(PolynomialRing):
     ) -> None:
         self.kinds = kinds
         self.given = tuple(constants)
-        self.angles = {i: (angles or {}).get(i, (i,)) for i, kind in enumerate(kinds) if kind == "R"}
+        given_angles = angles or {}
+        self.angles = {i: given_angles.get(i, (i,)) for i, kind in enumerate(kinds) if kind == "R"}
+        self.sums = tuple(joints for joints in sums if joints not in self.angles.values())
+
         reciprocals = [c for c in constants if c.reciprocal_of is not None]
         others = [c for c in constants if c.reciprocal_of is None]
-        self.sums = tuple(joints for joints in sums if joints not in self.angles.values())
-        turning = [(i, joints, angle_name(joints)) for i, joints in self.angles.items()]
+        with_square = [c for c in others if c.square is not None]
+        without_square = [c for c in others if c.square is None]
+
+        # Joint (-1 for an angle that is only printed), the joints that it sums, and the index text of each angle.
         summed = [(-1, joints, angle_name(joints)) for joints in self.sums]
+        turning = [(i, joints, angle_name(joints)) for i, joints in self.angles.items()]
+        all_angles = [*summed, *turning]
+
         # A relation replaces its first generator in this order: reciprocals come first, the last one foremost.
         self.generators: tuple[Generator, ...] = (
             *(Generator("constant", c.text, meaning=c.meaning) for c in reversed(reciprocals)),
-            *(Generator("constant", c.text, meaning=c.meaning) for c in reversed(others) if c.square is not None),
-            *(Generator("sine", f"s{name}", i, joints) for i, joints, name in [*summed, *turning]),
-            *(Generator("cosine", f"c{name}", i, joints) for i, joints, name in [*summed, *turning]),
+            *(Generator("constant", c.text, meaning=c.meaning) for c in reversed(with_square)),
+            *(Generator("sine", f"s{name}", i, joints) for i, joints, name in all_angles),
+            *(Generator("cosine", f"c{name}", i, joints) for i, joints, name in all_angles),
             *(Generator("position", f"q{i + 1}", i) for i, kind in enumerate(kinds) if kind != "R"),
             *(Generator("rate", f"qd{i + 1}", i) for i in range(len(kinds))),
             *(Generator("acceleration", f"qdd{i + 1}", i) for i in range(len(kinds))),
-            *(Generator("constant", c.text, meaning=c.meaning) for c in others if c.square is None),
+            *(Generator("constant", c.text, meaning=c.meaning) for c in without_square),
         )
         self._places = {generator.key: k for k, generator in enumerate(self.generators)}
         self.polynomials = polynomials(len(self.generators))
+
+        # s_i^2 = 1 - c_i^2, root^2 = its argument, reciprocal * denominator = 1. Earlier relations apply to later ones.
         self.relations: tuple[Relation, ...] = ()
         for i in self.angles:
-            self._relate(("sine", i), 2, 1 - self.cosine(i) * self.cosine(i))
+            self._relate_square(("sine", i), 1 - self.cosine(i) * self.cosine(i))
         for constant in constants:
-            place = ("constant", constant.text)
+            key = ("constant", constant.text)
             if constant.square is not None:
-                self._relate(place, 2, self.read(constant.square))
+                self._relate_square(key, self.read(constant.square))
             if constant.reciprocal_of is not None:
-                self._relate(place, 1, self.read(constant.reciprocal_of))
+                self._relate_reciprocal(key, self.read(constant.reciprocal_of))
 
-    def _relate(self, place: tuple[str, int | str], power: int, other: Element) -> None:
-        """Add the relation x^2 = other (power 2) or x other = 1 (power 1) for the generator x with this key."""
-        x = self._element(place).polynomial
-        zero = x * x - other.polynomial if power == 2 else x * other.polynomial - self.polynomials.constant(1)
-        relations = [*self.relations, Relation(self._places[place], power, zero)]
-        self.relations = tuple(sorted(relations, key=lambda relation: relation.place))
+    def _relate_square(self, key: tuple[str, int | str], square: Element) -> None:
+        """Add the relation x^2 - square = 0 for the generator x with this key."""
+        x = self._element(key).polynomial
+        self._add_relation(Relation(self._places[key], 2, x * x - square.polynomial))
+
+    def _relate_reciprocal(self, key: tuple[str, int | str], denominator: Element) -> None:
+        """Add the relation x * denominator - 1 = 0 for the generator x with this key."""
+        x = self._element(key).polynomial
+        self._add_relation(Relation(self._places[key], 1, x * denominator.polynomial - self.polynomials.constant(1)))
+
+    def _add_relation(self, relation: Relation) -> None:
+        relations = [*self.relations, relation]
+        self.relations = tuple(sorted(relations, key=lambda each: each.place))
 
     def _key(self) -> tuple[Any, ...]:
+        """Everything that the ring is made from; rings with equal keys are equal."""
         return self.kinds, self.given, tuple(self.angles.items()), self.sums
 
     def __eq__(self, other: object) -> bool:
@@ -159,12 +177,23 @@ class Ring(PolynomialRing):
     @cached_property
     def _expansions(self) -> dict[int, Element]:
         """Sines and cosines of :attr:`sums` in terms of those of the ring's own angles, by index."""
-        single = {joints: (self.sine(i), self.cosine(i)) for i, joints in self.angles.items()}
         expansions: dict[int, Element] = {}
         for sine, cosine, joints in self.turning:
             if joints in self.sums:
-                expansions[sine], expansions[cosine] = _sum_of_angles(self, joints, single)
+                expansions[cosine], expansions[sine] = self._direction_of_sum(joints)
         return expansions
+
+    def _direction_of_sum(self, joints: tuple[int, ...]) -> Direction:
+        """Return cosine and sine of q_i + q_j + ..., in those of the ring's own angles."""
+        total = (self.one, self.zero)
+        for i in joints:
+            own = self.angles[i]
+            direction = (self.cosine(i), self.sine(i))
+            if len(own) > 1:
+                # The angle of joint i is a sum that ends with q_i: q_i = (... + q_h + q_i) - (... + q_h)
+                direction = difference_of_angles(direction, self._direction_of_sum(own[:-1]))
+            total = sum_of_angles(total, direction)
+        return total
 
     def expanded(self, element: Element) -> Element:
         """Return an element in the sines and cosines of the ring's own angles alone: its normal form."""
@@ -176,29 +205,12 @@ class Ring(PolynomialRing):
         units: dict[TermMonomial, list[Fraction]] = {}
         for constant in self.given:
             if constant.meaning is not None and constant.text.startswith("cos("):
-                ((((atom, _),), _),) = constant.meaning.terms
+                # The meaning is one term, 1 * cos(angle)^1, and the angle is one term, unit * monomial.
+                ((product, _),) = constant.meaning.terms
+                ((atom, _),) = product
                 ((monomial, unit),) = atom.arguments[0].terms
                 units.setdefault(monomial, []).append(unit)
         return units
-
-
-def _sum_of_angles(
-    ring: Ring, joints: tuple[int, ...], single: Mapping[tuple[int, ...], tuple[Element, Element]]
-) -> tuple[Element, Element]:
-    """Return sine and cosine of a sum of joint angles, from those of the ring's angles and of their differences."""
-    s = ring.zero
-    c = ring.one
-    for i in joints:
-        own = ring.angles[i]
-        s_own, c_own = single[own]
-        if len(own) > 1:
-            # The ring's angle is a sum q1 + ... + qi: qi is its difference from the sum without qi.
-            s_less, c_less = _sum_of_angles(ring, own[:-1], single)
-            s_own, c_own = s_own * c_less - c_own * s_less, c_own * c_less + s_own * s_less
-
-        # sin(a + b) = sin a cos b + cos a sin b,  cos(a + b) = cos a cos b - sin a sin b.
-        s, c = s * c_own + c * s_own, c * c_own - s * s_own
-    return s, c
 
 
 def translated(element: Element, ring: PolynomialRing, replacements: Mapping[int, Element]) -> Element:
@@ -214,9 +226,11 @@ def translated(element: Element, ring: PolynomialRing, replacements: Mapping[int
         Elements that replace generators, by index in the element's ring; other generators keep their kind and name.
     """
     own = element.ring.generators
-    powers: dict[tuple[int, int], Element] = {}
     kept = [k for k in range(len(own)) if k not in replacements]
-    targets: dict[int, int] = {}
+
+    # Terms are collected by their exponents of the replaced generators y_k:
+    #   sum over exponents e of  (part of the kept generators, moved to the new ring) * product of y_k^e_k
+    targets: dict[int, int] = {}  # index in the new ring of each kept generator that occurs
     parts: dict[Monomial, dict[Monomial, Fraction]] = {}
     for monomial, coefficient in element.terms.items():
         replaced = tuple(monomial[k] for k in replacements)
@@ -227,6 +241,8 @@ def translated(element: Element, ring: PolynomialRing, replacements: Mapping[int
                     targets[k] = ring.place(*own[k].key)
                 moved[targets[k]] = monomial[k]
         parts.setdefault(replaced, {})[tuple(moved)] = coefficient
+
+    powers: dict[tuple[int, int], Element] = {}  # powers of replacements so far, by index and exponent
     total = []
     for exponents, group in parts.items():
         product = ring.one
@@ -242,4 +258,5 @@ def translated(element: Element, ring: PolynomialRing, replacements: Mapping[int
 def angle_name(joints: Sequence[int]) -> str:
     """Return the index text of a sum of joint angles: 23 for q2 + q3; 9_10 where a joint number has two digits."""
     numbers = [str(joint + 1) for joint in joints]
-    return ("_" if any(len(number) > 1 for number in numbers) and len(numbers) > 1 else "").join(numbers)
+    has_two_digits = any(len(number) > 1 for number in numbers)
+    return ("_" if has_two_digits else "").join(numbers)
