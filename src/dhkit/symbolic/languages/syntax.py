@@ -1,4 +1,4 @@
-"""How programming languages write entries of arrays, calls of functions and numbers: shared by all code generators."""
+"""Syntax of entries of arrays, calls of functions and numbers in programming languages, for all code generators."""
 
 from __future__ import annotations
 
@@ -42,6 +42,8 @@ class Syntax:
 
     def number(self, value: float) -> str:
         """Return a literal that is read as the same double."""
-        if math.isfinite(value):
-            return repr(value)
-        return self.nan if math.isnan(value) else self.infinity if value > 0 else f"-{self.infinity}"
+        if math.isnan(value):
+            return self.nan
+        if math.isinf(value):
+            return self.infinity if value > 0 else f"-{self.infinity}"
+        return repr(value)
