@@ -115,7 +115,7 @@ class SymbolicKinematics:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Numbers that are symbols because they cannot be written exactly."""
+        """One sentence for each number that is a symbol because it cannot be written exactly."""
         return self.arm.notes
 
     @property
@@ -152,7 +152,7 @@ class SymbolicKinematics:
         Raises
         ------
         DescriptionError
-            No closed form is known: says which axes do not meet or are not parallel.
+            No closed form is known; the message names the axes that do not meet or are not parallel.
         """
         from dhkit.symbolic.inverse import inverse_derivation
 
@@ -166,17 +166,18 @@ class SymbolicKinematics:
 
     def text(self, what: str | Sequence[str] = ("A", "T")) -> str:
         """Return some of A (all links), A1 ... An, T and J as text."""
-        return str(format_function("equations_text")(format_function("kinematic_quantities")(self, what)))
+        quantities = format_function("kinematic_quantities")(self, what)
+        return str(format_function("equations_text")(quantities))
 
     def latex(self, what: str | Sequence[str] = ("A", "T")) -> str:
         """Return some of A, A1 ... An, T and J in LaTeX, for a page that loads amsmath."""
-        return str(format_function("equations_latex")(format_function("kinematic_quantities")(self, what)))
+        quantities = format_function("kinematic_quantities")(self, what)
+        return str(format_function("equations_latex")(quantities))
 
     def sympy(self, what: str | Sequence[str] = ("A", "T", "J")) -> dict[str, object]:
         """Return sympy matrices by name, not simplified."""
-        matrices: dict[str, object] = format_function("equations_sympy")(
-            format_function("kinematic_quantities")(self, what)
-        )
+        quantities = format_function("kinematic_quantities")(self, what)
+        matrices: dict[str, object] = format_function("equations_sympy")(quantities)
         return matrices
 
     def code(self, what: str | Sequence[str] = ("T", "J"), language: str = "python") -> str:
@@ -189,7 +190,8 @@ class SymbolicKinematics:
         """
         if language not in _LANGUAGES:
             raise ValueError(f"language is {language!r}; expected one of {', '.join(_LANGUAGES)}")
-        return str(format_function(f"equations_{language}")(self, format_function("kinematic_quantities")(self, what)))
+        quantities = format_function("kinematic_quantities")(self, what)
+        return str(format_function(f"equations_{language}")(self, quantities))
 
     def __str__(self) -> str:
         return self.text("A")
@@ -208,10 +210,12 @@ class SymbolicKinematics:
         names = [*(f"A{i}" for i in range(1, self.n + 1)), "T", "J"]
         if name not in names:
             raise ValueError(f"no quantity {name!r}; expected one of {', '.join(names)}")
-        found = self.derivation.A[int(name[1:]) - 1] if name.startswith("A") else getattr(self.derivation, name)
-        entries = np.empty(found.shape, dtype=object)
+        matrix = self.derivation.A[int(name[1:]) - 1] if name.startswith("A") else getattr(self.derivation, name)
+
+        # Sums of no terms are the number 0, not an element.
+        entries = np.empty(matrix.shape, dtype=object)
         zero = self.arm.ring.zero
-        for place, entry in np.ndenumerate(found):
+        for place, entry in np.ndenumerate(matrix):
             entries[place] = entry if isinstance(entry, Element) else zero + entry
         return entries
 

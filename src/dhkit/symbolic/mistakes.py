@@ -123,10 +123,12 @@ _MASSES = "Look again at the masses: which body moves with which joint?"
 
 
 def _energy(hint: str, **sentences: str) -> list[Mistake]:
+    """Return mistakes in an energy with one hint, each an identity with its sentence."""
     return [Mistake(identity, Subject.ENERGY, sentence, hint) for identity, sentence in sentences.items()]
 
 
 def _equation(hint: str, **sentences: str) -> list[Mistake]:
+    """Return mistakes in the equations of motion with one hint, each an identity with its sentence."""
     return [Mistake(identity, Subject.EQUATION, sentence, hint) for identity, sentence in sentences.items()]
 
 
@@ -224,7 +226,7 @@ VELOCITY_FACTORS = {
     "centrifugal_halved": (True, _HALF),
     "centrifugal_doubled": (True, Fraction(2)),
 }
-"""Whether the mistake changes squares of rates (else products of two rates), and the factor that it applies."""
+"""Factors of terms with rates, with True for squares of a rate and False for products of two different rates."""
 
 STEP_FACTORS = {
     "mass_rate_omitted": (Fraction(0), Fraction(1)),
@@ -238,6 +240,7 @@ STEP_FACTORS = {
 """Factors of dM/dt qd and of dK/dq in the Euler-Lagrange equation."""
 
 ROTOR_MISTAKES = frozenset(("rotor_forgotten", "rotor_gear", "rotor_without_gear"))
+"""Mistakes in the kinetic energy of the rotors."""
 
 LINK_MISTAKES = frozenset(MISTAKES) - {*VELOCITY_FACTORS, *STEP_FACTORS, *ROTOR_MISTAKES, "potential_gradient_sign"}
 """Mistakes that change a link's own energies."""
@@ -279,6 +282,7 @@ def check_mistake(
         raise ValueError(f"no mistake {made.identity!r}; expected one of {', '.join(known)}")
     if made.link is not None and not 1 <= made.link <= n:
         raise ValueError(f"mistake {made.identity!r}: no link {made.link}; expected 1 to {n}")
+
     if made.body is None:
         return
     names = bodies[made.link - 1] if made.link is not None and bodies else ()

@@ -21,6 +21,7 @@ from dhkit.symbolic.exact.naming import Naming, Symbols
 from dhkit.symbolic.exact.transforms import identity, inverse, rotation, translation
 from dhkit.symbolic.mistakes import MadeAt, Mistake, Subject, catalogue, check_mistake, has, made_at
 from dhkit.symbolic.ring import Direction, Elements, RingError
+from dhkit.symbolic.ring.reading import difference_of_angles
 
 ROW = "Look again at this row: which axis does it turn about, and which lengths lie along which axis?"
 _ZERO_POSE = "Look again at where each joint's angle is zero: draw the arm with all joint values zero."
@@ -33,6 +34,7 @@ _AXES = "Look again at which axes and which point the Jacobian is for."
 
 
 def _mistakes(subject: Subject, hint: str, **sentences: str) -> list[Mistake]:
+    """Return mistakes of one subject and hint, each an identity with its sentence."""
     return [Mistake(identity, subject, sentence, hint) for identity, sentence in sentences.items()]
 
 
@@ -162,15 +164,24 @@ class TextbookKinematics:
     @cached_property
     def J(self) -> Elements:
         """The Jacobian, shape (6, n): linear velocity of the tool's origin, then angular velocity, in world axes."""
-        columns = [self._column(i) for i in range(self.arm.n)]
-        linear, angular = (np.array([column[half] for column in columns], dtype=object).T for half in (0, 1))
+        n = self.arm.n
+        linear = np.empty((3, n), dtype=object)
+        angular = np.empty((3, n), dtype=object)
+        for i in range(n):
+            linear[:, i], angular[:, i] = self._column(i)
+
         if self._has("axes_of_tool"):
-            linear, angular = (self._pose[:3, :3].T @ rows for rows in (linear, angular))
+            R = self._pose[:3, :3]
+            linear = R.T @ linear
+            angular = R.T @ angular
         if self._has("axes_of_frame_0"):
-            linear, angular = (self.base[:3, :3].T @ rows for rows in (linear, angular))
+            R = self.base[:3, :3]
+            linear = R.T @ linear
+            angular = R.T @ angular
         if self._has("angular_axes_unturned"):
-            turning = [kind == "R" for kind in self.arm.ring.kinds]
-            angular = identity(self.arm.ring)[:3, 2:3] * np.array(turning, dtype=int)
+            z = identity(self.arm.ring)[:3, 2:3]
+            is_revolute = np.array([kind == "R" for kind in self.arm.ring.kinds], dtype=int)
+            angular = z * is_revolute
         if self._has("jacobian_x_y_exchanged"):
             linear = linear[[1, 0, 2]]
         halves = (angular, linear) if self._has("jacobian_halves_exchanged") else (linear, angular)
@@ -178,7 +189,7 @@ class TextbookKinematics:
 
     @cached_property
     def base(self) -> Elements:
-        """Frame 0 in the world."""
+        """Frame 0 in the world, shape (4, 4), m."""
         if self._has("base_forgotten"):
             return identity(self.arm.ring)
         base = _placement(self.arm, self.arm.description.base.placement)
@@ -186,7 +197,7 @@ class TextbookKinematics:
 
     @cached_property
     def tool(self) -> Elements:
-        """The tool in frame n."""
+        """The tool in frame n, shape (4, 4), m."""
         if self._has("tool_forgotten"):
             return identity(self.arm.ring)
         tool = _placement(self.arm, self.arm.description.tool.placement)
@@ -194,6 +205,7 @@ class TextbookKinematics:
 
     @cached_property
     def _pose(self) -> Elements:
+        """The tool in the world before it may be inverted by mistake, shape (4, 4), m."""
         return _product(self.frames[-1], self.tool, self._has("translations_unrotated", self.arm.n))
 
     @property
@@ -236,52 +248,60 @@ class TextbookKinematics:
             a = ring.zero
         if self._has("d_forgotten", i):
             d = ring.zero if ring.kinds[i] == "R" else ring.position(i)
-        return replace(row, a=d, d=a) if self._has("a_d_exchanged", i) else replace(row, a=a, d=d)
+        if self._has("a_d_exchanged", i):
+            return replace(row, a=d, d=a)
+        return replace(row, a=a, d=d)
 
     def _angles(self, i: int, row: ExactRow) -> ExactRow:
         """Return the row with the mistakes in theta and alpha."""
+        # Angles are (cosine, sine).
         ring = self.arm.ring
-        (ca, sa) = row.alpha
-        theta = row.theta
+        alpha = row.alpha
         if self._has("alpha_forgotten", i):
-            ca = ring.one
-            sa = ring.zero
+            alpha = (ring.one, ring.zero)
         if self._has("alpha_sign", i):
-            sa = -sa
+            alpha = _negative(alpha)
         if self._has("alpha_sin_cos", i):
-            ca, sa = sa, ca
+            (c, s) = alpha
+            alpha = (s, c)
+
+        # theta = joint variable + constant offset; the variable of a prismatic joint is not an angle.
+        theta = row.theta
         variable = (ring.cosine(i), ring.sine(i)) if ring.kinds[i] == "R" else (ring.one, ring.zero)
-        offset = _sum(theta, _negative(variable))
+        offset = difference_of_angles(theta, variable)
         if self._has("theta_offset_forgotten", i):
             theta = variable
         if self._has("theta_offset_sign", i):
-            theta = _sum(variable, _negative(offset))
+            theta = difference_of_angles(variable, offset)
         if self._has("variable_forgotten", i):
             theta = offset
         if self._has("theta_sign", i):
             theta = _negative(theta)
+
+        # cos(x +- 90 deg) = -+sin x, sin(x +- 90 deg) = +-cos x
+        (c, s) = theta
         if self._has("theta_quarter_more", i):
-            theta = -theta[1], theta[0]
+            (c, s) = (-s, c)
         if self._has("theta_quarter_less", i):
-            theta = theta[1], -theta[0]
+            (c, s) = (s, -c)
         if self._has("theta_sin_cos", i):
-            theta = theta[1], theta[0]
-        return replace(row, alpha=(ca, sa), theta=theta)
+            (c, s) = (s, c)
+        return replace(row, alpha=alpha, theta=(c, s))
 
     def _column(self, i: int) -> tuple[Elements, Elements]:
         """Return the linear and the angular half of column i, counted from 0, shape (3,) each."""
-        ring = self.arm.ring
-        axis = self._axis(i)
-        nothing = np.array([ring.zero] * 3, dtype=object)
-        turning = np.cross(axis, self._lever(i))
+        # Revolute: (z x lever; z). Prismatic: (z; 0).
+        z = self._axis(i)
+        zero = np.array([self.arm.ring.zero] * 3, dtype=object)
+        is_prismatic = self.arm.ring.kinds[i] != "R"
+        if is_prismatic and not self._has("prismatic_as_revolute"):
+            return z, z if self._has("prismatic_angular") else zero
+        if not is_prismatic and self._has("revolute_as_prismatic"):
+            return z, zero
+        linear = np.cross(z, self._lever(i))
         if self._has("cross_product_order"):
-            turning = -turning
-        slides = ring.kinds[i] != "R"
-        if slides and not self._has("prismatic_as_revolute"):
-            return axis, axis if self._has("prismatic_angular") else nothing
-        if not slides and self._has("revolute_as_prismatic"):
-            return axis, nothing
-        return turning, axis
+            linear = -linear
+        return linear, z
 
     def _axis(self, i: int) -> Elements:
         """Return the direction of joint i's axis in the world, shape (3,)."""
@@ -321,8 +341,9 @@ def derive_kinematics(
     description
         The robot; links may lack bodies.
     mistakes
-        Of :data:`KINEMATIC_MISTAKES`, by identity where they are made throughout; those of :data:`LINK_MISTAKES` at
-        one link as ``MadeAt(identity, link)``; ``translations_unrotated`` at link n + 1 is that of the tool.
+        Mistakes of :data:`KINEMATIC_MISTAKES`, by identity where they are made throughout; those of
+        :data:`LINK_MISTAKES` at one link as ``MadeAt(identity, link)``; ``translations_unrotated`` at link n + 1 is
+        that of the tool.
     symbols
         See :func:`dhkit.symbolic.exact_arm`.
 
@@ -382,8 +403,10 @@ def _arm_with_tool(description: Description, symbols: Symbols) -> ExactArm:
     try:
         _placement(arm, description.tool.placement)
     except RingError:
-        angles = _known_angles(arm, description.tool.placement)
-        return exact_arm(description, symbols, tuple(function(x) for x in angles for function in (cos, sin)))
+        needed: list[Expression] = []
+        for angle in _known_angles(arm, description.tool.placement):
+            needed += [cos(angle), sin(angle)]
+        return exact_arm(description, symbols, tuple(needed))
     return arm
 
 
@@ -411,12 +434,7 @@ def _product(first: Elements, second: Elements, unrotated: bool) -> Elements:
     return product
 
 
-def _sum(first: Direction, second: Direction) -> Direction:
-    """Return cosine and sine of the sum of two angles."""
-    c, s = first
-    x, y = second
-    return c * x - s * y, s * x + c * y
-
-
 def _negative(direction: Direction) -> Direction:
-    return direction[0], -direction[1]
+    """Return cosine and sine of the negative of an angle."""
+    (c, s) = direction
+    return c, -s

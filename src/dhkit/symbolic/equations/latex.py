@@ -8,10 +8,12 @@ from fractions import Fraction
 from functools import lru_cache
 from itertools import pairwise
 
+import numpy as np
+
 from dhkit.symbolic.equations.collected import collected
 from dhkit.symbolic.equations.latex_document import escaped
 from dhkit.symbolic.equations.latex_names import latex_names
-from dhkit.symbolic.equations.quantities import Quantity, check_length
+from dhkit.symbolic.equations.quantities import Quantity, check_length, elements_of
 from dhkit.symbolic.equations.writing import Printer, readable_decimal
 from dhkit.symbolic.ring import Element, Generator, Ring
 from dhkit.symbolic.ring.notation import (
@@ -28,16 +30,19 @@ from dhkit.symbolic.ring.notation import (
 _LINE = 62
 """Symbols of a line: one is 0.4 to 0.5 em wide, and a line of an article in 11 points is 32.8 em."""
 _SYMBOLS_PER_EM = 2
+"""Number of symbols that take the width of an em."""
 _FRACTION = re.compile(r"\\t?frac\{((?:[^{}]|\{[^{}]*\})*)\}\{((?:[^{}]|\{[^{}]*\})*)\}")
 _INVISIBLE = re.compile(r"\\(?:d?dot|[bB]ig[lr]|left|right|mathrm|mathit|sqrt|,|(?=(?:arc)?(?:sin|cos|tan)))")
 """Commands that print nothing beside other symbols; of a function's name, the backslash."""
 _INDENT = r"\qquad "
 _BREAK = "\n"
-"""Marks a place in front of a sign where a line may be broken; doubled outside of brackets."""
+"""Mark before a sign at which a line may be broken."""
 FUNCTIONS = {"asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan", "atan2": r"\mathrm{atan2}"}
+"""Functions that have another name in LaTeX."""
 _ZEROS = 6
 """Names per line in the list of entries that are zero."""
 _HEADS = {"tau": r"\tau"}
+"""Quantities whose name is a Greek letter."""
 _WHOLE = {"T": "T(q)", "J": "J(q)", "M": "M(q)", "C": r"C(q,\dot{q})", "h": r"h(q,\dot{q})", "g": "g(q)"}
 """Matrices and vectors with their arguments, which also distinguish the vector g from the constant."""
 
@@ -64,13 +69,16 @@ class LatexWriter:
             return rf"\sqrt{{{inner}}}"
         if function == "abs":
             return rf"\left|{inner}\right|"
-        return f"{FUNCTIONS.get(function, chr(92) + function)}{_bracketed(inner)}"
+        command = FUNCTIONS.get(function, "\\" + function)
+        return f"{command}{_bracketed(inner)}"
 
     def power(self, base: str, exponent: int) -> str:  # noqa: D102
         function = re.match(r"(\\(?:sin|cos|tan))(?=[\\(])", base)
         if function:
             return f"{function[1]}^{{{exponent}}}{base[function.end() :]}"
-        return f"{base}^{{{exponent}}}" if not base.startswith("\\sqrt") else f"{_bracketed(base)}^{{{exponent}}}"
+        if base.startswith("\\sqrt"):
+            return f"{_bracketed(base)}^{{{exponent}}}"
+        return f"{base}^{{{exponent}}}"
 
     def brackets(self, inner: str) -> str:  # noqa: D102
         return _bracketed(inner)
@@ -79,13 +87,18 @@ class LatexWriter:
         decimal = readable_decimal(coefficient)
         number = _number(coefficient) if decimal is None else _scientific(decimal)
         factors = list(numerator)
+
+        # The first factor, or the number alone, is written over the denominator.
         if denominator:
             divisor = _without_brackets(denominator[0]) if len(denominator) == 1 else " ".join(denominator)
             dividend = factors.pop(0) if factors else number
-            number = "" if dividend == number else number
-            factors[:0] = [rf"\frac{{{_without_brackets(dividend)}}}{{{divisor}}}".replace(_BREAK, "")]
+            if dividend == number:
+                number = ""
+            fraction = rf"\frac{{{_without_brackets(dividend)}}}{{{divisor}}}"
+            factors.insert(0, fraction.replace(_BREAK, ""))
+
         if number and (number != "1" or not factors):
-            factors[:0] = [number + r"\,"] if decimal and factors else [number]
+            factors.insert(0, number + r"\," if decimal and factors else number)
         return _spaced(factors)
 
     def total(self, terms: Sequence[tuple[bool, str]]) -> str:  # noqa: D102
@@ -114,7 +127,7 @@ def latex_text(element: Element) -> str:
 
 
 def latex_lines(element: Element, room: float) -> list[str]:
-    """Return an element in LaTeX as lines of about ``room`` em at most, broken in front of terms."""
+    """Return an element in LaTeX as lines of about ``room`` em at most, broken before terms."""
     return _lines(_marked(element), int(_SYMBOLS_PER_EM * room))
 
 
@@ -128,13 +141,15 @@ def displays(quantities: Sequence[Quantity]) -> list[str]:
     """
     check_length(quantities)
     shown = [_matrix(quantity) or _entries(quantity) for quantity in quantities]
-    angles = angles_of(generators_of(_elements(quantities)))
-    return shown + ([_where(angles)] if angles else [])
+    angles = angles_of(generators_of(elements_of(quantities)))
+    if angles:
+        shown.append(_where(angles))
+    return shown
 
 
 def equations_latex(quantities: Sequence[Quantity]) -> str:
     """Return quantities in LaTeX, for a page that loads amsmath; see :func:`displays`."""
-    notes = [f"% {escaped(note)}" for note in renamings(_elements(quantities))]
+    notes = [f"% {escaped(note)}" for note in renamings(elements_of(quantities))]
     return "\n".join([*displays(quantities), *notes]) + "\n"
 
 
@@ -143,18 +158,18 @@ def constant_latex(ring: Ring, name: str) -> str:
     return _writer(ring).symbol(name)
 
 
-def _elements(quantities: Sequence[Quantity]) -> list[Element]:
-    return [element for quantity in quantities for element in quantity.elements.flat]
-
-
 def _marked(element: Element) -> str:
-    return Printer(element.ring.generators, _writer(element.ring)).sum(collected(element))
+    """Return an element in LaTeX with marks at which lines may be broken."""
+    printer = Printer(element.ring.generators, _writer(element.ring))
+    return printer.sum(collected(element))
 
 
 @lru_cache(maxsize=64)
 def _writer(ring: Ring) -> LatexWriter:
+    """Return the writer of a ring's elements."""
     written = notation(ring)
-    taken = {_variable_latex(name) for name in variables(ring)} | {_head(name) for name in entry_names(ring.n)}
+    taken = {_variable_latex(name) for name in variables(ring)}
+    taken |= {_head(name) for name in entry_names(ring.n)}
     return LatexWriter(latex_names(written.names.values(), taken), written)
 
 
@@ -165,24 +180,38 @@ def _matrix(quantity: Quantity) -> str:
     table = quantity.elements.reshape(len(quantity.elements), -1)
     if sum(len(element) for element in table.flat) > 40 * table.shape[1]:
         return ""
-    rows = [[latex_text(element) for element in row] for row in table]
+
+    cells = np.empty(table.shape, dtype=object)
+    symbols = np.empty(table.shape, dtype=int)
+    for place, element in np.ndenumerate(table):
+        cells[place] = latex_text(element)
+        symbols[place] = _symbols(cells[place])
+
     head = _WHOLE.get(quantity.name) or _HEADS.get(quantity.name) or _head(quantity.name)
-    widths = [max(_symbols(row[k]) for row in rows) for k in range(table.shape[1])]
-    gaps = _SYMBOLS_PER_EM * (len(widths) + 1)  # an em between columns, and for each bracket
-    if _symbols(f"{head} =") + sum(widths) + gaps > _LINE:
+    width_of_columns = int(symbols.max(axis=0).sum())
+    gaps = _SYMBOLS_PER_EM * (table.shape[1] + 1)  # an em between columns, and for each bracket
+    if _symbols(f"{head} =") + width_of_columns + gaps > _LINE:
         return ""
+
+    rows = cells.tolist()
     body = " \\\\\n".join(" & ".join(row) for row in rows)
     return f"\\begin{{equation*}}\n{head} = \\begin{{pmatrix}}\n{body}\n\\end{{pmatrix}}\n\\end{{equation*}}"
 
 
 def _entries(quantity: Quantity) -> str:
     """Return the entries one after another, broken over lines."""
+    heads: list[str] = []
+    elements: list[Element] = []
+    for names, element in quantity.entries:
+        heads.append(" = ".join(_head(name) for name in names))
+        elements.append(element)
+
     lines: list[str] = []
-    entries = [(" = ".join(_head(name) for name in names), element) for names, element in quantity.entries]
-    room = _LINE - max((_symbols(f"{head} =") for head, _ in entries), default=0)
-    for head, element in entries:
+    room = _LINE - max((_symbols(f"{head} =") for head in heads), default=0)
+    for head, element in zip(heads, elements, strict=True):
         first, *more = _lines(_marked(element), room)
         lines += [f"{head} &= {first}", *(f"&{_INDENT}{line}" for line in more)]
+
     zeros = [_head(name) for name in quantity.zeros]
     if len(zeros) == 1:
         lines.append(f"{zeros[0]} &= 0")
@@ -194,11 +223,16 @@ def _entries(quantity: Quantity) -> str:
 
 
 def _head(name: str) -> str:
-    if link := re.fullmatch(r"A(\d+)_(\d+)", name):
+    r"""Return the name of a quantity or an entry in LaTeX: M12 is M_{12}, A1_12 is (A_{1})_{12}."""
+    link = re.fullmatch(r"A(\d+)_(\d+)", name)
+    if link:
         return rf"(A_{{{link[1]}}})_{{{link[2]}}}"
+
     letters, number = re.fullmatch(r"([A-Za-z]+)([\d_]*)", name).groups()  # type: ignore[union-attr]
-    head = _HEADS.get(letters, letters if len(letters) == 1 else rf"\mathit{{{letters}}}")
-    return head + (f"_{{{number.replace('_', ',')}}}" if number else "")
+    symbol = letters if len(letters) == 1 else rf"\mathit{{{letters}}}"
+    head = _HEADS.get(letters, symbol)
+    subscript = number.replace("_", ",")
+    return f"{head}_{{{subscript}}}" if subscript else head
 
 
 def _symbols(latex: str) -> int:
@@ -212,19 +246,21 @@ def _symbols(latex: str) -> int:
 
 
 def _lines(marked: str, room: int) -> list[str]:
-    """Break a sum in front of terms, and inside those that are longer than a line."""
+    """Break a sum before terms, and inside those that are longer than a line."""
     lines = []
     line = ""
     for term in _terms(marked):
         whole = term.replace(_BREAK, "")
-        if not line or _symbols(line + whole) <= room:
-            pieces = [whole] if _symbols(line + whole) <= room else term.split(_BREAK)
-        elif _symbols(whole) <= room:
+        if _symbols(line + whole) <= room:
+            pieces = [whole]
+        elif line and _symbols(whole) <= room:
+            # A line of its own.
             lines.append(line)
             line = ""
             pieces = [whole]
         else:
             pieces = term.split(_BREAK)
+
         for piece in pieces:
             if line and _symbols(line + piece) > room:
                 lines.append(line)
@@ -234,7 +270,7 @@ def _lines(marked: str, room: int) -> list[str]:
 
 
 def _terms(marked: str) -> list[str]:
-    """Split a sum in front of the signs outside of brackets; breaks inside stay marked."""
+    """Split a sum before the signs outside of brackets; breaks inside stay marked."""
     terms = []
     depth = 0
     for piece in marked.split(_BREAK):
@@ -248,14 +284,16 @@ def _terms(marked: str) -> list[str]:
 
 def _where(angles: Sequence[Angle]) -> str:
     """Return the angles of the sines and cosines."""
-    own = [r"s_{i} = \sin(q_{i})", r"c_{i} = \cos(q_{i})"] if any(len(angle.joints) == 1 for angle in angles) else []
-    sums = [
-        f"{_variable_latex(angle.name)} = \\{angle.function}({' + '.join(f'q_{{{j + 1}}}' for j in angle.joints)})"
-        for angle in angles
-        if len(angle.joints) > 1
-    ]
+    definitions: list[str] = []
+    if any(len(angle.joints) == 1 for angle in angles):
+        definitions += [r"s_{i} = \sin(q_{i})", r"c_{i} = \cos(q_{i})"]
+    for angle in angles:
+        if len(angle.joints) > 1:
+            total = " + ".join(f"q_{{{joint + 1}}}" for joint in angle.joints)
+            definitions.append(f"{_variable_latex(angle.name)} = \\{angle.function}({total})")
+
     lines: list[str] = []
-    for definition in own + sums:
+    for definition in definitions:
         if lines and _symbols(f"{lines[-1]},{_INDENT}{definition}") <= _LINE:
             lines[-1] += f",{_INDENT}{definition}"
         else:
@@ -273,12 +311,14 @@ def _spaced(factors: Sequence[str]) -> str:
 
 
 def _number(value: Fraction) -> str:
+    """Return a rational number in LaTeX."""
     if value.denominator == 1:
         return str(value.numerator)
     return rf"\tfrac{{{value.numerator}}}{{{value.denominator}}}"
 
 
 def _scientific(decimal: str) -> str:
+    r"""Return a decimal in LaTeX: 1e-9 is 1\times 10^{-9}."""
     mantissa, _, exponent = decimal.partition("e")
     return rf"{mantissa}\times 10^{{{int(exponent)}}}" if exponent else mantissa
 

@@ -18,7 +18,7 @@ def latex_document(equations: str, title: str) -> str:
     Parameters
     ----------
     equations
-        What :func:`equations_latex` returns.
+        Displayed equations, as :func:`equations_latex` returns them.
     title
         Plain text.
     """
@@ -28,5 +28,6 @@ def latex_document(equations: str, title: str) -> str:
 def escaped(text: str) -> str:
     """Return plain text for LaTeX, printable ASCII alone."""
     spelled = {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+    spelled |= {x: f"\\{x}" for x in "&%$#_{}"}
     printable = re.sub(r"[^ -~]", "?", text)
-    return "".join(spelled.get(x, f"\\{x}" if x in "&%$#_{}" else x) for x in printable)
+    return "".join(spelled.get(x, x) for x in printable)

@@ -1,8 +1,9 @@
-r"""Names in LaTeX: m_{2}, I_{xx,2}, \theta_{1}; no two names look alike."""
+r"""Names in LaTeX: m_{2}, I_{xx,2}, \theta_{1}; no two names have the same LaTeX."""
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable
 
 _LETTERS = """
@@ -29,36 +30,47 @@ def latex_names(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, st
         by letter.
     """
     listed = list(names)
+    counts = Counter(_typeset(name) for name in listed)
     used = set(taken)
     written = {}
-    counts: dict[str, int] = {}
     for name in listed:
-        counts[_nice(name)] = counts.get(_nice(name), 0) + 1
-    for name in listed:
-        wanted = _nice(name)
-        written[name] = wanted if counts[wanted] == 1 and wanted not in used else literal(name)
+        typeset = _typeset(name)
+        is_unique = counts[typeset] == 1 and typeset not in used
+        written[name] = typeset if is_unique else literal(name)
     return written
 
 
-def _nice(name: str) -> str:
+def _typeset(name: str) -> str:
     """Return a name as textbooks typeset it."""
-    if match := _AXES.fullmatch(name):
+    # Ixx2: an entry of an inertia matrix.
+    match = _AXES.fullmatch(name)
+    if match:
         letter, axes, number = match.groups()
-        return f"{letter}_{{{axes}{',' + number if number else ''}}}"
-    if match := _MOMENT.fullmatch(name):
-        return "{}_{{{}{}}}".format(*match.groups())
-    if match := _REGROUPED.fullmatch(name):
-        return r"\mathit{{{}}}_{{{}}}".format(*match.groups())
+        subscript = f"{axes},{number}" if number else axes
+        return f"{letter}_{{{subscript}}}"
+
+    # rx2: a first moment.
+    match = _MOMENT.fullmatch(name)
+    if match:
+        letter, axis, number = match.groups()
+        return f"{letter}_{{{axis}{number}}}"
+
+    # XX2, Ia2: a base parameter.
+    match = _REGROUPED.fullmatch(name)
+    if match:
+        letters, number = match.groups()
+        return rf"\mathit{{{letters}}}_{{{number}}}"
+
+    # lc1, l_c1, theta_2: letters, a number, and subscripts after underscores.
     head, *subscripts = name.split("_")
-    if not head or not all(subscripts):
+    match = _HEAD.fullmatch(head)
+    if match is None or not match[1] or not all(subscripts):
         return literal(name)
-    letters, number = _HEAD.fullmatch(head).groups() if _HEAD.fullmatch(head) else ("", "")  # type: ignore[union-attr]
-    if not letters:
-        return literal(name)
+    letters, number = match.groups()
     base, subscript = _base(letters)
     scripts = [subscript + number] if subscript + number else []
     scripts += [_word(part) for part in subscripts]
-    return base + (f"_{{{','.join(scripts)}}}" if scripts else "")
+    return f"{base}_{{{','.join(scripts)}}}" if scripts else base
 
 
 def _greek(name: str) -> str | None:
@@ -68,12 +80,14 @@ def _greek(name: str) -> str | None:
 
 def literal(name: str) -> str:
     """Return a name as it is typed, in upright letters."""
-    return rf"\mathrm{{{name.replace('_', chr(92) + '_')}}}"
+    escaped = name.replace("_", r"\_")
+    return rf"\mathrm{{{escaped}}}"
 
 
 def _base(letters: str) -> tuple[str, str]:
     """Split letters into a symbol and its subscript: l and c for lc."""
-    if command := _greek(letters):
+    command = _greek(letters)
+    if command:
         return command, ""
     if len(letters) == 1:
         return letters, ""
@@ -83,7 +97,10 @@ def _base(letters: str) -> tuple[str, str]:
 
 
 def _word(part: str) -> str:
+    """Return a subscript in LaTeX."""
     match = _HEAD.fullmatch(part)
-    if match and _greek(match[1]):
-        return _greek(match[1]) + (f" {match[2]}" if match[2] else "")  # type: ignore[operator]
-    return part if len(part) == 1 or part.isdecimal() or _LETTER.fullmatch(part) else rf"\mathrm{{{part}}}"
+    command = _greek(match[1]) if match else None
+    if match and command:
+        return f"{command} {match[2]}" if match[2] else command
+    is_plain = len(part) == 1 or part.isdecimal() or _LETTER.fullmatch(part)
+    return part if is_plain else rf"\mathrm{{{part}}}"

@@ -34,7 +34,7 @@ class Quantity:
     name
         One of :data:`QUANTITIES`, ``definitions``, A1 ... An, T or J.
     elements
-        Shape (n, n), (n,) or (); for kinematics (4, 4) or (6, n).
+        Its entries, shape (n, n), (n,) or (); for kinematics (4, 4) or (6, n).
     labels
         Names of the entries, for definitions.
     """
@@ -59,9 +59,12 @@ class Quantity:
     def entries(self) -> Iterator[tuple[tuple[str, ...], Element]]:
         """Entries that are not zero, each with its names, which count from 1: M12 and M21."""
         for place, element in np.ndenumerate(self.elements):
-            if element and not (self.is_symmetric and place[0] > place[1]):
-                mirrored = [place] if not self.is_symmetric or place[0] == place[1] else [place, place[::-1]]
-                yield tuple(self.head(p) for p in mirrored), element
+            if not element:
+                continue
+            if not self.is_symmetric or place[0] == place[1]:
+                yield (self.head(place),), element
+            elif place[0] < place[1]:
+                yield (self.head(place), self.head(place[::-1])), element
 
     @property
     def zeros(self) -> list[str]:
@@ -76,6 +79,19 @@ class Quantity:
         return entry_name(f"{self.name}_" if _LINK.fullmatch(self.name) else self.name, place)
 
 
+def elements_of(quantities: Sequence[Quantity]) -> list[Element]:
+    """Return the entries of all quantities."""
+    elements: list[Element] = []
+    for quantity in quantities:
+        elements += quantity.elements.flat
+    return elements
+
+
+def _listed(what: str | Sequence[str]) -> list[str]:
+    """Return names one by one; in one text they are separated by commas or spaces."""
+    return what.replace(",", " ").split() if isinstance(what, str) else list(what)
+
+
 def quantities(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
     """Return quantities of a Lagrangian by name, in the angles that make each entry shortest.
 
@@ -86,7 +102,7 @@ def quantities(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
     ValueError
         No such quantity, or none at all.
     """
-    names = what.replace(",", " ").split() if isinstance(what, str) else list(what)
+    names = _listed(what)
     unknown = [name for name in names if name not in QUANTITIES]
     if unknown or not names:
         raise ValueError(f"no quantity {unknown[0] if unknown else ''!r}; expected some of {', '.join(QUANTITIES)}")
@@ -101,9 +117,10 @@ def kinematic_quantities(kinematics: SymbolicKinematics, what: str | Sequence[st
     ValueError
         No such quantity, or none at all.
     """
-    listed = what.replace(",", " ").split() if isinstance(what, str) else list(what)
     links = [f"A{i}" for i in range(1, kinematics.n + 1)]
-    names = [name for one in listed for name in (links if one == "A" else [one])]
+    names: list[str] = []
+    for name in _listed(what):
+        names += links if name == "A" else [name]
     unknown = [name for name in names if name not in (*links, "T", "J")]
     if unknown or not names:
         raise ValueError(
@@ -115,7 +132,7 @@ def kinematic_quantities(kinematics: SymbolicKinematics, what: str | Sequence[st
 
 def is_kinematic(what: str | Sequence[str]) -> bool:
     """Return whether all names are of kinematics: A, A1 ... An, T, J."""
-    names = what.replace(",", " ").split() if isinstance(what, str) else list(what)
+    names = _listed(what)
     return bool(names) and all(name in KINEMATIC_QUANTITIES or _LINK.fullmatch(name) for name in names)
 
 
@@ -128,7 +145,7 @@ def readable(lag: Lagrangian, what: str | Sequence[str]) -> list[Quantity]:
         No such quantity, or none at all.
     """
     found = quantities(lag, what)
-    used = {g.text for quantity in found for g in generators_of(quantity.elements.flat)}
+    used = {generator.text for generator in generators_of(elements_of(found))}
     labels = tuple(name for name in lag.definitions if name in used)
     if not labels:
         return found

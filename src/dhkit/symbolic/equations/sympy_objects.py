@@ -15,6 +15,7 @@ from dhkit.symbolic.ring import Element, Generator
 from dhkit.symbolic.ring.notation import Notation, notation
 
 FUNCTIONS = {"abs": "Abs"}
+"""Functions that have another name in sympy."""
 
 
 class SympyWriter:
@@ -65,7 +66,9 @@ def sympy_object(element: Element) -> Any:
     >>> sympy_object(lagrangian(library_robot("planar2r")).M[1, 1])
     l2**2*m2/3
     """
-    return Printer(element.ring.generators, SympyWriter(notation(element.ring))).sum(collected(element))
+    ring = element.ring
+    printer: Printer[Any] = Printer(ring.generators, SympyWriter(notation(ring)))
+    return printer.sum(collected(element))
 
 
 def equations_sympy(quantities: Sequence[Quantity]) -> dict[str, object]:

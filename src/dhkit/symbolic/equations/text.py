@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from dhkit.symbolic.equations.collected import collected
-from dhkit.symbolic.equations.quantities import Quantity, check_length
+from dhkit.symbolic.equations.quantities import Quantity, check_length, elements_of
 from dhkit.symbolic.equations.writing import Printer, readable_decimal
 from dhkit.symbolic.ring import Element, Generator
 from dhkit.symbolic.ring.notation import Notation, angles_of, generators_of, notation, renamings
@@ -46,15 +46,16 @@ class TextWriter:
         return f"({inner})"
 
     def product(self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]) -> str:  # noqa: D102
+        factors = list(numerator)
+        divisors = list(denominator)
         decimal = readable_decimal(coefficient)
         if decimal is not None:
-            factors = [decimal, *numerator]
-            divisors = list(denominator)
+            factors.insert(0, decimal)
         else:
-            over = coefficient.numerator
-            under = coefficient.denominator
-            factors = [*([str(over)] if over != 1 or not numerator else []), *numerator]
-            divisors = [*([str(under)] if under != 1 else []), *denominator]
+            if coefficient.numerator != 1 or not numerator:
+                factors.insert(0, str(coefficient.numerator))
+            if coefficient.denominator != 1:
+                divisors.insert(0, str(coefficient.denominator))
         return "*".join(factors) + "".join(f"/{divisor}" for divisor in divisors)
 
     def total(self, terms: Sequence[tuple[bool, str]]) -> str:  # noqa: D102
@@ -90,26 +91,28 @@ def equations_text(quantities: Sequence[Quantity]) -> str:
     """
     check_length(quantities)
     blocks = ["\n".join(_entry_lines(quantity)) for quantity in quantities]
-    elements = [element for quantity in quantities for element in quantity.elements.flat]
+    elements = elements_of(quantities)
     angles = [f"{angle.name} = {angle.function}({angle.text})" for angle in angles_of(generators_of(elements))]
     if angles:
         blocks.append("\n".join(_filled_lines("where ", angles)))
-    if notes := renamings(elements):
+    notes = renamings(elements)
+    if notes:
         blocks.append("\n".join(f"note: {note}" for note in notes))
     return "\n\n".join(blocks)
 
 
 def _entry_lines(quantity: Quantity) -> list[str]:
+    """Return the lines of a quantity's entries; those that are zero share lines."""
     lines: list[str] = []
     for heads, element in quantity.entries:
         lines += broken_lines(f"{' = '.join(heads)} = ", plain_text(element))
-    if zeros := quantity.zeros:
-        lines += _filled_lines("", [f"{head} =" for head in zeros], "0", separator=" ")
+    if quantity.zeros:
+        lines += _filled_lines("", [f"{head} =" for head in quantity.zeros], "0", separator=" ")
     return lines
 
 
 def broken_lines(head: str, text: str) -> list[str]:
-    """Return a sum behind a head, broken in front of terms, and inside those that are longer than a line."""
+    """Return a sum after a head, broken before terms, and inside those that are longer than a line."""
     lines = []
     line = head
     for term in _terms(text):
@@ -130,7 +133,7 @@ def broken_lines(head: str, text: str) -> list[str]:
 
 
 def _terms(text: str) -> list[str]:
-    """Split a sum in front of the signs outside of brackets."""
+    """Split a sum before the signs outside of brackets."""
     terms = [""]
     depth = 0
     for piece in re.split(r"(?= [+-] )", text):
@@ -142,10 +145,14 @@ def _terms(text: str) -> list[str]:
 
 
 def _filled_lines(head: str, words: Sequence[str], tail: str = "", separator: str = ", ") -> list[str]:
-    """Return words behind a head, with as many on a line as it holds."""
+    """Return words after a head, with as many on a line as it holds."""
+    following = list(words[1:])
+    if tail:
+        following.append(tail)
+
     lines = []
     line = head + words[0]
-    for word in [*words[1:], *([tail] if tail else [])]:
+    for word in following:
         if len(line) + len(separator) + len(word) > WIDTH:
             lines.append(line + separator.rstrip())
             line = _INDENT + word

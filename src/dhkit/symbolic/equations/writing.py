@@ -68,7 +68,7 @@ class Printer(Generic[T]):
     def sum(self, products: Iterable[Product]) -> T:
         """Return a sum."""
         terms = [(product.coefficient < 0, self.product(product)) for product in products]
-        return self.writer.total(terms or [(False, self.writer.product(Fraction(0), [], []))])
+        return self._total(terms)
 
     def product(self, product: Product) -> T:
         """Return a product without its sign."""
@@ -90,7 +90,14 @@ class Printer(Generic[T]):
             numerator = [self._power(self.atom(atom), e) for atom, e in monomial if e > 0]
             denominator = [self._power(self.atom(atom), -e) for atom, e in monomial if e < 0]
             terms.append((coefficient < 0, writer.product(abs(coefficient), numerator, denominator)))
-        return writer.total(terms or [(False, writer.product(Fraction(0), [], []))])
+        return self._total(terms)
+
+    def _total(self, terms: Sequence[tuple[bool, T]]) -> T:
+        """Return a sum of terms, each with whether it is subtracted; 0 without terms."""
+        if not terms:
+            zero = self.writer.product(Fraction(0), [], [])
+            terms = [(False, zero)]
+        return self.writer.total(terms)
 
     def atom(self, atom: Atom) -> T:
         """Return a name, pi or a function."""
@@ -101,6 +108,7 @@ class Printer(Generic[T]):
         return self.writer.pi() if atom.name == "pi" else self.writer.symbol(atom.name)
 
     def _powers(self, powers: Powers, *, reciprocals: bool) -> list[T]:
+        """Return the factors that are reciprocals, as their denominators, or those that are not."""
         return [self._power(self._generator(k), e) for k, e in powers if self._is_reciprocal[k] == reciprocals]
 
     def _power(self, base: T, exponent: int) -> T:
@@ -119,19 +127,24 @@ class Printer(Generic[T]):
         return self._written[place]
 
     def _atom_like(self, generator: Generator) -> T:
+        """Return a constant as a factor: a name, a single function or name without its power, or a sum in brackets."""
         meaning = generator.meaning
         if meaning is None or is_name(generator):
             return self.writer.symbol(generator.text)
-        if len(meaning.terms) == 1 and len(meaning.terms[0][0]) == 1 and meaning.terms[0][1] == 1:
-            return self.atom(meaning.terms[0][0][0][0])
+        if len(meaning.terms) == 1:
+            ((monomial, coefficient),) = meaning.terms
+            if len(monomial) == 1 and coefficient == 1:
+                ((atom, _),) = monomial
+                return self.atom(atom)
         return self.writer.brackets(self.expression(meaning))
 
 
 def readable_decimal(value: Fraction) -> str | None:
-    """Return a rational as an exact decimal; None for a short fraction, or where the decimal does not end."""
-    return None if max(value.numerator, value.denominator) <= MAX_FRACTION_PART else decimal_text(value)
+    """Return a rational as an exact decimal; None for a short fraction, or if the decimal does not end."""
+    is_short_fraction = max(value.numerator, value.denominator) <= MAX_FRACTION_PART
+    return None if is_short_fraction else decimal_text(value)
 
 
 def is_name(generator: Generator) -> bool:
-    """Whether a constant is written as its name."""
+    """Return whether a constant is written as its name."""
     return generator.meaning is None or generator.meaning.text in generator.meaning.symbols

@@ -7,11 +7,13 @@ import textwrap
 from collections.abc import Sequence
 
 _WIDTH = 112
+"""Longest line of an expression, in characters; it leaves room for an ending."""
 _COMMENT_WIDTH = 96
+"""Longest line of a comment's text, in characters."""
 
 
 def wrapped(text: str, first: str, following: str, ending: str = "") -> str:
-    """Break a long expression in front of plus and minus signs.
+    """Break a long expression into lines before plus and minus signs.
 
     Parameters
     ----------
@@ -41,12 +43,14 @@ def comment_block(sentences: Sequence[str], first: str, following: str, end: str
     Parameters
     ----------
     sentences
-        What it says.
+        The text.
     first, following
         Beginning of the first line, and of the others.
     end
         Ending of the last line.
     """
-    lines = textwrap.wrap(" ".join(sentences), _COMMENT_WIDTH)
-    begun = [f"{first if k == 0 else following}{line}" for k, line in enumerate(lines)]
-    return [*begun[:-1], begun[-1] + end]
+    texts = textwrap.wrap(" ".join(sentences), _COMMENT_WIDTH)
+    lines = [first + texts[0]]
+    lines += [following + text for text in texts[1:]]
+    lines[-1] += end
+    return lines

@@ -22,7 +22,7 @@ C = Syntax(
 
 
 def c_lines(statement: Statement, indent: str, shape: Sequence[int] = ()) -> list[str]:
-    """Return a statement; an array of some shape is stored row by row."""
+    """Return the lines of a statement; an array of some shape is stored row by row."""
     match statement:
         case Comment(text):
             return ["", *comment_block([text], f"{indent}/* ", f"{indent} * ", " */")]
@@ -30,20 +30,19 @@ def c_lines(statement: Statement, indent: str, shape: Sequence[int] = ()) -> lis
             line = wrapped(expression, f"{indent}const double {name} = ", f"{indent}    ") + ";"
             return [line + (f" /* {remark} */" if remark else "")]
         case Store(array, places, parts):
-            first, *others = [array + (f"[{_offset(place, shape)}]" if place else "") for place in places]
-            signs = ["=", *["+="] * (len(parts) - 1)]
-            lines = [
-                wrapped(part, f"{indent}{first} {sign} ", f"{indent}    ") + ";"
-                for sign, part in zip(signs, parts, strict=True)
-            ]
+            first, *others = [f"{array}[{_offset(place, shape)}]" if place else array for place in places]
+            lines = []
+            for k, part in enumerate(parts):
+                sign = "=" if k == 0 else "+="
+                lines.append(wrapped(part, f"{indent}{first} {sign} ", f"{indent}    ") + ";")
             return [*lines, *(f"{indent}{other} = {first};" for other in others)]
         case Guard(expression, least):
             return [f"{indent}if ({expression} < {least}) continue;"]
         case Digit(expressions, is_inverted):
-            negative, *others = [f"(({expression}) < 0.0)" for expression in expressions]
+            is_odd, *others = [f"(({expression}) < 0.0)" for expression in expressions]
             for other in others:
-                negative = f"({negative} != {other})"
-            return [f"{indent}b = 2*b + {'!' if is_inverted else ''}{negative};"]
+                is_odd = f"({is_odd} != {other})"
+            return [f"{indent}b = 2*b + {'!' if is_inverted else ''}{is_odd};"]
 
 
 def _offset(place: Sequence[int], shape: Sequence[int]) -> int:
@@ -71,7 +70,7 @@ PYTHON = Syntax(item="{array}[{k}]", first_index=0, pi="pi", functions={}, nan="
 
 
 def python_lines(statement: Statement, indent: str) -> list[str]:
-    """Return a statement; entries of arrays have leading batch axes."""
+    """Return the lines of a statement; entries of arrays have leading batch axes."""
     match statement:
         case Comment(text):
             return ["", *comment_block([text], f"{indent}# ", f"{indent}# ", "")]
@@ -79,24 +78,27 @@ def python_lines(statement: Statement, indent: str) -> list[str]:
             return [_assigned(expression, f"{indent}{name} = ", indent) + (f"  # {remark}" if remark else "")]
         case Store(array, places, parts):
             first, *others = [f"{array}[{', '.join(['...', *map(str, place)])}]" for place in places]
-            signs = ["=", *["+="] * (len(parts) - 1)]
-            lines = [
-                _assigned(part, f"{indent}{first} {sign} ", indent) for sign, part in zip(signs, parts, strict=True)
-            ]
+            lines = []
+            for k, part in enumerate(parts):
+                sign = "=" if k == 0 else "+="
+                lines.append(_assigned(part, f"{indent}{first} {sign} ", indent))
             return [*lines, *(f"{indent}{other} = {first}" for other in others)]
         case Guard(expression, least):
             return [f"{indent}if {expression} < {least}:", f"{indent}    continue"]
         case Digit(expressions, is_inverted):
-            negative, *others = [f"(({expression}) < 0)" for expression in expressions]
+            is_odd, *others = [f"(({expression}) < 0)" for expression in expressions]
             for other in others:
-                negative = f"({negative} != {other})"
-            return [f"{indent}b = 2*b + int{f'(not {negative})' if is_inverted else negative}"]
+                is_odd = f"({is_odd} != {other})"
+            digit = f"(not {is_odd})" if is_inverted else is_odd
+            return [f"{indent}b = 2*b + int{digit}"]
 
 
 def _assigned(expression: str, head: str, indent: str) -> str:
     """Return an assignment, in brackets where it is longer than a line."""
-    one = wrapped(expression, head, "")
-    return one if "\n" not in one else wrapped(expression, f"{head}(", f"{indent}    ") + ")"
+    line = wrapped(expression, head, "")
+    if "\n" not in line:
+        return line
+    return wrapped(expression, f"{head}(", f"{indent}    ") + ")"
 
 
 # MATLAB, and GNU Octave
@@ -105,7 +107,7 @@ MATLAB = Syntax(item="{array}({k})", first_index=1, pi="pi", functions={}, nan="
 
 
 def matlab_lines(statement: Statement, indent: str) -> list[str]:
-    """Return a statement."""
+    """Return the lines of a statement."""
     match statement:
         case Comment(text):
             return ["", *comment_block([text], f"{indent}% ", f"{indent}% ", "")]
@@ -113,19 +115,29 @@ def matlab_lines(statement: Statement, indent: str) -> list[str]:
             line = wrapped(expression, f"{indent}{name} = ", f"{indent}    ", ending=" ...") + ";"
             return [line + (f"  % {remark}" if remark else "")]
         case Store(array, places, parts):
-            first, *others = [
-                array + (f"({', '.join(str(k + 1) for k in place)})" if place else "") for place in places
-            ]
+            first, *others = [_matlab_entry(array, place) for place in places]
             lines = []
             for k, part in enumerate(parts):
-                sum_so_far = f"{first} " if part.startswith("-") else f"{first} + "
-                before = sum_so_far if k else ""
-                lines.append(wrapped(part, f"{indent}{first} = {before}", f"{indent}    ", ending=" ...") + ";")
+                # There is no "+=": the entry is added to the next part.
+                if k == 0:
+                    sum_so_far = ""
+                elif part.startswith("-"):
+                    sum_so_far = f"{first} "
+                else:
+                    sum_so_far = f"{first} + "
+                lines.append(wrapped(part, f"{indent}{first} = {sum_so_far}", f"{indent}    ", ending=" ...") + ";")
             return [*lines, *(f"{indent}{other} = {first};" for other in others)]
         case Guard(expression, least):
             return [f"{indent}if {expression} < {least}", f"{indent}    continue", f"{indent}end"]
         case Digit(expressions, is_inverted):
-            negative, *others = [f"(({expression}) < 0)" for expression in expressions]
+            is_odd, *others = [f"(({expression}) < 0)" for expression in expressions]
             for other in others:
-                negative = f"xor({negative}, {other})"
-            return [f"{indent}b = 2*b + double({'~' if is_inverted else ''}{negative});"]
+                is_odd = f"xor({is_odd}, {other})"
+            return [f"{indent}b = 2*b + double({'~' if is_inverted else ''}{is_odd});"]
+
+
+def _matlab_entry(array: str, place: Sequence[int]) -> str:
+    """Return an entry of an array by its indices from 0, or the name of a scalar."""
+    if not place:
+        return array
+    return f"{array}({', '.join(str(k + 1) for k in place)})"

@@ -42,7 +42,7 @@ class Store:
 
 @dataclass(frozen=True)
 class Guard:
-    """The loop goes on with the next branch unless an expression is at least another one."""
+    """Continue with the next branch unless ``expression`` is at least ``least``."""
 
     expression: str
     least: str
@@ -50,7 +50,15 @@ class Guard:
 
 @dataclass(frozen=True)
 class Digit:
-    """The next binary digit of the branch's index: whether an odd number of expressions is negative, or an even one."""
+    """The next binary digit of the branch's index.
+
+    Attributes
+    ----------
+    expressions
+        The digit is 1 if an odd number of these is negative, else 0.
+    is_inverted
+        Whether the digits are exchanged.
+    """
 
     expressions: tuple[str, ...]
     is_inverted: bool

@@ -1,4 +1,4 @@
-"""Syntax of programming languages for entries of arrays, calls of functions and numbers, for all code generators."""
+"""Syntax of entries of arrays, calls of functions and numbers in programming languages, for all code generators."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class Syntax:
 
     def number(self, value: float) -> str:
         """Return a literal that is read as the same double."""
-        if math.isfinite(value):
-            return repr(value)
         if math.isnan(value):
             return self.nan
-        return self.infinity if value > 0 else f"-{self.infinity}"
+        if math.isinf(value):
+            return self.infinity if value > 0 else f"-{self.infinity}"
+        return repr(value)
