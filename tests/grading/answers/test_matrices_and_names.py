@@ -2,6 +2,7 @@
 
 import unicodedata
 
+import casadi
 import pytest
 
 from dhkit import Arm
@@ -159,3 +160,60 @@ def test_a_right_entry_of_C_beside_one_outside_the_ring():
     arm = Arm.load("cart_pendulum")
     report = arm.grade(C=[["q2*qd2", "-l*mp*qd2*sin(q2)/2"], ["0", "0"]], explain=False)
     assert {entry.name for entry in report.entries if not entry.verdict.passes} == {"C11"}
+
+
+# CasADi
+
+
+def mass_matrix(q2, m1, m2, l1, l2):
+    """Return the mass matrix of two uniform rods, which does not depend on q1."""
+    coupled = m2 * (l2**2 / 3 + l1 * l2 * casadi.cos(q2) / 2)
+    first = m1 * l1**2 / 3 + m2 * (l1**2 + l2**2 / 3 + l1 * l2 * casadi.cos(q2))
+    return casadi.vertcat(casadi.horzcat(first, coupled), casadi.horzcat(coupled, m2 * l2**2 / 3))
+
+
+LENGTHS = [casadi.SX.sym(name) for name in ("m1", "m2", "l1", "l2")]
+
+
+@pytest.mark.parametrize("name", ["q2", "q_2"])
+def test_symbols_of_casadi_count_from_one(name):
+    assert ARM.grade(M=mass_matrix(casadi.SX.sym(name), *LENGTHS), explain=False).verdict is Verdict.CORRECT
+
+
+def test_entries_of_a_vector_of_casadi_count_from_zero_if_the_answer_shows_it():
+    """SX.sym("q", 2) has q_0 and q_1; q_1 alone may be a symbol of the first joint too."""
+    q = casadi.SX.sym("q", 2)
+    alone = ARM.grade(M=mass_matrix(q[1], *LENGTHS), explain=False)
+    assert alone.verdict is Verdict.UNREADABLE
+    assert "q_1 may be joint 1 or" in alone.entries[0].statement
+    m1, m2, l1, l2 = LENGTHS
+    g = casadi.SX.sym("g")
+    second = m2 * g * l2 / 2 * casadi.cos(q[0] + q[1])
+    first = (m1 / 2 + m2) * g * l1 * casadi.cos(q[0]) + second
+    assert ARM.grade(g=casadi.vertcat(first, second), explain=False).verdict is Verdict.CORRECT
+
+
+def test_a_function_of_casadi_has_the_arms_own_joint_variables():
+    values = ARM.description.numbers.values
+    q = casadi.SX.sym("q", 2)
+    M = mass_matrix(q[1], *(values[name] for name in ("m1", "m2", "l1", "l2")))
+    function = casadi.Function("M", [q], [M])
+    assert ARM.grade(M=function, explain=False).verdict in (Verdict.CORRECT, Verdict.ROUNDED)
+    wrong = casadi.Function("M", [q], [casadi.substitute(M, q[1], q[0])])
+    assert ARM.grade(M=wrong, explain=False).verdict is Verdict.WRONG
+    with pytest.raises(AnswerError, match="expected a function of"):
+        ARM.grade(M=casadi.Function("M", [], [casadi.SX.eye(2)]))
+
+
+@pytest.mark.parametrize(
+    ("text", "plain", "latex"),
+    [
+        ("(2^3)^q1", "(2^3)^q1", r"(2^{3})^{q_{1}}"),
+        ("2^(3^q1)", "2^(3^q1)", r"2^{3^{q_{1}}}"),
+        ("2*3*q1", "2*3*q1", r"2 \cdot 3 q_{1}"),
+        ("2*1/2", "2*1/2", r"\frac{2 \cdot 1}{2}"),
+        ("cos(q1)^2*l1/2", "cos(q1)^2*l1/2", r"\frac{\cos(q_{1})^{2} l_{1}}{2}"),
+    ],
+)
+def test_formulas_are_typeset_without_double_meaning(text, plain, latex):
+    assert typeset(read_answer(text, Vocabulary(ARM.description))) == (plain, latex)

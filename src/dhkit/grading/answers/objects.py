@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from decimal import Decimal
 from fractions import Fraction
 from itertools import islice
@@ -135,32 +135,38 @@ def _squeeze(rows: list[Any]) -> list[Any]:
 
 # CasADi
 
+_NUMBERED = re.compile(r"(\w*?)_(\d{1,4})", re.ASCII)
+"""Name of a numbered symbol, such as q_0 of SX.sym("q", 2)."""
+
 
 def _casadi_entries(value: Any, n: int) -> Any:
     import casadi
 
     if isinstance(value, casadi.Function):
-        if value.n_in() > len(_STATES) or value.n_out() != 1:
+        if not 1 <= value.n_in() <= len(_STATES) or value.n_out() != 1:
             raise AnswerError(f"{value.name()}: expected a function of (q), (q, qd) or (q, qd, qdd) with one result")
         try:
-            value = value(*(casadi.SX.sym(name, n) for name in _STATES[: value.n_in()]))
+            states = [[casadi.SX.sym(f"{name}{i}") for i in range(1, n + 1)] for name in _STATES[: value.n_in()]]
+            value = value(*(casadi.vertcat(*state) for state in states))
         except RuntimeError as error:
             raise AnswerError(f"{value.name()}: {str(error).splitlines()[-1][:200]}") from None
     if isinstance(value, casadi.DM):
         return _squeeze(value.full().tolist())
     if not isinstance(value, casadi.SX):
         raise AnswerError(f"found casadi.{type(value).__name__}; expected SX, DM or a Function that takes SX")
-    rows = [[_CasadiScalar(value[i, j]) for j in range(value.shape[1])] for i in range(value.shape[0])]
+    names = frozenset(symbol.name() for symbol in casadi.symvar(value))
+    rows = [[_CasadiScalar(value[i, j], names) for j in range(value.shape[1])] for i in range(value.shape[0])]
     return rows[0][0] if value.shape == (1, 1) else _squeeze(rows)
 
 
 class _CasadiScalar:
-    """A CasADi scalar, still unread."""
+    """A CasADi scalar, still unread, with the names of all symbols of the answer that it is an entry of."""
 
-    def __init__(self, scalar: Any) -> None:
+    def __init__(self, scalar: Any, names: frozenset[str]) -> None:
         import casadi
 
         self.scalar = scalar
+        self.names = names
         self.nodes = int(casadi.n_nodes(scalar))
         is_short = self.nodes <= BOUNDS.shown_casadi_nodes
         self.text = (
@@ -175,7 +181,7 @@ class _CasadiScalar:
         if self.nodes > BOUNDS.object_nodes:
             raise AnswerError(f"{self.text}; expected at most {BOUNDS.object_nodes}")
         symbols = casadi.symvar(self.scalar)
-        inputs = [read_answer(name, vocabulary) for name in _counted_from_one([x.name() for x in symbols])]
+        inputs = [read_answer(_counted_from_one(x.name(), self.names, vocabulary), vocabulary) for x in symbols]
         try:
             inside = {"x": casadi.SX(casadi.vertcat(*symbols))} if symbols else {}
             graph = Graph.of("answer", inside, {"y": self.scalar})
@@ -188,14 +194,31 @@ class _CasadiScalar:
         return trees[graph.results[0][0]]
 
 
-def _counted_from_one(names: Sequence[str]) -> list[str]:
-    """Return names whose numbers begin with 1: SX.sym("q", 2) has q_0 and q_1."""
-    matches = [re.fullmatch(r"(\w*?)_(\d+)", name) for name in names]
-    from_zero = {match[1] for match in matches if match and match[2] == "0"}
-    return [
-        f"{match[1]}{int(match[2]) + 1}" if match and match[1] in from_zero else name
-        for name, match in zip(names, matches, strict=True)
-    ]
+def _counted_from_one(name: str, names: Collection[str], vocabulary: Vocabulary) -> str:
+    """Return a symbol's name with a number that counts from 1.
+
+    The entries of ``SX.sym("q", 2)`` are called q_0 and q_1. A number counts from 0 if the answer has a symbol q_0, and
+    from 1 if it has q_n of an arm of n joints.
+
+    Raises
+    ------
+    AnswerError
+        A joint's variable that may count from 0 or from 1.
+    """
+    match = _NUMBERED.fullmatch(name)
+    if match is None:
+        return name
+    prefix, number = match[1], int(match[2])
+    numbers = {int(other[2]) for other in map(_NUMBERED.fullmatch, names) if other and other[1] == prefix}
+    if 0 in numbers:
+        return f"{prefix}{number + 1}"
+    n = len(vocabulary.kinds)
+    if number < n and n not in numbers and vocabulary.is_state(name):
+        raise AnswerError(
+            f"{name} may be joint {number} or, as an entry of SX.sym({prefix!r}, {n}), joint {number + 1}: expected "
+            f"symbols named {prefix}1 to {prefix}{n}"
+        )
+    return name
 
 
 _TREES: dict[str, Callable[..., Tree]] = {

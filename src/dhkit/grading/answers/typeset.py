@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from functools import reduce
 from typing import NamedTuple
 
 from dhkit.expressions.syntax import Call, Name, Number, Power, Tree
@@ -20,6 +21,7 @@ _LATEX_MARKS = {"qdd": r"\ddot{q}", "qd": r"\dot{q}", "q": "q"}
 _SUM = 0
 _PRODUCT = 1
 _POWER = 2
+_ATOM = 3
 """Binding strengths of operations: a weaker one stands in brackets inside a stronger one."""
 
 
@@ -59,7 +61,7 @@ def typeset_equations(equations: Sequence[tuple[Tree, Tree]]) -> tuple[str, str]
 
 
 class _Text(NamedTuple):
-    """A part of a formula as text, and how tightly its operation binds: _SUM, _PRODUCT or _POWER."""
+    """A part of a formula as text, and how tightly its operation binds: _SUM, _PRODUCT, _POWER or _ATOM."""
 
     text: str
     level: int
@@ -86,18 +88,18 @@ class _Writer(Algebra[_Text]):
         self._write_power = write_power
 
     def number(self, tree: Number) -> _Text:
-        return _Text(tree.text, _POWER)
+        return _Text(tree.text, _ATOM)
 
     def name(self, tree: Name) -> _Text:
-        return _Text(self._write_name(tree.text), _POWER)
+        return _Text(self._write_name(tree.text), _ATOM)
 
     def call(self, tree: Call) -> _Text:
-        return _Text(self._write_call(tree.function, [self.of(one).text for one in tree.arguments]), _POWER)
+        return _Text(self._write_call(tree.function, [self.of(one).text for one in tree.arguments]), _ATOM)
 
     def power(self, tree: Power) -> _Text:
         base = self.of(tree.base)
         exponent = self.of(tree.exponent)
-        return _Text(self._write_power(base.inside(_POWER), exponent.inside(_POWER)), _POWER)
+        return _Text(self._write_power(base.inside(_ATOM), exponent.inside(_ATOM)), _POWER)
 
     def product(self, factors: Sequence[tuple[bool, _Text]]) -> _Text:
         return _Text(self._write_product([(is_factor, one.inside(_PRODUCT)) for is_factor, one in factors]), _PRODUCT)
@@ -137,16 +139,17 @@ def _latex_call(function: str, arguments: Sequence[str]) -> str:
 
 
 def _latex_product(factors: Sequence[tuple[bool, str]]) -> str:
-    """Write a product from left to right: what follows a division is a factor of the fraction."""
+    """Write a product from left to right: a factor after a division stands beside the fraction, a/b*c."""
     text = ""
     above: list[str] = []
     for multiplied, factor in factors:
         if multiplied:
             above.append(factor)
         else:
-            text = rf"\frac{{{_join(text, ' '.join(above) or '1')}}}{{{factor}}}"
+            numerator = reduce(_join, above, text) or "1"
+            text = rf"\frac{{{numerator}}}{{{factor}}}"
             above = []
-    return _join(text, " ".join(above))
+    return reduce(_join, above, text)
 
 
 def _join(left: str, right: str) -> str:

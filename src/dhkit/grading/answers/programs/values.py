@@ -459,11 +459,11 @@ def _of_two_matrices(left: Matrix, sign: str, right: Matrix, power: str) -> Valu
 
 
 def _power_of_matrix(base: Matrix, exponent: Scalar, power: str) -> Value:
-    count = int(exponent.number or 0)
-    if count != exponent.number or not 1 <= count <= BOUNDS.matrix_power:
+    count = exponent.number
+    if count is None or count not in range(1, BOUNDS.matrix_power + 1):
         raise UnreadError("a power of a matrix that is not a small whole number")
     result: Value = base
-    for _ in range(count - 1):
+    for _ in range(int(count) - 1):
         result = calculated(result, "@", base, power)
     return result
 
