@@ -148,7 +148,7 @@ class Phrases:
         sign = 1
         texts = []
         for factor in choice.factors:
-            if self._is_number(factor):
+            if is_number(factor):
                 (number,) = factor.terms.values()
                 sign *= -1 if number < 0 else 1
             elif len(factor):
@@ -157,14 +157,6 @@ class Phrases:
         if len(texts) == 1:
             return f"{first} where {texts[0]} > 0, else {second}"
         return f"{first} where {' and '.join(texts)} have the same sign, else {second}"
-
-    @staticmethod
-    def _is_number(element: Element) -> bool:
-        """Return whether an element is a number other than 0."""
-        if len(element) != 1:
-            return False
-        (monomial,) = element.terms
-        return not any(monomial)
 
     def _letters(self, text: str) -> str:
         """Return an expression in letters in this notation."""
@@ -189,6 +181,14 @@ class Phrases:
     def constants(self, expression: object) -> str:
         """Return an expression of the file's parameters."""
         return self._printer.expression(expression).replace("\n", "")  # type: ignore[arg-type]
+
+
+def is_number(element: Element) -> bool:
+    """Return whether an element is a number other than 0."""
+    if len(element) != 1:
+        return False
+    (monomial,) = element.terms
+    return not any(monomial)
 
 
 def phi_label(derivation: InverseDerivation) -> str:

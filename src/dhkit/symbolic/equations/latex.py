@@ -184,8 +184,9 @@ def _matrix(quantity: Quantity) -> str:
     cells = np.empty(table.shape, dtype=object)
     symbols = np.empty(table.shape, dtype=int)
     for place, element in np.ndenumerate(table):
-        cells[place] = latex_text(element)
-        symbols[place] = _symbols(cells[place])
+        cell = latex_text(element)
+        cells[place] = cell
+        symbols[place] = _symbols(cell)
 
     head = _WHOLE.get(quantity.name) or _HEADS.get(quantity.name) or _head(quantity.name)
     width_of_columns = int(symbols.max(axis=0).sum())
