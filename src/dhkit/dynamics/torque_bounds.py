@@ -94,7 +94,7 @@ def torque_derivative_bounds(description: Description, motion: Array) -> Array:
         angular_momentum = _product(_rotating_inertia(numbers.inertia[i], w), w)
         moments.append(angular_momentum[1:])
 
-    # Torque at joint j, over the links i >= j: z . sum of forces (prismatic), or z . sum of (moments + levers x forces).
+    # Torque at joint j: z . sum of forces (prismatic), or z . sum of (moments + levers x forces), over links i >= j.
     bounds = np.zeros((K, n))
     for j in range(n):
         if numbers.prismatic[j]:
