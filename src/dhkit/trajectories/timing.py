@@ -14,8 +14,10 @@ from dhkit.trajectories.limits import Limits
 from dhkit.trajectories.slowdown import Torques, least_slowdown, require_inside
 from dhkit.trajectories.trajectory import Trajectory
 
-_MIN_DURATION, _MAX_DURATION = 1e-6, 1e6
-"""Range of durations, s; others are typing errors, and their powers leave the range of doubles."""
+_MIN_DURATION = 1e-6
+"""Smallest duration, s; shorter ones are typing errors, and their powers leave the range of doubles."""
+_MAX_DURATION = 1e6
+"""Largest duration, s, for the same reasons."""
 _DURATION_SLACK = 1e-9
 """Share by which rounding may make a duration shorter than the limits allow."""
 
