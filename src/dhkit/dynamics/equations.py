@@ -22,9 +22,9 @@ def mass_matrix(description: Description, q: ArrayLike, out: Array | None = None
     q
         Joint values, shape (..., n), rad and m; angles, and sums of those of parallel joints, up to 1e6 rad.
     out
-        Where to write, shape (..., n, n), float64, C-contiguous.
+        Array that receives the result, shape (..., n, n), float64, C-contiguous.
     threads
-        How many threads share a large batch.
+        Number of threads that share a large batch.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def mass_matrix(description: Description, q: ArrayLike, out: Array | None = None
 def coriolis_matrix(
     description: Description, q: ArrayLike, qd: ArrayLike, out: Array | None = None, threads: int = 1
 ) -> Array:
-    """Return the Coriolis matrix C(q, qd) by Christoffel symbols, shape (..., n, n): Mdot - 2 C is skew-symmetric.
+    """Return the Coriolis matrix C(q, qd) by Christoffel symbols, shape (..., n, n): dM/dt - 2 C is skew-symmetric.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def coriolis_matrix(
 
 @takes_robot
 def gravity_torque(description: Description, q: ArrayLike, out: Array | None = None, threads: int = 1) -> Array:
-    """Return g(q), shape (..., n), N m and N: what holds the arm at rest; arguments as for :func:`mass_matrix`."""
+    """Return g(q), shape (..., n), N m and N: torques that hold the arm; arguments as for :func:`mass_matrix`."""
     return evaluate("gravity_torque", description, {"q": q}, (description.n,), out, threads)
 
 
@@ -99,9 +99,9 @@ def inverse_dynamics(
     friction
         True for dry friction as a step, 0 at rest; ``Friction(width=...)`` for a smooth one.
     out
-        Where to write, shape (..., n), float64, C-contiguous.
+        Array that receives the result, shape (..., n), float64, C-contiguous.
     threads
-        How many threads share a large batch.
+        Number of threads that share a large batch.
 
     Returns
     -------
@@ -116,10 +116,13 @@ def inverse_dynamics(
         An argument of another shape, or not numeric; ``out`` does not fit.
     """
     load = external_torque(description, q, qd, wrench, friction, threads)
+    states = {"q": q, "qd": qd, "qdd": qdd}
     if load is None:
-        return evaluate("inverse_dynamics", description, {"q": q, "qd": qd, "qdd": qdd}, (description.n,), out, threads)
-    start = joint_array(description, q)
-    start = np.broadcast_to(start, np.broadcast_shapes(start.shape, load.shape))
-    tau = evaluate("inverse_dynamics", description, {"q": start, "qd": qd, "qdd": qdd}, load.shape[-1:], out, threads)
+        return evaluate("inverse_dynamics", description, states, (description.n,), out, threads)
+
+    # The load may have batch axes (of the wrench) that the states lack.
+    q = joint_array(description, q)
+    states["q"] = np.broadcast_to(q, np.broadcast_shapes(q.shape, load.shape))
+    tau = evaluate("inverse_dynamics", description, states, load.shape[-1:], out, threads)
     tau -= load
     return tau

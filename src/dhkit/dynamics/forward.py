@@ -1,4 +1,4 @@
-"""Forward dynamics: how an arm accelerates."""
+"""Forward dynamics: the accelerations that torques cause."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ def forward_dynamics(
     Returns
     -------
     Array
-        Shape (..., n), rad/s^2 and m/s^2; NaN where an input is not finite, or M is singular at this state, of which
-        the log tells.
+        Shape (..., n), rad/s^2 and m/s^2; NaN where an input is not finite, or M is singular at this state; the latter
+        is logged as a warning.
 
     Raises
     ------
@@ -56,12 +56,15 @@ def forward_dynamics(
         An argument of another shape, or not numeric; ``out`` does not fit.
     """
     load = external_torque(description, q, qd, wrench, friction, threads)
-    q, qd, tau = (joint_array(description, array, name) for array, name in ((q, "q"), (qd, "qd"), (tau, "tau")))
+    q = joint_array(description, q, "q")
+    qd = joint_array(description, qd, "qd")
+    tau = joint_array(description, tau, "tau")
     if out is not None and np.may_share_memory(out, q):
         q = q.copy()  # out= may overwrite q, which is needed to explain a missing acceleration
     drive = tau if load is None else tau + load
     states = {"q": q, "qd": qd, "tau": drive}
     qdd = evaluate("forward_dynamics", description, states, (description.n,), out, threads)
+
     # The sum finds a NaN in one pass; only then its cause is looked for.
     if qdd.size and not np.isfinite(qdd.sum()):
         _explain(description, q, qdd)
@@ -75,21 +78,26 @@ def require_inertia(description: Description) -> None:
     Raises
     ------
     DescriptionError
-        A link without a body; joints that carry no inertia at any state, or couplings that are too large: names them,
-        and what would help.
+        A link without a body; joints that carry no inertia at any state, or couplings that are too large. The message
+        names them, and a remedy.
     """
     q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SINGULAR_SAMPLES, description.n))
     M = mass_matrix(description, q)
-    if description.couplings and (np.linalg.eigvalsh(M)[:, 0] < -SINGULAR * np.abs(M).max(axis=(1, 2))).any():
-        pairs = (coupling.joints for coupling in description.couplings)
-        listed = ", ".join(f"joints {i} and {j}" for i, j in pairs)
-        raise DescriptionError(
-            f"{description.name}: the mass matrix is not positive definite: the coupling of {listed} is too large for "
-            "the inertia of links and drives"
-        )
-    everywhere = _failing(M)
-    if np.all(everywhere >= 0):
-        names = _named(description, np.unique(everywhere))
+
+    if description.couplings:
+        smallest_eigenvalue = np.linalg.eigvalsh(M)[:, 0]
+        rounding = SINGULAR * np.abs(M).max(axis=(1, 2))
+        if (smallest_eigenvalue < -rounding).any():
+            pairs = [coupling.joints for coupling in description.couplings]
+            listed = ", ".join(f"joints {i} and {j}" for i, j in pairs)
+            raise DescriptionError(
+                f"{description.name}: the mass matrix is not positive definite: the coupling of {listed} is too large "
+                "for the inertia of links and drives"
+            )
+
+    joints = _joints_without_inertia(M)
+    if np.all(joints >= 0):
+        names = _named(description, np.unique(joints))
         raise DescriptionError(
             f"{description.name}: the mass matrix is singular: {names} no inertia; give the links behind a body with "
             "inertia, or the drive a rotor inertia"
@@ -100,7 +108,8 @@ def _explain(description: Description, q: Array, qdd: Array) -> None:
     """Raise an error or log a warning where M is singular; other NaN come from states that are not finite."""
     require_inertia(description)
     lost = np.isnan(qdd).any(axis=-1)
-    joints = _failing(mass_matrix(description, np.broadcast_to(q, qdd.shape)[lost]))
+    M = mass_matrix(description, np.broadcast_to(q, qdd.shape)[lost])
+    joints = _joints_without_inertia(M)
     if np.all(joints < 0):
         return
     log.warning(
@@ -112,20 +121,26 @@ def _explain(description: Description, q: Array, qdd: Array) -> None:
     )
 
 
-def _failing(M: Array) -> Array:
-    """Return the last joint without inertia for each matrix (N, n, n), as ``solve_for_acceleration``; -1: none."""
+def _joints_without_inertia(M: Array) -> Array:
+    """Return the last joint, from 0, without inertia for each matrix (N, n, n), shape (N,); -1 if there is none.
+
+    The elimination and its tolerance are those of ``solve_for_acceleration``.
+    """
     A = M.copy()
-    least = SINGULAR * np.diagonal(M, axis1=-2, axis2=-1).max(axis=-1)
-    failing = np.full(len(M), -1)
+    smallest_pivot = SINGULAR * np.diagonal(M, axis1=-2, axis2=-1).max(axis=-1)
+    joints = np.full(len(M), -1)
     for k in reversed(range(M.shape[-1])):
         pivot = A[:, k, k].copy()
-        singular = (pivot <= least) & (failing < 0)
-        failing[singular] = k
-        with np.errstate(all="ignore"):  # results after a singular pivot are not used
+        is_singular = (pivot <= smallest_pivot) & (joints < 0)
+        joints[is_singular] = k
+        # A_ij <- A_ij - A_ik A_kj / A_kk; results after a singular pivot are not used.
+        with np.errstate(all="ignore"):
             A -= A[:, :, k, None] * A[:, None, k, :] / pivot[:, None, None]
-    return failing
+    return joints
 
 
 def _named(description: Description, joints: Array) -> str:
+    """Return the subject and verb of a sentence on joints, from 0, that carry something."""
     names = [f"{i + 1} ({description.joints[i].name})" for i in joints]
-    return f"joint{'s' * (len(names) > 1)} {', '.join(names)} {'carry' if len(names) > 1 else 'carries'}"
+    listed = ", ".join(names)
+    return f"joint {listed} carries" if len(names) == 1 else f"joints {listed} carry"

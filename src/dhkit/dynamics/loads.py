@@ -38,7 +38,7 @@ def friction_torque(
     qd
         Joint rates, shape (..., n), rad/s and m/s.
     friction
-        How dry friction changes with the direction of motion: a step unless given, 0 at rest.
+        Model of dry friction near rest: a step unless given, 0 at rest.
     out, threads
         As for :func:`dhkit.dynamics.mass_matrix`.
 
@@ -69,7 +69,7 @@ def wrench_torque(description: Description, q: ArrayLike, wrench: ArrayLike, thr
     q
         Joint values, shape (..., n), rad and m.
     wrench
-        Shape (..., 6): force (N) then moment (N m) that the environment applies at the tool's origin, world axes.
+        Force (N), then moment (N m), that the environment applies at the tool's origin, world axes, shape (..., 6).
     threads
         As for :func:`dhkit.dynamics.mass_matrix`.
 
@@ -101,11 +101,11 @@ def external_torque(
         As for :func:`friction_torque` and :func:`wrench_torque`; ``friction`` is neither a bool nor a Friction.
     """
     model = Friction.chosen(friction)
-    push = None if wrench is None else wrench_torque(description, q, wrench, threads)
+    of_wrench = None if wrench is None else wrench_torque(description, q, wrench, threads)
     if model is None:
-        return push
-    loss = friction_torque(description, qd, model, threads=threads)
-    return -loss if push is None else push - loss
+        return of_wrench
+    of_friction = friction_torque(description, qd, model, threads=threads)
+    return -of_friction if of_wrench is None else of_wrench - of_friction
 
 
 def friction_kernel(n: int, smooth: bool) -> Kernel:
@@ -122,6 +122,7 @@ def wrench_kernel(description: Description) -> tuple[Kernel, Array]:
 
 
 def _friction_graph(name: str, n: int, smooth: bool) -> Graph:
+    """Return the program of :func:`friction_torque`."""
     parameters = joint_symbols("parameters", 3 * n + 1)
     qd = joint_symbols("qd", n)
     torque = friction_expression(qd, parameters, smooth=smooth)
@@ -129,9 +130,9 @@ def _friction_graph(name: str, n: int, smooth: bool) -> Graph:
 
 
 def _wrench_graph(description: Description) -> Graph:
+    """Return the program of :func:`wrench_torque`."""
     table, parameters = SymbolicTable.parametric(description)
     q = joint_symbols("q", description.n)
     wrench = joint_symbols("wrench", 6)
-    return Graph.of(
-        "wrench_torque", {"parameters": parameters, "q": q, "wrench": wrench}, {"tau": jacobian(table, q).T @ wrench}
-    )
+    tau = jacobian(table, q).T @ wrench
+    return Graph.of("wrench_torque", {"parameters": parameters, "q": q, "wrench": wrench}, {"tau": tau})

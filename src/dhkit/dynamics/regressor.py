@@ -13,7 +13,7 @@ from dhkit.description.frames import carrying, world_to_frames
 def inertial_parameters(description: Description) -> Array:
     """Return the links' inertial parameters, shape (10 n,), that :func:`regressor` is to be multiplied by.
 
-    Of each link its mass, kg, first moments m c, kg m, and second moments xx, yy, zz, xy, yz, xz about its DH frame's
+    Ten for each link: mass, kg, first moments m c, kg m, and second moments xx, yy, zz, xy, yz, xz about its DH frame's
     origin, kg m^2, in the axes of that frame: m2, rx2, ry2, rz2, Ixx2, Iyy2, Izz2, Ixy2, Iyz2, Ixz2.
     """
     return description.numbers.inertial_parameters.ravel()
@@ -44,59 +44,71 @@ def regressor(description: Description, q: ArrayLike, qd: ArrayLike, qdd: ArrayL
         An argument of another shape, or not numeric.
     """
     n = description.n
-    states = [joint_array(description, x, name) for x, name in ((q, "q"), (qd, "qd"), (qdd, "qdd"))]
-    q, qd, qdd = np.broadcast_arrays(*states)
-    T = world_to_frames(description, q)
-    frames = np.moveaxis(T, -3, 0)
-    carriers = carrying(description.convention, frames)
     prismatic = description.numbers.prismatic
-    omega, rate = np.zeros((2, *q.shape[:-1], 3))
-    # Gravity acts like an acceleration of the base upwards.
-    a = np.broadcast_to(-description.numbers.gravity, omega.shape)
+    q, qd, qdd = np.broadcast_arrays(
+        joint_array(description, q, "q"), joint_array(description, qd, "qd"), joint_array(description, qdd, "qdd")
+    )
+    frames = np.moveaxis(world_to_frames(description, q), -3, 0)
+    origins = frames[..., :3, 3]
+    # The frames whose z axis and origin lie on the joints' axes.
+    carriers = carrying(description.convention, frames)
+
+    # Everything is in world axes. Gravity acts like an acceleration of the base upwards.
+    w, wd = np.zeros((2, *q.shape[:-1], 3))
+    a = np.broadcast_to(-description.numbers.gravity, w.shape)
     Y = np.zeros((*q.shape, 10 * n))
     for i in range(n):
-        axis = carriers[i][..., :3, 2]
-        at = carriers[i][..., :3, 3]
-        lever = frames[i + 1][..., :3, 3] - frames[i][..., :3, 3]
-        v, dv = (x[..., i, None] for x in (qd, qdd))
+        z = carriers[i][..., :3, 2]
+        on_axis = carriers[i][..., :3, 3]
+        v = qd[..., i, None]
+        vd = qdd[..., i, None]
         if prismatic[i]:
-            a = a + _relative_acceleration(omega, rate, lever) + 2 * v * np.cross(omega, axis) + dv * axis
+            # a_i = a_(i-1) + wd x r + w x (w x r) + 2 w x z qd + z qdd
+            lever = origins[i + 1] - origins[i]
+            a = a + _relative_acceleration(w, wd, lever) + 2 * v * np.cross(w, z) + vd * z
         else:
-            # The joint's axis passes through a point of the link before; the link's own frame turns about it.
-            a = a + _relative_acceleration(omega, rate, at - frames[i][..., :3, 3])
-            rate = rate + dv * axis + v * np.cross(omega, axis)
-            omega = omega + v * axis
-            a = a + _relative_acceleration(omega, rate, frames[i + 1][..., :3, 3] - at)
-        force, moment = _force_and_moment(frames[i + 1][..., :3, :3], omega, rate, a)
+            # To a point on the axis with the link before, then on to the origin with the link itself:
+            # wd_i = wd_(i-1) + z qdd + w_(i-1) x z qd,  w_i = w_(i-1) + z qd
+            a = a + _relative_acceleration(w, wd, on_axis - origins[i])
+            wd = wd + vd * z + v * np.cross(w, z)
+            w = w + v * z
+            a = a + _relative_acceleration(w, wd, origins[i + 1] - on_axis)
+
+        # The torque at joint j is the component along its axis of the force, or of the moment about a point on it.
+        force, moment = _force_and_moment(frames[i + 1][..., :3, :3], w, wd, a)
         for j in range(i + 1):
-            # Joint j feels z . f if prismatic, z . (moment + (o_i - p) x f) if revolute, o_i the link's origin.
             z = carriers[j][..., :3, 2]
-            p = carriers[j][..., :3, 3]
             effort = force
             if not prismatic[j]:
-                arm = frames[i + 1][..., :3, 3] - p
-                effort = moment + np.cross(arm[..., None], force, axisa=-2, axisb=-2, axisc=-2)
+                lever = origins[i + 1] - carriers[j][..., :3, 3]
+                effort = moment + np.cross(lever[..., None], force, axisa=-2, axisb=-2, axisc=-2)
             Y[..., j, 10 * i : 10 * i + 10] = np.einsum("...k,...kp->...p", z, effort)
     Y[~np.isfinite(q + qd + qdd).all(axis=-1)] = np.nan
     return Y
 
 
-def _relative_acceleration(omega: Array, rate: Array, lever: Array) -> Array:
-    """Return the acceleration of a point of a link relative to another, which is at -``lever`` from it."""
-    return np.cross(rate, lever) + np.cross(omega, np.cross(omega, lever))
+def _relative_acceleration(w: Array, wd: Array, r: Array) -> Array:
+    """Return the acceleration of a point at r from another point of a link: wd x r + w x (w x r)."""
+    return np.cross(wd, r) + np.cross(w, np.cross(w, r))
 
 
-def _force_and_moment(R: Array, omega: Array, rate: Array, a: Array) -> tuple[Array, Array]:
-    """Return a link's force and moment about its frame's origin, world axes, as matrices (..., 3, 10)."""
-    # In the link's axes, with mass m, first moment h = m c and second moments I about the origin:
-    #     f = m a + ([w'] + [w]^2) h,    n = -[a] h + I w' + [w] I w.
-    w, dw, acceleration = (np.einsum("...ji,...j->...i", R, x) for x in (omega, rate, a))
+def _force_and_moment(R: Array, w: Array, wd: Array, a: Array) -> tuple[Array, Array]:
+    """Return a link's force and moment about its frame's origin, world axes, as matrices (..., 3, 10).
+
+    They are multiplied by mass, first moments and second moments in the link's axes, whose rotation is R.
+    """
+    # R^T: in the axes of the link.
+    w = np.einsum("...ji,...j->...i", R, w)
+    wd = np.einsum("...ji,...j->...i", R, wd)
+    a = np.einsum("...ji,...j->...i", R, a)
+
+    # Force m a + ([wd]x + [w]x [w]x) m c, moment -[a]x m c + I wd + [w]x I w
     force, moment = np.zeros((2, *w.shape, 10))
     W = _cross_matrix(w)
-    force[..., :, 0] = acceleration
-    force[..., :, 1:4] = _cross_matrix(dw) + W @ W
-    moment[..., :, 1:4] = -_cross_matrix(acceleration)
-    moment[..., :, 4:] = _tensor_times(dw) + W @ _tensor_times(w)
+    force[..., :, 0] = a
+    force[..., :, 1:4] = _cross_matrix(wd) + W @ W
+    moment[..., :, 1:4] = -_cross_matrix(a)
+    moment[..., :, 4:] = _tensor_times(wd) + W @ _tensor_times(w)
     return R @ force, R @ moment
 
 

@@ -27,8 +27,8 @@ import numpy as np
 
 from dhkit.description import Array, Convention, Description, Numbers
 
-_FRICTION_FACTORS = 1.0, 3.0, 12.0, 60.0
-"""The factors c_k of smooth dry friction."""
+_FRICTION_FACTORS = (1.0, 3.0, 12.0, 60.0)
+"""The factors c_1 ... c_4 of smooth dry friction."""
 
 
 def torque_derivative_bounds(description: Description, motion: Array) -> Array:
@@ -49,85 +49,100 @@ def torque_derivative_bounds(description: Description, motion: Array) -> Array:
     """
     numbers = description.numbers
     n = description.n
-    orders = len(motion) - 1
     K = motion.shape[1]
-    of_torques = orders - 1  # lengths of jets: of torques, accelerations and forces
+
+    # Lengths of jets: positions have all orders of the motion, velocities one less, accelerations and forces two less.
+    of_positions = len(motion)
+    of_velocities = len(motion) - 1
+    of_forces = len(motion) - 2
+
     # Axis i is fixed in link i - 1. In the standard convention the vector from axis i to axis i + 1 is fixed in link i,
     # in the modified one the vector from axis i - 1 to axis i is fixed in link i - 1.
     is_standard = description.convention is Convention.STANDARD
-    spin = np.zeros((orders, K))  # jet of the angular velocity of the link
-    fixed = _fixed_in(spin)
-    axes = []
-    spans = []
-    coms = []
-    positions = np.zeros((orders + 1, K))  # jet of the sum of vectors from the base to the link's frame
-    forces = []
-    moments = []
+
+    # From the base to the last link: jets of motion, of forces and of moments about centres of mass.
+    w = np.zeros((of_velocities, K))  # angular velocity of the link
+    fixed = _fixed_in(w)  # a unit vector that is fixed in the link
+    position = np.zeros((of_positions, K))  # sum of the vectors from the base to the link's frame
+    axes: list[Array] = []
+    spans: list[Array] = []
+    coms: list[Array] = []
+    forces: list[Array] = []
+    moments: list[Array] = []
     for i in range(n):
-        before = fixed
-        axes.append(before)
+        axis = fixed
+        axes.append(axis)
         q = motion[:, :, i]
         length = float(np.hypot(numbers.a[i], numbers.d[i]))
         if numbers.prismatic[i]:
-            span = length * before + _product(before, q)
+            # A vector of constant length, and q along the axis.
+            span = length * axis + _product(axis, q)
         else:
-            spin = spin + _product(before[:orders], q[1:])
-            fixed = _fixed_in(spin)
-            span = length * (fixed if is_standard else before)
+            # w_i = w_(i-1) + z qd
+            w = w + _product(axis[:of_velocities], q[1:])
+            fixed = _fixed_in(w)
+            span = length * (fixed if is_standard else axis)
         spans.append(span)
-        positions = positions + span
+        position = position + span
         com = float(np.linalg.norm(numbers.com[i])) * fixed
         coms.append(com)
-        acceleration = (positions + com)[2:]
+
+        # Force m (p'' - g); the moment is the derivative of I w.
+        acceleration = (position + com)[2:]
         acceleration[0] += np.linalg.norm(numbers.gravity)
         forces.append(numbers.mass[i] * acceleration)
-        # The moment is the derivative of I w.
-        moments.append(_product(_rotating_inertia(numbers.inertia[i], spin), spin)[1:])
+        angular_momentum = _product(_rotating_inertia(numbers.inertia[i], w), w)
+        moments.append(angular_momentum[1:])
+
+    # Torque at joint j: z . sum of forces (prismatic), or z . sum of (moments + levers x forces), over links i >= j.
     bounds = np.zeros((K, n))
     for j in range(n):
         if numbers.prismatic[j]:
             load = np.sum(forces[j:], axis=0)
         else:
-            load = np.zeros((of_torques, K))
-            lever = np.zeros((orders + 1, K))
+            load = np.zeros((of_forces, K))
+            lever = np.zeros((of_positions, K))  # from axis j to the link's frame
             for i in range(j, n):
                 if is_standard or i > j:
                     lever = lever + spans[i]
-                load = load + moments[i] + _product((lever + coms[i])[:of_torques], forces[i])
-        bounds[:, j] = _product(axes[j][:of_torques], load)[-1]
+                load = load + moments[i] + _product((lever + coms[i])[:of_forces], forces[i])
+        bounds[:, j] = _product(axes[j][:of_forces], load)[-1]
+
+    # Drives: B qdd
     result: Array = bounds + motion[-1] @ np.abs(numbers.drive_inertia)
     return result
 
 
 def _product(u: Array, v: Array) -> Array:
-    """Return the jet of a product, shape (m, K), from two of them: (u v)^(m) = sum_j C(m, j) u^(j) v^(m - j)."""
-
-    def derivative(m: int) -> Array:
-        return np.asarray(sum(comb(m, j) * u[j] * v[m - j] for j in range(m + 1)))
-
-    return np.stack([derivative(m) for m in range(len(u))])
+    """Return the jet of a product, shape (m, K), from two of them."""
+    return np.stack([_product_rule(u, v, m) for m in range(len(u))])
 
 
-def _fixed_in(spin: Array) -> Array:
+def _product_rule(u: Array | list[Array], v: Array | list[Array], m: int) -> Array:
+    """Return the bound of the m-th derivative of a product, shape (K,): sum of binomial(m, j) |u^(j)| |v^(m-j)|."""
+    total: Array = sum(comb(m, j) * u[j] * v[m - j] for j in range(m + 1))  # type: ignore[assignment]
+    return total
+
+
+def _fixed_in(w: Array) -> Array:
     """Return the jet of a unit vector fixed in a body, one order longer, from that of the angular velocity."""
-    # e' = w x e, so |e^(m + 1)| <= sum_j C(m, j) |w^(j)| |e^(m - j)|.
-    jet = [np.ones(spin.shape[1])]
-    for m in range(len(spin)):
-        jet.append(sum(comb(m, j) * spin[j] * jet[m - j] for j in range(m + 1)))
+    # v' = w x v, so that v^(m+1) is the m-th derivative of the product of w and v.
+    jet = [np.ones(w.shape[1])]
+    for m in range(len(w)):
+        jet.append(_product_rule(w, jet, m))
     return np.stack(jet)
 
 
-def _rotating_inertia(inertia: Array, spin: Array) -> Array:
+def _rotating_inertia(inertia: Array, w: Array) -> Array:
     """Return the jet of a body's inertia in world axes, in the spectral norm, as long as that of the angular velocity.
 
-    I = c 1 + D with c the mean of the extreme eigenvalues: c 1 does not change, and D' = [w] D - D [w].
+    I = c 1 + D with c the mean of the extreme eigenvalues: c 1 does not change, and D' = [w]x D - D [w]x.
     """
+    # |D'| <= 2 |w| |D|, order by order; |D| is half the difference of the extreme eigenvalues.
     low, *_, high = np.linalg.eigvalsh(inertia)
-
-    # |D^(m + 1)| <= 2 sum_j C(m, j) |w^(j)| |D^(m - j)|, from |D| = (high - low) / 2.
-    jet = [np.full(spin.shape[1], (high - low) / 2)]
-    for m in range(len(spin) - 1):
-        jet.append(2 * sum(comb(m, j) * spin[j] * jet[m - j] for j in range(m + 1)))
+    jet = [np.full(w.shape[1], (high - low) / 2)]
+    for m in range(len(w) - 1):
+        jet.append(2 * _product_rule(w, jet, m))
     result = np.stack(jet)
     result[0] = max(abs(low), abs(high))
     return result
@@ -147,13 +162,14 @@ def dry_friction_bounds(numbers: Numbers, width: float, least_speed: Array, moti
     motion
         Upper bounds of |q|, |q'| ... |q^(5)| at least, shape (6, K, n).
     """
-    # |f^(k)(v)| <= size F_k / (width^k r^(k + 2)) with r = sqrt(1 + (v / width)^2).
-    forwards, backwards = numbers.coulomb.T
-    size = np.abs(forwards - backwards) / 2 + np.abs(forwards + backwards)
+    # Derivatives of friction by the rate: |f_k| = |d^k f / dv^k| <= size c_k / (width^k r^(k+2)), with
+    # size = |c_pos - c_neg| / 2 + 2 |c_pos + c_neg| / 2
+    c_pos, c_neg = numbers.coulomb.T
+    size = np.abs(c_pos - c_neg) / 2 + np.abs(c_pos + c_neg)
     r = np.hypot(1.0, least_speed / width)
-    f1, f2, f3, f4 = (size * _FRICTION_FACTORS[k - 1] / (width**k * r ** (k + 2)) for k in (1, 2, 3, 4))
-    v1, v2, v3, v4 = motion[2:6]
+    f1, f2, f3, f4 = (size * c / (width**k * r ** (k + 2)) for k, c in enumerate(_FRICTION_FACTORS, start=1))
 
-    # d^4 f(v(t)) / dt^4 (Faa di Bruno).
+    # d^4 f(v(t)) / dt^4 = f4 v'^4 + 6 f3 v'^2 v'' + f2 (3 v''^2 + 4 v' v''') + f1 v'''' (Faa di Bruno)
+    v1, v2, v3, v4 = motion[2:6]
     bounds: Array = f4 * v1**4 + 6 * f3 * v1**2 * v2 + f2 * (3 * v2**2 + 4 * v1 * v3) + f1 * v4
     return bounds

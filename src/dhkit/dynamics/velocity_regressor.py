@@ -21,7 +21,8 @@ from dhkit.symbolic import (
 )
 
 _DEPENDENT = 1e-9
-"""A column of unit length depends on earlier ones where less than this remains of it; rounding leaves 1e-14."""
+"""Largest norm that is left of a dependent column of length 1 when its projection on others is subtracted; rounding
+leaves 1e-14."""
 _STATES_PER_JOINT = 20
 """Number of random states per joint for the rank: twice as many equations as parameters."""
 
@@ -51,9 +52,9 @@ def velocity_regressor(
     qd_r, qdd_r
         Reference rates and accelerations, likewise.
     out
-        Where to write, shape (..., n, 10 n), float64, C-contiguous.
+        Array that receives the result, shape (..., n, 10 n), float64, C-contiguous.
     threads
-        How many threads share a large batch.
+        Number of threads that share a large batch.
 
     Returns
     -------
@@ -82,6 +83,7 @@ def _velocity_regressor_kernel(description: Description) -> tuple[Kernel, Array]
 
 
 def _graph(description: Description) -> Graph:
+    """Return the program of :func:`velocity_regressor`; gravity in frame 0 is the last parameter."""
     import casadi
 
     table, parameters = SymbolicTable.parametric(description)
@@ -96,13 +98,13 @@ class ParameterGrouping:
     """Base parameters in numbers: the fewest combinations of inertial parameters that the torques depend on.
 
     With theta of :func:`dhkit.dynamics.inertial_parameters`, Y theta = Y[..., columns] @ (matrix @ theta) for every
-    state: base parameter k is entry ``columns[k]`` of theta plus the multiples of others that cannot be told from it.
+    state: base parameter k is entry ``columns[k]`` of theta plus multiples of others that have the same effect.
     """
 
     columns: tuple[int, ...]
     """Indices of independent columns of the regressor, ascending."""
     matrix: Array
-    """Shape (m, 10 n)."""
+    """Base parameters in terms of inertial parameters, shape (m, 10 n)."""
 
     def __len__(self) -> int:
         return len(self.columns)
@@ -137,26 +139,29 @@ def parameter_grouping(description: Description) -> ParameterGrouping:
     states = rng.uniform(-np.pi, np.pi, (3, _STATES_PER_JOINT * n, n))
     A = regressor(description, *states).reshape(-1, 10 * n)
 
-    # Order of the columns: moments from the last link to the first, then masses.
-    links = list(reversed(range(n)))
-    moments = [10 * i + k for i in links for k in range(1, 10)]
-    masses = [10 * i for i in links]
-    order = moments + masses
+    # Moments from the last link to the first, then masses. Column 10 i is the mass of link i, then come its moments.
+    order: list[int] = []
+    for i in reversed(range(n)):
+        order += range(10 * i + 1, 10 * i + 10)
+    order += [10 * i for i in reversed(range(n))]
 
-    # Gram-Schmidt: a column is kept if a part of it is perpendicular to the columns kept before.
-    basis = np.zeros((len(A), 0))
+    # Gram-Schmidt: the columns of Q are an orthonormal basis of the kept columns. The second pass removes the
+    # components along them that rounding left.
+    Q = np.zeros((len(A), 0))
     kept = []
-    floor = _DEPENDENT * np.linalg.norm(A, axis=0).max()
+    smallest = _DEPENDENT * np.linalg.norm(A, axis=0).max()
     for k in order:
         size = np.linalg.norm(A[:, k])
-        if size <= floor:
+        if size <= smallest:
             continue
         rest = A[:, k] / size
-        for _ in range(2):  # the second pass removes what rounding left
-            rest = rest - basis @ (basis.T @ rest)
+        for _ in range(2):
+            rest = rest - Q @ (Q.T @ rest)
         if np.linalg.norm(rest) > _DEPENDENT:
-            basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
+            Q = np.column_stack([Q, rest / np.linalg.norm(rest)])
             kept.append(k)
+
+    # All columns as combinations of the kept ones: A = A[:, columns] matrix
     columns = tuple(sorted(kept))
     matrix, *_ = np.linalg.lstsq(A[:, columns], A, rcond=None)
     return ParameterGrouping(columns, np.asarray(matrix))

@@ -39,18 +39,22 @@ def interpolated(
     t = check_times(times)
     if qd is None and qdd is not None:
         raise ValueError("qdd is given without qd; expected both or neither")
-    arrays = [
-        _rows(description, value, name, len(t))
-        for name, value in (("q", q), ("qd", qd), ("qdd", qdd))
-        if value is not None
-    ]
+    count = len(t)
+    q = _rows(description, q, "q", count)
+    qd = None if qd is None else _rows(description, qd, "qd", count)
+    qdd = None if qdd is None else _rows(description, qdd, "qdd", count)
     t = t - t[0]
-    if len(arrays) == 1:
-        return t, np.moveaxis(CubicSpline(t, arrays[0]).c[::-1], 0, 1)
-    return t, (cubic_hermite if len(arrays) == 2 else quintic_hermite)(t, *arrays)
+
+    if qd is None:
+        # SciPy has the highest power first, in the first axis.
+        return t, np.moveaxis(CubicSpline(t, q).c[::-1], 0, 1)
+    if qdd is None:
+        return t, cubic_hermite(t, q, qd)
+    return t, quintic_hermite(t, q, qd, qdd)
 
 
 def _rows(description: Description, value: ArrayLike, name: str, count: int) -> Array:
+    """Return an argument as an array (count, n) of finite values."""
     array = joint_array(description, value, name)
     if array.shape != (count, description.n):
         raise ValueError(f"{name} has shape {array.shape}; expected ({count}, {description.n})")
@@ -70,25 +74,27 @@ def cubic_hermite(times: Array, q: Array, qd: Array) -> Array:
     q, qd
         Values and derivatives at these times, shape (K+1, m).
     """
-    # With s = (q1 - q0) / h:  c2 = (3 s - 2 v0 - v1) / h,  c3 = (v0 + v1 - 2 s) / h^2.
+    # q_0 + qd_0 u + (3 slope - 2 qd_0 - qd_1) / h u^2 + (qd_0 + qd_1 - 2 slope) / h^2 u^3, on an interval of length h
     h = np.diff(times)[:, None]
     slope = np.diff(q, axis=0) / h
-    c2 = (3 * slope - 2 * qd[:-1] - qd[1:]) / h
-    c3 = (qd[:-1] + qd[1:] - 2 * slope) / h**2
-    return np.stack([q[:-1], qd[:-1], c2, c3], axis=1)
+    qd_0 = qd[:-1]
+    qd_1 = qd[1:]
+    c_2 = (3 * slope - 2 * qd_0 - qd_1) / h
+    c_3 = (qd_0 + qd_1 - 2 * slope) / h**2
+    return np.stack([q[:-1], qd_0, c_2, c_3], axis=1)
 
 
 def quintic_hermite(times: Array, q: Array, qd: Array, qdd: Array) -> Array:
     """Return coefficients (K, 6, m) as :func:`cubic_hermite`, from second derivatives too."""
-    # Differences at the end from the parabola at the beginning, in units of the interval:
-    #     g = q1 - q0 - h v0 - h^2 a0 / 2,    r = h (v1 - v0 - h a0),    b = h^2 (a1 - a0).
+    # The parabola q_0 + qd_0 u + qdd_0 / 2 u^2 and, with x = u / h, x^3 (a + b x + c x^2) such that the sum has the
+    # value, first and second derivative of the end at x = 1. The differences from the parabola there, by x:
     h = np.diff(times)[:, None]
-    gap = np.diff(q, axis=0) - h * qd[:-1] - h**2 * qdd[:-1] / 2
-    rate = h * (qd[1:] - qd[:-1] - h * qdd[:-1])
-    bend = h**2 * (qdd[1:] - qdd[:-1])
+    value = np.diff(q, axis=0) - h * qd[:-1] - h**2 * qdd[:-1] / 2
+    first = h * (qd[1:] - qd[:-1] - h * qdd[:-1])
+    second = h**2 * (qdd[1:] - qdd[:-1])
 
-    # c3 h^3 + c4 h^4 + c5 h^5 = g, and its first and second derivatives, times h and h^2, r and b.
-    c3 = (10 * gap - 4 * rate + bend / 2) / h**3
-    c4 = (-15 * gap + 7 * rate - bend) / h**4
-    c5 = (6 * gap - 3 * rate + bend / 2) / h**5
-    return np.stack([q[:-1], qd[:-1], qdd[:-1] / 2, c3, c4, c5], axis=1)
+    # a + b + c = value,  3 a + 4 b + 5 c = first,  6 a + 12 b + 20 c = second
+    a = 10 * value - 4 * first + second / 2
+    b = -15 * value + 7 * first - second
+    c = 6 * value - 3 * first + second / 2
+    return np.stack([q[:-1], qd[:-1], qdd[:-1] / 2, a / h**3, b / h**4, c / h**5], axis=1)

@@ -18,7 +18,7 @@ _BISECTIONS = 60
 _SAME_BREAK = 1e-12
 """Breaks closer to each other than this share of the duration are merged."""
 _LAW_SLACK = 1e-9
-"""Distance by which rounding may take a time law out of [0, 1], or back."""
+"""Largest distance by which a time law may leave [0, 1], go back or jump: rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,14 +111,19 @@ class JointPath:
             raise ValueError(f"coefficients has shape {rows.shape}; expected (K, p+1)")
         law = Pieces.of(breaks, rows[..., None], 1)
         _check_law(law)
+
+        # Between merged breaks, s(t) is one piece k of the law, and q(s) one piece m of the path.
         merged = self._merged_breaks(law)
         starts = merged[:-1]
         middles = (merged[:-1] + merged[1:]) / 2
         k = np.searchsorted(law.breaks, middles) - 1
+        m = np.searchsorted(self.breaks, law(middles)[..., 0]) - 1
+        m = np.clip(m, 0, len(self.breaks) - 2)
+
+        # Both about the beginning of the piece: s = s_0 + inner(t - t_0), q = outer(s - s_0).
         inner = shift(law.coefficients[k], starts - law.breaks[k])[..., 0]
-        m = np.clip(np.searchsorted(self.breaks, law(middles)[..., 0]) - 1, 0, len(self.breaks) - 2)
         outer = shift(self.coefficients[m], inner[:, 0] - self.breaks[m])
-        inner[:, 0] = 0.0  # the path is expanded about the value of s at the beginning of each piece
+        inner[:, 0] = 0.0
         return Trajectory(self.description, merged, _compose(outer, inner))
 
     def __repr__(self) -> str:
@@ -127,7 +132,7 @@ class JointPath:
 
     def _merged_breaks(self, law: Pieces) -> Array:
         """Return the law's breaks together with the times at which s passes breaks of the path."""
-        # s(t) never falls, so that each break is passed once: its time is found by bisection.
+        # The times of all inner breaks at once: s never goes back.
         low = np.zeros(len(self.breaks) - 2)
         high = np.full(len(self.breaks) - 2, law.end)
         for _ in range(_BISECTIONS):
@@ -136,8 +141,10 @@ class JointPath:
             low = np.where(below, middle, low)
             high = np.where(below, high, middle)
         crossings = (low + high) / 2
+
         gaps = np.abs(crossings[:, None] - law.breaks).min(axis=1, initial=np.inf)
-        merged = np.sort(np.concatenate([law.breaks, crossings[gaps > _SAME_BREAK * law.end]]))
+        new = crossings[gaps > _SAME_BREAK * law.end]
+        merged = np.sort(np.concatenate([law.breaks, new]))
         distinct: Array = merged[np.concatenate([[True], np.diff(merged) > 0])]
         return distinct
 
@@ -148,6 +155,13 @@ def quintic_law() -> tuple[Array, Array]:
 
 
 def _check_law(law: Pieces) -> None:
+    """Check that s(t) goes from 0 to 1, continuously and never back.
+
+    Raises
+    ------
+    ValueError
+        It does not.
+    """
     start = float(law(0.0)[0])
     end = float(law(law.end)[0])
     if max(abs(start), abs(end - 1.0)) > _LAW_SLACK:
@@ -167,20 +181,19 @@ def _compose(outer: Array, inner: Array) -> Array:
     Parameters
     ----------
     outer
-        Shape (K, p+1, n).
+        Coefficients of K polynomials of degree p, shape (K, p+1, n).
     inner
-        Shape (K, r+1).
+        Coefficients of K polynomials of degree r, shape (K, r+1).
     """
-    power = outer.shape[1] - 1
-    step = inner.shape[1] - 1
-    result = np.zeros((len(outer), power * step + 1, outer.shape[2]))
-    result[:, 0] = outer[:, power]
-
-    # result <- inner * result + outer_j, whose degree in u grows by r each time.
-    for j in range(power - 1, -1, -1):
-        degree = (power - 1 - j) * step
+    p = outer.shape[1] - 1
+    r = inner.shape[1] - 1
+    result = np.zeros((len(outer), p * r + 1, outer.shape[2]))
+    result[:, 0] = outer[:, p]
+    for j in range(p - 1, -1, -1):
+        # result <- inner * result + outer_j; the result so far has this degree
+        degree = (p - 1 - j) * r
         product = np.zeros_like(result)
-        for i in range(step + 1):
+        for i in range(r + 1):
             product[:, i : i + degree + 1] += inner[:, i, None, None] * result[:, : degree + 1]
         product[:, 0] += outer[:, j]
         result = product

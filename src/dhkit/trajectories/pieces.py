@@ -21,12 +21,16 @@ _MAX_HALVINGS = 60
 
 
 class Bounds(NamedTuple):
-    """Proved bounds of functions, and where they are nearly reached, shape (m,) each."""
+    """Proved bounds of m functions, and the arguments at which they are nearly reached, shape (m,) each."""
 
     lowest: Array
+    """Lower bounds."""
     at_lowest: Array
+    """Arguments of the lowest values."""
     highest: Array
+    """Upper bounds."""
     at_highest: Array
+    """Arguments of the highest values."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +80,11 @@ class Pieces:
     @cached_property
     def derivative(self) -> Pieces:
         """The first derivative."""
-        powers = np.arange(1, self.coefficients.shape[1])[:, None]
-        falling = self.coefficients[:, 1:] * powers if len(powers) else np.zeros_like(self.coefficients)
-        return Pieces(self.breaks, falling)
+        # d/du sum of c_j u^j = sum of j c_j u^(j-1)
+        j = np.arange(1, self.coefficients.shape[1])[:, None]
+        if not len(j):
+            return Pieces(self.breaks, np.zeros_like(self.coefficients))
+        return Pieces(self.breaks, self.coefficients[:, 1:] * j)
 
     def differentiated(self, order: int) -> Pieces:
         """Return a derivative; order 0 is the function itself."""
@@ -96,6 +102,7 @@ class Pieces:
 
     def on(self, piece: NDArray[np.intp], u: Array) -> Array:
         """Return values, shape (..., m), of given pieces at u after their beginnings, shapes (...)."""
+        # Horner's rule.
         value: Array = self.coefficients[piece, -1] + 0.0 * u[..., None]
         for power in range(self.coefficients.shape[1] - 2, -1, -1):
             value = value * u[..., None] + self.coefficients[piece, power]
@@ -103,9 +110,10 @@ class Pieces:
 
     def backwards(self) -> Pieces:
         """Return f(end - x)."""
-        turned = shift(self.coefficients, np.diff(self.breaks))[::-1]
-        signs = (-1.0) ** np.arange(turned.shape[1])[:, None]
-        return Pieces(self.end - self.breaks[::-1], turned * signs)
+        # Each piece in powers of u from its end, and with -u instead of u.
+        from_end = shift(self.coefficients, np.diff(self.breaks))[::-1]
+        signs = (-1.0) ** np.arange(from_end.shape[1])[:, None]
+        return Pieces(self.end - self.breaks[::-1], from_end * signs)
 
     def divided(self, parts: int) -> Pieces:
         """Return the same function with each piece divided into equal parts."""
@@ -129,7 +137,10 @@ class Pieces:
         """
         p = self.coefficients.shape[1] - 1
         powers = np.diff(self.breaks)[:, None] ** np.arange(p + 1)
-        matrix = np.array([[comb(i, j) / comb(p, j) for j in range(p + 1)] for i in range(p + 1)])
+        matrix = np.zeros((p + 1, p + 1))
+        for i in range(p + 1):
+            for j in range(p + 1):
+                matrix[i, j] = comb(i, j) / comb(p, j)
         return np.asarray(np.einsum("ij,kj,kjm->kim", matrix, powers, self.coefficients))
 
     def bounds(self, tolerance: ArrayLike) -> Bounds:
@@ -138,30 +149,36 @@ class Pieces:
         They are proved: the smallest and largest Bernstein coefficients of pieces that are halved until these are
         within ``tolerance``, shape () or (m,), of values of the function.
         """
-        # The largest of f and of -f.
-        both = self.bernstein
-        # Rounding of the powers' sum, which is what the function's values have too: it matters above degree 12.
+        # Rounding of the powers' sum, which the function's values have too: it matters above degree 12.
         powers = np.diff(self.breaks)[:, None] ** np.arange(self.coefficients.shape[1])
         size = np.einsum("kp,kpm->km", powers, np.abs(self.coefficients)).max(axis=0)
         rounding = self.coefficients.shape[1] * np.finfo(float).eps * size
-        b = np.concatenate([both, -both], axis=2)
-        allowed = np.tile(np.broadcast_to(tolerance, both.shape[2]), 2)
+
+        # The upper bounds of f and of -f, in 2 m columns.
+        of_f = self.bernstein
+        b = np.concatenate([of_f, -of_f], axis=2)
+        columns = b.shape[2]
+        allowed = np.tile(np.broadcast_to(tolerance, of_f.shape[2]), 2)
         begin = self.breaks[:-1]
         width = np.diff(self.breaks)
-        reached = np.full(b.shape[2], -np.inf)
-        places = np.zeros(b.shape[2])
-        bound = np.full(b.shape[2], -np.inf)
+        reached = np.full(columns, -np.inf)  # largest values at ends of pieces so far
+        reached_at = np.zeros(columns)
+        bound = np.full(columns, -np.inf)  # largest hulls of the pieces that are decided
         for _ in range(_MAX_HALVINGS):
-            for values, at in ((b[:, 0], begin), (b[:, -1], begin + width)):
+            # The first and the last Bernstein coefficient are the values at the ends.
+            for values, x in ((b[:, 0], begin), (b[:, -1], begin + width)):
                 k = values.argmax(axis=0)
                 highest = np.take_along_axis(values, k[None], axis=0)[0]
-                places = np.where(highest > reached, at[k], places)
+                reached_at = np.where(highest > reached, x[k], reached_at)
                 reached = np.maximum(reached, highest)
+
+            # A piece is open while its hull exceeds the values reached by more than the tolerance.
             hulls = b.max(axis=1)
             is_open = (hulls > reached + allowed).any(axis=1)
             bound = np.maximum(bound, hulls[~is_open].max(axis=0, initial=-np.inf))
             if not is_open.any():
                 break
+
             b = np.concatenate(_halves(b[is_open]))
             begin = begin[is_open]
             width = width[is_open] / 2
@@ -169,9 +186,10 @@ class Pieces:
             width = np.concatenate([width, width])
         else:
             bound = np.maximum(bound, b.max(axis=(0, 1)))
-        highest, negated = np.split(bound + np.tile(rounding, 2), 2)
-        at_highest, at_lowest = np.split(places, 2)
-        return Bounds(-negated, at_lowest, highest, at_highest)
+
+        highest, negated_lowest = np.split(bound + np.tile(rounding, 2), 2)
+        at_highest, at_lowest = np.split(reached_at, 2)
+        return Bounds(-negated_lowest, at_lowest, highest, at_highest)
 
     def inside(self, points: int) -> tuple[Array, Array]:
         """Return times (K, points) evenly spread over each piece, both its ends included, and values (K, points, m)."""
@@ -213,9 +231,10 @@ def join(first: Pieces, second: Pieces) -> tuple[Array, Array]:
 
 def shift(coefficients: Array, u: Array) -> Array:
     """Return the coefficients (K, p+1, m) of polynomials in x - u instead of x, u of shape (K,)."""
-    degrees = coefficients.shape[1]
-    matrix = np.zeros((len(coefficients), degrees, degrees))
-    for i in range(degrees):
-        for j in range(i, degrees):
+    # With y = x - u: c_j (y + u)^j = sum of c_j binomial(j, i) u^(j-i) y^i
+    count = coefficients.shape[1]
+    matrix = np.zeros((len(coefficients), count, count))
+    for i in range(count):
+        for j in range(i, count):
             matrix[:, i, j] = comb(j, i) * u ** (j - i)
     return np.asarray(matrix @ coefficients)

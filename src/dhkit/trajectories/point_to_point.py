@@ -19,7 +19,7 @@ _GRID = 50
 _FINER_GRID = 15
 """Number of blends that are tried between the neighbours of the best one."""
 _REFINEMENTS = 4
-"""Number of such refinements: the blend is found to 2e-6 of the duration."""
+"""Number of times that the best blend is refined: to 2e-6 of the duration."""
 
 
 @takes_robot
@@ -168,21 +168,20 @@ def _unit(duration: float | None, ends: tuple[ArrayLike | None, ...]) -> float:
 
 
 def _blended(description: Description, q0: Array, q1: Array, blend: float) -> Trajectory:
-    """Return the trapezoidal motion over one second, with blends b at both ends.
-
-    The area under the trapezoid of rates is the way: v (1 - b) = q1 - q0, and the acceleration is v / b.
-    """
-    way = q1 - q0
-    rate = way / (1 - blend)
-    speed_up = np.stack([q0, np.zeros_like(way), rate / (2 * blend)])
-    cruise = np.stack([q0 + rate * blend / 2, rate, np.zeros_like(way)])
-    brake = np.stack([q1 - rate * blend / 2, rate, -rate / (2 * blend)])
+    """Return the motion over one second with blends of ``blend`` seconds."""
+    # Acceleration v / b for b seconds, velocity v, acceleration -v / b for b seconds: v (1 - b) = q1 - q0
+    v = (q1 - q0) / (1 - blend)
+    zero = np.zeros_like(v)
+    speed_up = np.stack([q0, zero, v / (2 * blend)])
+    cruise = np.stack([q0 + v * blend / 2, v, zero])
+    brake = np.stack([q1 - v * blend / 2, v, -v / (2 * blend)])
     if blend == 0.5:
         return Trajectory(description, np.array([0.0, 0.5, 1.0]), np.stack([speed_up, brake]))
     return Trajectory(description, np.array([0.0, blend, 1 - blend, 1.0]), np.stack([speed_up, cruise, brake]))
 
 
 def _best_blend(description: Description, q0: Array, q1: Array, limits: Limits, torques: Torques | None) -> float:
+    """Return the blend, as a share of the duration, with the shortest duration that the limits allow."""
     # The duration may have several minima in the blend: a grid is searched before one is refined.
     low = _MIN_BLEND
     high = 0.5

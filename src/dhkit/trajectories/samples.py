@@ -49,12 +49,14 @@ class Samples:
         return repr_line("Samples", self.description.name, self._summary)
 
     def _repr_html_(self) -> str:
-        units = ["m" if slides else "rad" for slides in self.description.numbers.prismatic]
-        joints = zip(self.description.joints, units, strict=True)
-        headings = ("t [s]", *(f"{joint.name} [{unit}]" for joint, unit in joints))
+        headings = ["t [s]"]
+        for joint, is_prismatic in zip(self.description.joints, self.description.numbers.prismatic, strict=True):
+            headings.append(f"{joint.name} [{'m' if is_prismatic else 'rad'}]")
+
         rows = []
         for t, q in zip(self.times[:_SHOWN_TIMES], self.q[:_SHOWN_TIMES], strict=True):
-            rows.append((f"{t:.4g}", *(f"{x:.4f}" for x in q)))
+            values = [f"{x:.4f}" for x in q]
+            rows.append((f"{t:.4g}", *values))
         caption = f"Samples of {self.description.name}: q, {self._summary}; qd, qdd and tau beside it"
         return html_table(headings, rows, caption, align="r", count=len(self.times))
 

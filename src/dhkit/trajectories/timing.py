@@ -15,9 +15,9 @@ from dhkit.trajectories.slowdown import Torques, least_slowdown, require_inside
 from dhkit.trajectories.trajectory import Trajectory
 
 _MIN_DURATION = 1e-6
-"""Shortest duration, s; a shorter one is a typing error, and its powers leave the range of doubles."""
+"""Smallest duration, s; shorter ones are typing errors, and their powers leave the range of doubles."""
 _MAX_DURATION = 1e6
-"""Longest duration, s, for the same reason."""
+"""Largest duration, s, for the same reasons."""
 _DURATION_SLACK = 1e-9
 """Share by which rounding may make a duration shorter than the limits allow."""
 

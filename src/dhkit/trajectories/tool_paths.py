@@ -72,17 +72,21 @@ class ToolCircle:
     def poses(self, s: Array) -> Array:
         """Return poses, shape (N, 4, 4)."""
         turn = s[:, None] * self.turn
-        return _poses(self.centre + self._radii(s), turn if self.turning else 0.0 * turn, self.T0)
+        tool_turn = turn if self.turning else 0.0 * turn
+        return _poses(self.centre + self._radii(s), tool_turn, self.T0)
 
     def twists(self, s: Array) -> Array:
         """Return twists, shape (N, 6)."""
+        # v = w x r, with w the turn per unit of s
         velocity: Array = np.cross(self.turn, self._radii(s))
-        return np.asarray(np.concatenate([velocity, np.broadcast_to(self.turn * self.turning, velocity.shape)], axis=1))
+        angular = np.broadcast_to(self.turn * self.turning, velocity.shape)
+        return np.asarray(np.concatenate([velocity, angular], axis=1))
 
     def twist_rates(self, s: Array) -> Array:
         """Return the derivatives of the twists, which point towards the axis, shape (N, 6)."""
-        towards = np.cross(self.turn, np.cross(self.turn, self._radii(s)))
-        return np.asarray(np.concatenate([towards, np.zeros_like(towards)], axis=1))
+        # dv/ds = w x (w x r)
+        acceleration = np.cross(self.turn, np.cross(self.turn, self._radii(s)))
+        return np.asarray(np.concatenate([acceleration, np.zeros_like(acceleration)], axis=1))
 
     def __repr__(self) -> str:
         angle = float(np.linalg.norm(self.turn))
@@ -91,7 +95,9 @@ class ToolCircle:
         return repr_line("ToolCircle", summary=f"{angle:.4g} rad of radius {radius:.4g} m, the tool {tool}")
 
     def _radii(self, s: Array) -> Array:
-        radii: Array = np.einsum("kij,j->ki", _rotations(s[:, None] * self.turn), self.T0[:3, 3] - self.centre)
+        """Return vectors from the centre to the tool, shape (N, 3), m."""
+        R = _rotations(s[:, None] * self.turn)
+        radii: Array = np.einsum("kij,j->ki", R, self.T0[:3, 3] - self.centre)
         return radii
 
 
@@ -112,7 +118,8 @@ def tool_line(T0: ArrayLike, T1: ArrayLike) -> ToolLine:
 
     start = one_pose(T0, "T0")
     goal = one_pose(T1, "T1")
-    turn = Rotation.from_matrix(goal[:3, :3] @ start[:3, :3].T).as_rotvec()
+    R = goal[:3, :3] @ start[:3, :3].T
+    turn = Rotation.from_matrix(R).as_rotvec()
     return ToolLine(start, goal[:3, 3] - start[:3, 3], turn)
 
 
@@ -155,6 +162,7 @@ def tool_circle(
 
 
 def _poses(positions: Array, turns: Array, T0: Array) -> Array:
+    """Return poses (N, 4, 4) from positions (N, 3), m, and rotation vectors (N, 3), rad, from T0."""
     T = np.zeros((len(positions), 4, 4))
     T[:, :3, :3] = _rotations(turns) @ T0[:3, :3]
     T[:, :3, 3] = positions
@@ -163,12 +171,14 @@ def _poses(positions: Array, turns: Array, T0: Array) -> Array:
 
 
 def _rotations(turns: Array) -> Array:
+    """Return rotation matrices (N, 3, 3) of rotation vectors (N, 3), rad."""
     from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_rotvec(turns).as_matrix())
 
 
 def _vector(value: ArrayLike, name: str) -> Array:
+    """Return an argument as a finite vector, shape (3,)."""
     array = number_array(value, name, "(3,)")
     if array.shape != (3,) or not np.isfinite(array).all():
         raise ValueError(f"{name} has shape {array.shape}; expected (3,), finite values")

@@ -19,19 +19,23 @@ from dhkit.verification.verification_report import Agreement, VerificationReport
 _FRAME_TOLERANCE = 1e-13
 """Tolerance for positions over the lengths of the table (at least 1 m) and rotation entries: some hundred roundings."""
 _LOST_POWER = 1.5
-"""Power of the table's lengths, in lengths of the arm, with which rounding errors of dynamics grow: between 1 and 2."""
+"""Exponent of (lengths of the table / lengths of the arm) in the growth of rounding errors of dynamics: it is between 1
+and 2."""
 _JACOBIAN_TOLERANCE = 1e-12
 """Tolerance for Jacobian entries, linear ones over the lengths of the table (at least 1 m)."""
 
 
 class Comparison(NamedTuple):
-    """A quantity with errors and tolerances at N states, shape (N,), and the vectors of the state that it needs."""
+    """Errors of a quantity at N states."""
 
     quantity: str
+    """Name of the quantity."""
     errors: Array
+    """Shape (N,)."""
     tolerance: Array | float
+    """Largest error that counts as agreement, shape (N,) or one for all states."""
     vectors: int = 1
-    """1: q; 2: q and qd; 3: q, qd and qdd."""
+    """Number of vectors of the state that the quantity depends on: 1 for q, 2 for q and qd, 3 for q, qd and qdd."""
 
 
 @takes_robot
@@ -77,10 +81,8 @@ def verify(description: Description, samples: int = 1000, seed: int = 0) -> Veri
                 f"lengths of the table add up to {description.numbers.table_length:.3g} m, those of the arm to"
                 f" {description.reach:.3g} m: errors of dynamics may be {scale:.1e} times as large as otherwise"
             )
-        comparisons += [
-            comparison._replace(tolerance=scale * comparison.tolerance)
-            for comparison in _dynamics(description, reference, notes)
-        ]
+        of_dynamics = _dynamics(description, reference, notes)
+        comparisons += [comparison._replace(tolerance=scale * comparison.tolerance) for comparison in of_dynamics]
     import pinocchio as pin
 
     return VerificationReport(
@@ -95,11 +97,12 @@ def verify(description: Description, samples: int = 1000, seed: int = 0) -> Veri
 
 def worst(comparison: Comparison, motion: JointStates) -> Agreement:
     """Return the state with the largest error relative to its tolerance; NaN counts as largest."""
-    quantity, errors, tolerance, vectors = comparison
-    tolerances = np.broadcast_to(tolerance, errors.shape)
-    k = int(np.argmax(np.where(np.isnan(errors), np.inf, errors / tolerances)))
-    state = (tuple(map(float, vector[k])) for vector in motion[:vectors])
-    return Agreement(quantity, float(errors[k]), float(tolerances[k]), *state)
+    errors = comparison.errors
+    tolerances = np.broadcast_to(comparison.tolerance, errors.shape)
+    relative = np.where(np.isnan(errors), np.inf, errors / tolerances)
+    k = int(np.argmax(relative))
+    state = [tuple(map(float, vector[k])) for vector in motion[: comparison.vectors]]
+    return Agreement(comparison.quantity, float(errors[k]), float(tolerances[k]), *state)
 
 
 def _rounding_scale(description: Description) -> float:
@@ -115,11 +118,12 @@ def _rounding_scale(description: Description) -> float:
 
 
 def _kinematics(description: Description, reference: PinocchioResults) -> Iterator[Comparison]:
+    """Yield the comparisons of frames and Jacobians; positions are divided by the lengths of the table."""
     q = reference.motion.q
     size = max(1.0, description.numbers.table_length)
-    ours = np.concatenate(
-        [kinematics.frames(description, q), kinematics.forward_kinematics(description, q)[:, None]], axis=1
-    )
+    frames = kinematics.frames(description, q)
+    tool = kinematics.forward_kinematics(description, q)
+    ours = np.concatenate([frames, tool[:, None]], axis=1)
     theirs = reference.frames([*(f"dh{i}" for i in range(description.n + 1)), "tool"])
     yield Comparison("frame positions", largest(ours[..., :3, 3] - theirs[..., :3, 3]) / size, _FRAME_TOLERANCE)
     yield Comparison("frame rotations", largest(ours[..., :3, :3] - theirs[..., :3, :3]), _FRAME_TOLERANCE)
@@ -131,28 +135,36 @@ def _kinematics(description: Description, reference: PinocchioResults) -> Iterat
 
 
 def _dynamics(description: Description, reference: PinocchioResults, notes: list[str]) -> Iterator[Comparison]:
+    """Yield the comparisons of dynamics; a note is appended if forward dynamics cannot be compared."""
     q, qd, qdd = reference.motion
+
+    # Pinocchio's.
     M = reference.mass_matrix()
     C = reference.coriolis_matrix()
+    C_qd = np.einsum("nij,nj->ni", C, qd)
     g = reference.gravity_torque()
     tau = reference.inverse_dynamics()
     floors = Floors.of(description, M, qd, qdd, tau)
-    ours = dynamics.coriolis_matrix(description, q, qd)
-    products = np.einsum("nij,nj->ni", C, qd)
+
+    our_C = dynamics.coriolis_matrix(description, q, qd)
+    our_C_qd = np.einsum("nij,nj->ni", our_C, qd)
     yield _relative("mass matrix M", dynamics.mass_matrix(description, q), M)
-    yield _relative("Coriolis matrix C", ours, C, floors.C, vectors=2)
-    yield _relative("C qd", np.einsum("nij,nj->ni", ours, qd), products, floors.h, vectors=2)
+    yield _relative("Coriolis matrix C", our_C, C, floors.C, vectors=2)
+    yield _relative("C qd", our_C_qd, C_qd, floors.h, vectors=2)
     yield _relative("gravity torque g", dynamics.gravity_torque(description, q), g, floors.g)
-    yield _relative("bias C qd + g", dynamics.bias(description, q, qd), products + g, floors.bias, vectors=2)
-    inverse = dynamics.inverse_dynamics(description, q, qd, qdd)
-    yield _relative("inverse dynamics tau", inverse, tau, floors.tau, vectors=3)
+    yield _relative("bias C qd + g", dynamics.bias(description, q, qd), C_qd + g, floors.bias, vectors=2)
+
+    our_tau = dynamics.inverse_dynamics(description, q, qd, qdd)
+    yield _relative("inverse dynamics tau", our_tau, tau, floors.tau, vectors=3)
+
     try:
-        ours = dynamics.forward_dynamics(description, q, qd, tau)
+        our_qdd = dynamics.forward_dynamics(description, q, qd, tau)
     except DescriptionError as error:
         notes.append(f"forward dynamics not compared: {error}")
     else:
-        apart = relative_error(ours, reference.forward_dynamics(tau), floors.qdd)
-        yield Comparison("forward dynamics qdd", apart, forward_tolerance(M), 3)
+        error_of_qdd = relative_error(our_qdd, reference.forward_dynamics(tau), floors.qdd)
+        yield Comparison("forward dynamics qdd", error_of_qdd, forward_tolerance(M), 3)
+
     K = dynamics.kinetic_energy(description, q, qd)
     V = dynamics.potential_energy(description, q)
     yield _relative("kinetic energy K", K, reference.kinetic_energy(), floors.h, vectors=2)
@@ -162,9 +174,10 @@ def _dynamics(description: Description, reference: PinocchioResults, notes: list
 
 
 def _relative(quantity: str, ours: Array, theirs: Array, floor: Array | float = 0.0, vectors: int = 1) -> Comparison:
+    """Return the comparison of a quantity of dynamics by its relative error."""
     return Comparison(quantity, relative_error(ours, theirs, floor), TOLERANCE, vectors)
 
 
 def largest(difference: Array) -> Array:
-    """Return the largest entry of each state, shape (N,)."""
+    """Return the largest magnitude of an entry at each state, shape (N,)."""
     return np.asarray(np.abs(difference).reshape(len(difference), -1).max(axis=1))

@@ -22,16 +22,16 @@ from dhkit.verification.states import random_motions
 from dhkit.verification.verification_report import VerificationReport, printable
 
 _SAME_POSE = 1e-12
-"""Differences of positions, m, and rotation entries up to this are rounding."""
+"""Largest difference of positions, m, and of rotation entries that is rounding."""
 _ROUNDING_STATES = 100
 """Number of states at which a URDF is compared with itself, read as designed."""
 _TOOL_SHARE = 2.0
-"""Multiple of the file's own rounding that is added to the tolerance of the tool: a table whose axes were made parallel
-is nearer to either reading of the file, as written and as designed, than they are to each other."""
+"""Allowed difference of tools, in differences between the URDF's tool as written and as designed: a table whose axes
+were made parallel is nearer to either reading than they are to each other."""
 _DYNAMICS_SHARE = 10.0
-"""Multiple of the file's own rounding that is added to the tolerance of M, g and tau."""
+"""Allowed relative difference of M, g and tau, in the same differences of the tool."""
 _CONSTANT = 1e-6
-"""Two tools differ by a constant transform if it varies by less than this between states, m and rotation entries."""
+"""Largest variation between states, m and rotation entries, of a transform between tools that counts as constant."""
 
 
 class _OffsetFrame(Enum):
@@ -137,9 +137,10 @@ def verify_urdf(
 
 
 def _rounding_of_angles(chain: Chain, q: Array, reach: float) -> float:
-    """Return by how much a URDF's tool moves if its rounded angles are read as right angles.
+    """Return the largest difference of a URDF's tool between its angles as written and as designed, unrounded.
 
-    Shares of the reach, and entries of the rotation, at joint values q (N, n); 0 if no angle is rounded.
+    The difference is that of positions as shares of the reach, and of entries of the rotation, at joint values q
+    (N, n); 0 if no angle is rounded.
     """
     designed = read_chain(chain.path, chain.base, chain.tip, as_designed=True)
     if not designed.tree.changes:
@@ -159,9 +160,13 @@ def _tool(
     reach = max(1.0, description.reach)
     position = largest(ours[:, :3, 3] - theirs[:, :3, 3]) / reach
     rotation = largest(ours[:, :3, :3] - theirs[:, :3, :3])
+    comparisons = [
+        Comparison("tool position", position, tolerance),
+        Comparison("tool rotation", rotation, tolerance),
+    ]
     differs = max(position.max(), rotation.max()) > max(tolerance, _SAME_POSE)
-    comparisons = [Comparison("tool position", position, tolerance), Comparison("tool rotation", rotation, tolerance)]
-    return comparisons, list(_constant_offsets(ours, theirs)) if differs else []
+    offsets = list(_constant_offsets(ours, theirs)) if differs else []
+    return comparisons, offsets
 
 
 def _tools(reference: PinocchioResults) -> Array:
@@ -172,13 +177,16 @@ def _tools(reference: PinocchioResults) -> Array:
 
 def _constant_offsets(ours: Array, theirs: Array) -> Iterator[_ConstantOffset]:
     """Yield the constant transforms at the tool and at the base between two tools, shape (N, 4, 4) each."""
+    # theirs = ours X at the tool, or theirs = X ours at the base, with a constant X
     inverse = np.linalg.inv(ours)
     for frame, offsets in ((_OffsetFrame.TOOL, inverse @ theirs), (_OffsetFrame.BASE, theirs @ inverse)):
-        if np.abs(offsets - offsets[0]).max() < _CONSTANT:
+        variation = np.abs(offsets - offsets[0]).max()
+        if variation < _CONSTANT:
             yield _ConstantOffset(frame, offsets[0])
 
 
 def _dynamics(description: Description, reference: PinocchioResults, tolerance: float) -> Iterator[Comparison]:
+    """Yield the comparisons of M, g and tau; errors are relative to the table's."""
     q, qd, qdd = reference.motion
     M = dynamics.mass_matrix(description, q)
     g = dynamics.gravity_torque(description, q)

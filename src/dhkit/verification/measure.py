@@ -20,7 +20,7 @@ def relative_error(ours: Array, reference: Array, floor: Array | float = 0.0) ->
     ours, reference
         A quantity at N states, shape (N, ...).
     floor
-        Shape (N,) or a number: size for states where the reference is smaller, so that noise around 0 is not an error.
+        Smallest size that differences are divided by, shape (N,) or a number, so that noise around 0 is not an error.
 
     Returns
     -------
@@ -63,17 +63,24 @@ class Floors:
     def of(cls, description: Description, M: Array, qd: Array, qdd: Array, tau: Array) -> Floors:
         """Return the sizes for states with mass matrices (N, n, n), rates, accelerations and torques (N, n)."""
         numbers = description.numbers
-        # Units of torque: the weight of all bodies at the arm's reach, and the largest entries of M, qd and qdd.
-        weight = float(np.sum(numbers.mass) * np.linalg.norm(numbers.gravity)) * max(1.0, description.reach)
-        inertia = _largest(M)
-        rate = _largest(qd)
-        g = np.full(len(M), weight)
-        C = inertia * rate
-        h = inertia * rate**2
+        gravity = float(np.linalg.norm(numbers.gravity))
+        weight_times_reach = float(np.sum(numbers.mass) * gravity) * max(1.0, description.reach)
+        largest_M = _largest(M)
+        largest_qd = _largest(qd)
+
+        g = np.full(len(M), weight_times_reach)
+        h = largest_M * largest_qd**2
         with np.errstate(all="ignore"):
-            fastest = _largest(tau) / np.min(np.diagonal(M, axis1=-2, axis2=-1), axis=-1)
-        falling = float(np.linalg.norm(numbers.gravity))
-        return cls(g, C, h, g + h, g + h + inertia * _largest(qdd), fastest, falling)
+            qdd_floor = _largest(tau) / np.min(np.diagonal(M, axis1=-2, axis2=-1), axis=-1)
+        return cls(
+            g=g,
+            C=largest_M * largest_qd,
+            h=h,
+            bias=g + h,
+            tau=g + h + largest_M * _largest(qdd),
+            qdd=qdd_floor,
+            Y=gravity,
+        )
 
 
 def forward_tolerance(M: Array) -> Array:
@@ -83,5 +90,6 @@ def forward_tolerance(M: Array) -> Array:
 
 
 def _largest(x: Array) -> Array:
+    """Return the largest magnitude of an entry at each state, shape (N,), of x, shape (N, ...)."""
     largest: Array = np.max(np.abs(x.reshape(len(x), -1)), axis=1, initial=0.0)
     return largest

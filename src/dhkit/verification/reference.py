@@ -14,8 +14,8 @@ from dhkit.verification.states import JointStates
 class PinocchioResults:
     """Pinocchio's results for a model at N joint states; N is the first axis of every array.
 
-    ``coupling``, shape (n, n), is the inertia of drives that two joints turn, which Pinocchio does not know: it is
-    added to M, and to what follows from M.
+    ``coupling``, shape (n, n), is the inertia of drives that move two joints together, which Pinocchio does not know:
+    it is added to M, and to the quantities that depend on M.
     """
 
     def __init__(self, model: PinocchioModel, motion: JointStates, coupling: Array | None = None) -> None:
@@ -26,7 +26,7 @@ class PinocchioResults:
 
     @property
     def notes(self) -> list[str]:
-        """Terms that were added to Pinocchio's results, a sentence each."""
+        """One sentence for each addition to Pinocchio's results."""
         return ["the inertia of coupled drives was added to Pinocchio's M"] if self.coupling.any() else []
 
     def frames(self, names: Sequence[str]) -> Array:
@@ -47,17 +47,20 @@ class PinocchioResults:
 
         axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED if in_world else pin.ReferenceFrame.LOCAL
         frame = self.model.getFrameId(name)
-        return self._each(
-            lambda q, qd, qdd: pin.computeFrameJacobian(self.model, self._data, q, frame, axes), (6, self.n)
-        )
+
+        def jacobian(q: Array, qd: Array, qdd: Array) -> Array:
+            return np.asarray(pin.computeFrameJacobian(self.model, self._data, q, frame, axes))
+
+        return self._each(jacobian, (6, self.n))
 
     def mass_matrix(self) -> Array:
         """Return joint-space mass matrices M(q), shape (N, n, n), kg m^2, kg m and kg."""
         import pinocchio as pin
 
+        # Old versions fill only the upper triangle.
         M = self._each(lambda q, qd, qdd: pin.crba(self.model, self._data, q), (self.n, self.n))
-        upper = np.triu(M)
-        return upper + np.swapaxes(np.triu(M, 1), 1, 2) + self.coupling  # old versions fill only the upper triangle
+        symmetric = np.triu(M) + np.swapaxes(np.triu(M, 1), 1, 2)
+        return symmetric + self.coupling
 
     def coriolis_matrix(self) -> Array:
         """Return Coriolis matrices C(q, qd) of Christoffel symbols, shape (N, n, n); C qd is in N m and N."""
@@ -83,8 +86,10 @@ class PinocchioResults:
         import pinocchio as pin
 
         if self.coupling.any():
+            # M qdd = tau - (C qd + g)
             bias = self._each(lambda q, qd, qdd: pin.nonLinearEffects(self.model, self._data, q, qd), (self.n,))
-            return np.asarray(np.linalg.solve(self.mass_matrix(), (tau - bias)[..., None])[..., 0])
+            qdd = np.linalg.solve(self.mass_matrix(), (tau - bias)[..., None])
+            return np.asarray(qdd[..., 0])
         torques = iter(tau)
         return self._each(lambda q, qd, qdd: pin.aba(self.model, self._data, q, qd, next(torques)), (self.n,))
 
@@ -93,7 +98,8 @@ class PinocchioResults:
         import pinocchio as pin
 
         K = self._each(lambda q, qd, qdd: pin.computeKineticEnergy(self.model, self._data, q, qd), ())
-        return np.asarray(K + np.einsum("ni,ij,nj->n", self.motion.qd, self.coupling, self.motion.qd) / 2)
+        of_couplings = np.einsum("ni,ij,nj->n", self.motion.qd, self.coupling, self.motion.qd) / 2
+        return np.asarray(K + of_couplings)
 
     def potential_energy(self) -> Array:
         """Return potential energies, shape (N,), J."""
@@ -125,23 +131,21 @@ class PinocchioResults:
         T = self._data.oMi[i + 1].inverse() * self._data.oMf[self.model.getFrameId(f"dh{i + 1}")]
         R = T.rotation
         p = T.translation
+        identity = np.eye(3)
 
-        # Mass m, first moment h and inertia I about the frame's origin, seen from the frame (R, p):
-        #     h' = R h + m p,
-        #     I' = R I R^T + 2 (p . R h) 1 - p (R h)^T - (R h) p^T + m (p^2 1 - p p^T).
-        # They are linear in the parameters, so the columns of the matrix are the images of unit vectors.
+        # Column k: the parameters of a body whose parameter k is 1. With m, h and I in the DH frame,
+        #   h' = R h + m p
+        #   I' = R I R^T + 2 (p . R h) 1 - p (R h)^T - (R h) p^T + m (p^2 1 - p p^T)
         matrix = np.zeros((10, 10))
         for k, unit in enumerate(np.eye(10)):
             m = unit[0]
-            Rh = R @ unit[1:4]
+            R_h = R @ unit[1:4]
             inertia = np.zeros((3, 3))
             for value, (a, b) in zip(unit[4:], INERTIA_PLACES.values(), strict=True):
-                inertia[a, b] = value
-                inertia[b, a] = value
-            of_first_moment = 2 * (p @ Rh) * np.eye(3) - np.outer(p, Rh) - np.outer(Rh, p)
-            of_mass = m * (p @ p * np.eye(3) - np.outer(p, p))
-            seen = R @ inertia @ R.T + of_first_moment + of_mass
-            matrix[:, k] = [m, *(Rh + m * p), *(seen[place] for place in _PINOCCHIO_ORDER)]
+                inertia[a, b] = inertia[b, a] = value
+            mixed = 2 * (p @ R_h) * identity - np.outer(p, R_h) - np.outer(R_h, p)
+            inertia = R @ inertia @ R.T + mixed + m * (p @ p * identity - np.outer(p, p))
+            matrix[:, k] = [m, *(R_h + m * p), *(inertia[place] for place in _PINOCCHIO_ORDER)]
         return matrix
 
     @property
@@ -150,8 +154,13 @@ class PinocchioResults:
         return int(self.model.nv)
 
     def _each(self, answer: Callable[[Array, Array, Array], object], shape: tuple[int, ...]) -> Array:
-        # eigenpy returns a matrix of one column as a vector.
-        return np.array([np.reshape(np.array(answer(*state)), shape) for state in zip(*self.motion, strict=True)])
+        """Return the answers of this shape for the states (q, qd, qdd), shape (N, *shape)."""
+        results = []
+        for state in zip(*self.motion, strict=True):
+            # Pinocchio overwrites its arrays: copy. eigenpy returns a matrix of one column as a vector.
+            result = np.array(answer(*state))
+            results.append(np.reshape(result, shape))
+        return np.array(results)
 
 
 _PINOCCHIO_ORDER = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))

@@ -14,6 +14,7 @@ from dhkit.model.urdf_chain import BASE_FRAME, TIP_FRAME, Chain, chain_text
 _TOLERANCE = 1e-9
 """Largest difference of a frame's entries, and of masses, centres and moments of inertia, that counts as agreement."""
 _STATES = 10
+"""Number of states at which the tool's pose is compared."""
 
 
 def second_opinion(chain: Chain, q: Array, tools: Array) -> Iterator[str]:
@@ -35,38 +36,50 @@ def second_opinion(chain: Chain, q: Array, tools: Array) -> Iterator[str]:
     # yourdfpy logs its own warnings; our sentences report what differs.
     logging.getLogger("yourdfpy").setLevel(logging.CRITICAL)
     try:
-        robot = yourdfpy.URDF.load(io.BytesIO(chain_text(chain).encode()), load_meshes=False, build_scene_graph=True)
-        frames = max(_tool_difference(robot, chain, *state) for state in zip(q[:_STATES], tools, strict=False))
+        text = io.BytesIO(chain_text(chain).encode())
+        robot = yourdfpy.URDF.load(text, load_meshes=False, build_scene_graph=True)
+        states = zip(q[:_STATES], tools[:_STATES], strict=True)
+        difference = max(_tool_difference(robot, chain, state, tool) for state, tool in states)
     except Exception as error:  # a second reader that fails says nothing about the file
-        yield f"yourdfpy does not read it: {' '.join(str(error).split())[:120] or type(error).__name__}"
+        message = " ".join(str(error).split())[:120]
+        yield f"yourdfpy does not read it: {message or type(error).__name__}"
         return
-    links = [link for group in chain.groups for link in group]
+
+    links: list[str] = []
+    for group in chain.groups:
+        links += group
     different = [name for name in links if not _same_inertial(robot, chain, name)]
     version = getattr(yourdfpy, "__version__", "")
-    if frames <= _TOLERANCE and not different:
-        yield f"yourdfpy {version} reads the same frames (within {frames:.1e}) and inertials"
-    if frames > _TOLERANCE:
-        yield f"yourdfpy {version} puts the tool {frames:.1e} away from where Pinocchio has it"
+    if difference <= _TOLERANCE and not different:
+        yield f"yourdfpy {version} reads the same frames (within {difference:.1e}) and inertials"
+    if difference > _TOLERANCE:
+        yield f"yourdfpy {version} puts the tool {difference:.1e} away from where Pinocchio has it"
     if different:
         yield f"yourdfpy {version} reads other inertials of links {', '.join(different)[:200]}"
 
 
 def _tool_difference(robot: object, chain: Chain, q: Array, tool: Array) -> float:
+    """Return the largest difference of the tip's pose in the base, m and rotation entries, at joint values q (n,)."""
     robot.update_cfg(dict(zip(chain.names, q.tolist(), strict=True)))  # type: ignore[attr-defined]
     T = robot.get_transform(TIP_FRAME, BASE_FRAME)  # type: ignore[attr-defined]
     return float(np.abs(T - tool).max())
 
 
 def _same_inertial(robot: object, chain: Chain, name: str) -> bool:
+    """Return whether a link has the same mass, centre of mass and inertia in both readings, or none in either."""
     ours = chain.tree.links[name].inertial
     theirs = robot.link_map[name].inertial  # type: ignore[attr-defined]
     if ours is None or theirs is None:
         return ours is None and theirs is None
+
+    # In the link's axes: I = R I_own R^T
     T = np.eye(4) if theirs.origin is None else np.asarray(theirs.origin, dtype=float)
-    inertia = T[:3, :3] @ np.asarray(theirs.inertia, dtype=float) @ T[:3, :3].T
-    size = max(1.0, float(np.abs(ours.inertia).max()))
-    return bool(
-        abs(theirs.mass - ours.mass) <= _TOLERANCE * max(1.0, ours.mass)
-        and np.abs(T[:3, 3] - ours.com).max() <= _TOLERANCE
-        and np.abs(inertia - ours.inertia).max() <= _TOLERANCE * size
-    )
+    R = T[:3, :3]
+    com = T[:3, 3]
+    inertia = R @ np.asarray(theirs.inertia, dtype=float) @ R.T
+
+    largest_inertia = max(1.0, float(np.abs(ours.inertia).max()))
+    same_mass = abs(theirs.mass - ours.mass) <= _TOLERANCE * max(1.0, ours.mass)
+    same_com = np.abs(com - ours.com).max() <= _TOLERANCE
+    same_inertia = np.abs(inertia - ours.inertia).max() <= _TOLERANCE * largest_inertia
+    return bool(same_mass and same_com and same_inertia)

@@ -11,7 +11,7 @@ from dhkit.display import counted, repr_line
 from dhkit.kernels import check_whole
 
 _DEFAULT_SPEED = 3.0
-"""Largest speed of a joint without speed limit, rad/s or m/s."""
+"""Largest speed of a joint without a speed limit, rad/s or m/s."""
 _ACCELERATION = 10.0
 """Largest acceleration, rad/s^2 or m/s^2."""
 
@@ -39,9 +39,10 @@ def random_states(description: Description, samples: int, seed: int = 0) -> Arra
     check_whole("samples", samples, 1)
     check_whole("seed", seed, 0)
     numbers = description.numbers
-    bounded = np.isfinite(numbers.lower) & np.isfinite(numbers.upper) & numbers.prismatic
-    lower = np.where(bounded, numbers.lower, np.where(numbers.prismatic, -1.0, -np.pi))
-    upper = np.where(bounded, numbers.upper, np.where(numbers.prismatic, 1.0, np.pi))
+    uses_limits = np.isfinite(numbers.lower) & np.isfinite(numbers.upper) & numbers.prismatic
+    free = np.where(numbers.prismatic, 1.0, np.pi)
+    lower = np.where(uses_limits, numbers.lower, -free)
+    upper = np.where(uses_limits, numbers.upper, free)
     return np.random.default_rng(seed).uniform(lower, upper, (samples, description.n))
 
 

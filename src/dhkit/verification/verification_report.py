@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -48,8 +49,12 @@ class Agreement:
     @property
     def state(self) -> str:
         """The state as text, such as ``q = [0.1, 0.2]``, with six significant digits; empty vectors are left out."""
-        named = (("q", self.q), ("qd", self.qd), ("qdd", self.qdd))
-        return ", ".join(f"{name} = {[float(f'{x:.6g}') for x in vector]}" for name, vector in named if vector)
+        parts = []
+        for name, vector in (("q", self.q), ("qd", self.qd), ("qdd", self.qdd)):
+            if vector:
+                rounded = [float(f"{x:.6g}") for x in vector]
+                parts.append(f"{name} = {rounded}")
+        return ", ".join(parts)
 
     def __repr__(self) -> str:
         verdict = "agrees" if self.ok else "DISAGREES"
@@ -66,13 +71,13 @@ class VerificationReport:
     robot
         Its name.
     reference
-        What it was compared with, and the version.
+        Name and version of the reference.
     samples, seed
         Number and seed of random states.
     agreements
         Worst error of each quantity.
     notes
-        Sentences about what was not compared, and why.
+        Sentences about quantities that were not compared, with the reason, and about differences.
     """
 
     robot: str
@@ -125,27 +130,36 @@ class VerificationReport:
 
     def json(self) -> dict[str, object]:
         """Return everything as plain data for JSON."""
-        units = {"q": "q_rad", "qd": "qd_rad_s", "qdd": "qdd_rad_s2"}  # of prismatic joints m, m/s, m/s^2
-        agreements = [
-            {units.get(key, key): value for key, value in vars(agreement).items()} | {"ok": agreement.ok}
-            for agreement in self.agreements
-        ]
+        # Keys name the units of revolute joints; those of prismatic joints are m, m/s, m/s^2.
+        keys = {"q": "q_rad", "qd": "qd_rad_s", "qdd": "qdd_rad_s2"}
+        agreements = []
+        for agreement in self.agreements:
+            data = {keys.get(key, key): value for key, value in vars(agreement).items()}
+            data["ok"] = agreement.ok
+            agreements.append(data)
         return vars(self) | {"agreements": agreements, "ok": self.ok}
 
     def markdown(self) -> str:
         """Return the report as Markdown."""
-        rows = [("quantity", "worst error", "at most", "", "worst state"), ("---",) * 5, *self._rows]
-        table = ["| " + " | ".join(_plain(cell) for cell in row) + " |" for row in rows]
-        notes = [f"- {_plain(note)}" for note in self.notes]
-        return "\n".join([f"# {_plain(self._title)}", "", *table, "", *notes, *([""] if notes else []), _MEASURE, ""])
+        lines = [f"# {_plain(self._title)}", ""]
+        for row in [("quantity", "worst error", "at most", "", "worst state"), ("---",) * 5, *self._rows]:
+            cells = [_plain(cell) for cell in row]
+            lines.append(f"| {' | '.join(cells)} |")
+        lines.append("")
+        if self.notes:
+            lines += [f"- {_plain(note)}" for note in self.notes]
+            lines.append("")
+        lines += [_MEASURE, ""]
+        return "\n".join(lines)
 
     def latex(self) -> str:
         """Return a table for a paper's appendix: booktabs, with a caption that says what was measured."""
-        rows = [
-            f"{_escaped(agreement.quantity)} & ${_power(agreement.error)}$ & ${_power(agreement.tolerance)}$ & "
-            f"{'yes' if agreement.ok else 'no'} & \\scriptsize {_escaped(agreement.state)} \\\\"
-            for agreement in self.agreements
-        ]
+        rows = []
+        for agreement in self.agreements:
+            figures = f"${_power(agreement.error)}$ & ${_power(agreement.tolerance)}$"
+            verdict = "yes" if agreement.ok else "no"
+            state = f"\\scriptsize {_escaped(agreement.state)}"
+            rows.append(f"{_escaped(agreement.quantity)} & {figures} & {verdict} & {state} \\\\")
         caption = f"{_escaped(self._title)}. {_escaped(' '.join([*self.notes, _MEASURE]))}"
         return "\n".join(
             [
@@ -167,6 +181,7 @@ class VerificationReport:
 
     @property
     def _rows(self) -> Sequence[tuple[str, ...]]:
+        """The rows of a table: quantity, worst error, tolerance, verdict and worst state."""
         return [
             (
                 agreement.quantity,
@@ -189,6 +204,7 @@ _SPECIAL = {character: f"\\{character}" for character in "&%$#_{}"} | {
     "~": "\\textasciitilde{}",
     "^": "\\textasciicircum{}",
 }
+"""LaTeX of characters that have a meaning there."""
 
 
 def _plain(text: str) -> str:
@@ -202,9 +218,12 @@ def _escaped(text: str) -> str:
 
 
 def _power(number: float) -> str:
-    if number != number:
+    r"""Return a number that is not negative in LaTeX: 1.2e-13 is 1.2 \times 10^{-13}."""
+    if math.isnan(number):
         return "\\mathrm{NaN}"
-    if number in (0.0, float("inf")):
-        return "0" if number == 0 else "\\infty"
+    if math.isinf(number):
+        return "\\infty"
+    if number == 0:
+        return "0"
     mantissa, exponent = f"{number:.1e}".split("e")
     return f"{mantissa} \\times 10^{{{int(exponent)}}}"

@@ -29,13 +29,13 @@ def inverse_page(derivation: InverseDerivation) -> str:
     """Return a derivation as one page of HTML."""
     name = derivation.description.name
     source = derivation.description.source
-    head = [
-        f"<h1>{escape(name)}: inverse kinematics, step by step</h1>",
-        f'<p class="source">{escape(source)}</p>' if source else "",
-        "<h2>Denavit-Hartenberg table</h2>",
-        DHTable.of(derivation.description)._repr_html_(),
-    ]
-    return html_page(f"{name}: inverse kinematics", "\n".join([*filter(None, head), _body(derivation)]))
+    parts = [f"<h1>{escape(name)}: inverse kinematics, step by step</h1>"]
+    if source:
+        parts.append(f'<p class="source">{escape(source)}</p>')
+    parts.append("<h2>Denavit-Hartenberg table</h2>")
+    parts.append(DHTable.of(derivation.description)._repr_html_())
+    parts.append(_body(derivation))
+    return html_page(f"{name}: inverse kinematics", "\n".join(parts))
 
 
 def _body(derivation: InverseDerivation) -> str:
@@ -62,8 +62,10 @@ def _body(derivation: InverseDerivation) -> str:
 
 
 def _step(derivation: InverseDerivation, write: Phrases, step: DerivationStep) -> Iterator[str]:
+    """Yield the paragraphs and equations of a step after its title and figure."""
     yield f"<p>{_words(step.look)}</p>"
-    if used := solved_before(derivation, step):
+    used = solved_before(derivation, step)
+    if used:
         yield f'<p class="ik-known">Known from before: {_words(", ".join(used))}.</p>'
     for definition in step.definitions:
         yield _display(f"{write.name(definition.name)} = {write.element(definition.element)}")
@@ -80,12 +82,14 @@ def _step(derivation: InverseDerivation, write: Phrases, step: DerivationStep) -
     yield _display(f"{solution.unknown} = {alternatives}", "display solution")
     if step.choice:
         yield f"<p>The two solutions: {_sentence(rule_in_dollars(write, step.choice))}.</p>"
-    for head, text in (("No solution where", step.nothing), ("Singular where", step.singular)):
-        if text:
-            yield f"<p>{head} {_words(text)}.</p>"
+    if step.nothing:
+        yield f"<p>No solution where {_words(step.nothing)}.</p>"
+    if step.singular:
+        yield f"<p>Singular where {_words(step.singular)}.</p>"
 
 
 def _display(latex: str, kind: str = "display") -> str:
+    """Return a displayed equation as MathML."""
     return f'<div class="{kind}">{equation_mathml(latex)}</div>'
 
 
@@ -96,6 +100,7 @@ def _sentence(text: str) -> str:
 
 
 def _inline(latex: str) -> str:
+    """Return a formula inside a line as MathML."""
     return equation_mathml(latex).replace('display="block"', 'display="inline"')
 
 
@@ -104,6 +109,9 @@ def _words(text: str) -> str:
     parts = []
     at = 0
     for match in _ANGLE.finditer(text):
-        parts += [escape(text[at : match.start()]), _inline(rf"\theta_{{{match[2]}}}" if match[1] else r"\varphi")]
+        angle = rf"\theta_{{{match[2]}}}" if match[1] else r"\varphi"
+        parts.append(escape(text[at : match.start()]))
+        parts.append(_inline(angle))
         at = match.end()
-    return "".join([*parts, escape(text[at:])])
+    parts.append(escape(text[at:]))
+    return "".join(parts)

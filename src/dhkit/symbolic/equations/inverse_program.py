@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from dhkit.symbolic.equations.collected import collected
-from dhkit.symbolic.equations.inverse_writing import PLACEHOLDER
+from dhkit.symbolic.equations.inverse_writing import PLACEHOLDER, is_number
 from dhkit.symbolic.equations.programs import RESERVED, harmless, identifier
 from dhkit.symbolic.equations.writing import Printer
 from dhkit.symbolic.inverse.chain import POSE
@@ -21,6 +21,7 @@ from dhkit.symbolic.ring import Element, Generator
 from dhkit.symbolic.ring.notation import constants_of, generators_of, symbols_of
 
 _LETTER = re.compile(r"\b[A-Zk]\b")
+"""A letter of a form: A, B, C ... and k."""
 _LOCAL = frozenset(["T", "q", "b", "k", "status", "wrap", "root", "branches", "found", "nargin", "true", "false"])
 """Names that the code around the statements uses."""
 
@@ -42,11 +43,11 @@ class InverseProgram:
     pose
         Entries of the pose that are used: name, row and column from 0.
     statements
-        In their order.
+        The statements in the order in which they are executed.
     joints
         Expressions of the joint values.
     turning
-        Which of them are angles.
+        For each joint, whether its value is an angle.
     words
         Sentences about the derivation.
     """
@@ -78,7 +79,7 @@ ABOUT = (
     "Branches that do not reach the pose have status 0, the others 1; all have 0 where T is not a pose.",
     "At singular poses, where solutions coincide or are not unique, one of them is returned.",
 )
-"""Comments of the generated functions."""
+"""Sentences of the generated functions' comments."""
 
 
 class _CodeWriter:
@@ -107,9 +108,11 @@ class _CodeWriter:
         return f"({inner})"
 
     def product(self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]) -> str:
-        exact = Fraction(float(coefficient)) == coefficient
-        number = repr(float(coefficient)) if exact else f"({coefficient.numerator}.0/{coefficient.denominator}.0)"
-        factors = [*([number] if coefficient != 1 or not numerator else []), *numerator]
+        factors = list(numerator)
+        if coefficient != 1 or not numerator:
+            is_double = Fraction(float(coefficient)) == coefficient
+            quotient = f"({coefficient.numerator}.0/{coefficient.denominator}.0)"
+            factors.insert(0, repr(float(coefficient)) if is_double else quotient)
         return "*".join(factors) + "".join(f"/{divisor}" for divisor in denominator)
 
     def total(self, terms: Sequence[tuple[bool, str]]) -> str:
@@ -123,63 +126,92 @@ def inverse_program(derivation: InverseDerivation, syntax: Syntax) -> InversePro
 
 
 class _Statements:
+    """Writes the statements of one derivation.
+
+    Attributes
+    ----------
+    names
+        Identifiers of the constants by name in the ring.
+    used
+        Texts of the generators that occur in expressions.
+    roots
+        Number of roots so far.
+    """
+
     def __init__(self, derivation: InverseDerivation, syntax: Syntax) -> None:
         self.derivation = derivation
         self.chain = derivation.chain
         self.syntax = syntax
-        elements = self._elements()
         ring = self.chain.ring
-        variables = {g.text for g in ring.generators if g.kind != "constant"}
-        taken = {*RESERVED, *_LOCAL, *variables, *(f"theta{i + 1}" for i in range(derivation.n)), "phi"}
-        taken |= {f"root{k + 1}" for k in range(derivation.n)}
+        generators = generators_of(self._elements())
+        self.used = {generator.text for generator in generators}
+
+        taken = {*RESERVED, *_LOCAL, "phi"}
+        taken |= {generator.text for generator in ring.generators if generator.kind != "constant"}
+        for i in range(derivation.n):
+            taken |= {f"theta{i + 1}", f"root{i + 1}"}
         self.names: dict[str, str] = {}
-        for name in sorted(symbols_of(constants_of(generators_of(elements)))):
+        for name in sorted(symbols_of(constants_of(generators))):
             own = identifier(name)
+            # Names like A_theta1 are those of letters.
             while own in taken or own in self.names.values() or re.fullmatch(r"[A-Zk]\w*_", own):
                 own += "_"
             self.names[name] = own
-        self.used = {g.text for g in generators_of(elements)}
         self.printer: Printer[str] = Printer(ring.generators, _CodeWriter(syntax, self.names))
-        self.root = 0
+        self.roots = 0
 
     def program(self) -> InverseProgram:
+        """Return the program."""
         derivation = self.derivation
         chain = self.chain
-        pose = {chain.names[name]: name for name in POSE}
-        entries = [(self.names[own], *_entry(name)) for own, name in pose.items() if own in self.names]
+        pose = []
+        for name in POSE:
+            own = chain.names[name]
+            if own in self.names:
+                row, column = _entry(name)
+                pose.append((self.names[own], row, column))
         constants = [(self.names[name], value) for name, value in chain.lengths.items() if name in self.names]
-        statements = [statement for step in derivation.steps for statement in self._step(step)]
+
+        statements: list[Statement] = []
+        for step in derivation.steps:
+            statements += self._step(step)
         statements += self._conditions()
         statements += [self._digit(choice) for choice in derivation.choices]
-        turning = tuple(kind == "R" for kind in derivation.description.kinds)
-        words = (derivation.geometry, *(note for note in derivation.notes))
         return InverseProgram(
-            harmless(derivation.description.name),
-            identifier(derivation.description.name),
-            derivation.n,
-            self.root,
-            derivation.branches,
-            tuple(constants),
-            tuple(entries),
-            tuple(statements),
-            tuple(self._joint(i) for i in range(derivation.n)),
-            turning,
-            words,
+            robot=harmless(derivation.description.name),
+            name=identifier(derivation.description.name),
+            n=derivation.n,
+            roots=self.roots,
+            branches=derivation.branches,
+            constants=tuple(constants),
+            pose=tuple(pose),
+            statements=tuple(statements),
+            joints=tuple(self._joint(i) for i in range(derivation.n)),
+            turning=tuple(kind == "R" for kind in derivation.description.kinds),
+            words=(derivation.geometry, *derivation.notes),
         )
 
     def _elements(self) -> list[Element]:
+        """Return all elements whose expressions the program contains."""
         derivation = self.derivation
-        found = [d.element for step in derivation.steps for d in step.definitions]
+        found: list[Element] = []
+        for step in derivation.steps:
+            found += [definition.element for definition in step.definitions]
         for step in derivation.steps:
             if step.form is not None and not isinstance(step.form, Remainder):
                 found += [step.form.letters[letter] for letter in self._letters(step.form)]
-            found += step.choice.factors if step.choice else ()
-        return found + [side for c in derivation.conditions for side in (c.left, c.right)]
+            if step.choice is not None:
+                found += step.choice.factors
+        for condition in derivation.conditions:
+            found += [condition.left, condition.right]
+        return found
 
     def _text(self, element: Element) -> str:
+        """Return an element's expression."""
         return self.printer.sum(collected(element))
 
     def _step(self, step: DerivationStep) -> Iterator[Statement]:
+        """Yield the statements of a step: definitions, the unknown, and its cosine and sine where they are used."""
         head = step.unknown.name if step.unknown else step.title
         yield Comment(f"{head}: {step.look}")
         for definition in step.definitions:
@@ -189,21 +221,22 @@ class _Statements:
         yield from self._solution(step.form)
         unknown = step.form.unknown
         if unknown.is_angle:
-            functions = ("cos", "sin")
-            for function, symbol in zip(functions, unknown.symbols, strict=True):
+            for function, symbol in zip(("cos", "sin"), unknown.symbols, strict=True):
                 (generator,) = generators_of([symbol])
                 if generator.text in self.used:
                     own = self.names.get(generator.text, generator.text)
                     yield Let(own, self.syntax.call(function, [unknown.name]))
 
     def _solution(self, form: Form) -> Iterator[Statement]:
+        """Yield the statements that compute a form's unknown: its letters, the radicand with its test, the solution."""
         name = form.unknown.name
         if isinstance(form, Remainder):
             signed = "".join(f" {'+' if sign > 0 else '-'} {angle}" for angle, sign in form.terms)
             yield Let(name, signed[3:] if signed.startswith(" + ") else f"-{signed[3:]}")
             return
+
+        # A letter whose value is a name stands for it; others become local variables.
         words = self._words(form)
-        guard, least = (self._filled(text, words) for text in form.guard)
         letters: dict[str, str] = {}
         for letter in self._letters(form):
             text = self._text(form.letters[letter])
@@ -216,25 +249,30 @@ class _Statements:
         def in_letters(text: str) -> str:
             return _LETTER.sub(lambda match: letters[match[0]], text)
 
+        # The radicand D of a circle is computed once.
+        guard, least = (self._filled(text, words) for text in form.guard)
         if "D" in words:
             yield Let(f"D_{name}", in_letters(words["D"]))
-            guard = words["D"] = f"D_{name}"
+            words["D"] = f"D_{name}"
+            guard = f"D_{name}"
         if guard:
             yield Guard(in_letters(guard), f"-{ZERO_RADICAND!r}*({in_letters(least)})")
+
         sign = "1.0"
         if form.has_two_roots:
-            self.root += 1
-            sign = f"root{self.root}"
+            self.roots += 1
+            sign = f"root{self.roots}"
         expression = self._filled(form.code.replace("<s>", "SIGN"), words)
         # A derived sum is a factor or an argument alone, so that it needs no brackets.
         expression = in_letters(expression).replace("SIGN", sign)
         yield Let(name, self._calls(expression))
 
     def _calls(self, expression: str) -> str:
+        """Return an expression with the language's name of atan2."""
         return re.sub(r"\batan2\(", f"{self.syntax.functions.get('atan2', 'atan2')}(", expression)
 
     def _words(self, form: Form) -> dict[str, str]:
-        """Return what stands in the code of a form, in its letters; squares are written as products."""
+        """Return the values of the placeholders in a form's code, in its letters; squares are written as products."""
         derived = {k: re.sub(r"\b([A-Zk])\^2", r"\1*\1", text) for k, (text, _) in form.derived.items()}
         return {k: derived.get(k, k) for k in self._placeholders(form)}
 
@@ -242,17 +280,21 @@ class _Statements:
         """Return the letters that the code of a form contains."""
         words = self._words(form)
         texts = [*words.values(), *(self._filled(text, words) for text in form.guard)]
-        return sorted({letter for text in texts for letter in _LETTER.findall(text)} & set(form.letters))
+        occurring = set(_LETTER.findall(" ".join(texts)))
+        return sorted(occurring & set(form.letters))
 
     @staticmethod
     def _placeholders(form: Form) -> list[str]:
+        """Return the placeholders in a form's code, without that of the root's sign."""
         return [k for k in PLACEHOLDER.findall(" ".join([form.code, *form.guard])) if k != "s"]
 
     @staticmethod
     def _filled(template: str, words: dict[str, str]) -> str:
+        """Return a template with words for its placeholders."""
         return PLACEHOLDER.sub(lambda match: words[match[1]], template)
 
     def _conditions(self) -> Iterator[Statement]:
+        """Yield the statements that test the conditions on the pose."""
         reach = self.derivation.description.reach or 1.0
         for condition in self.derivation.conditions:
             yield Comment(condition.look)
@@ -260,16 +302,19 @@ class _Statements:
             yield Guard(repr(IN_PLANE * reach), self.syntax.call("abs", ["off"]))
 
     def _digit(self, choice: Choice) -> Digit:
+        """Return the digit of a choice: 0 for the root that comes first in the order of branches."""
         is_inverted = in_branch_order(choice)[0] != choice.names[0]
         texts = []
         for factor in choice.factors:
-            if len(factor) == 1 and not any(next(iter(factor.terms))):
-                is_inverted ^= next(iter(factor.terms.values())) < 0
+            if is_number(factor):
+                (number,) = factor.terms.values()
+                is_inverted ^= number < 0
             elif len(factor):
                 texts.append(self._text(factor))
         return Digit(tuple(texts), is_inverted)
 
     def _joint(self, i: int) -> str:
+        """Return the expression of joint i's value, i from 0: theta_i minus its offset."""
         if self.derivation.description.kinds[i] != "R":
             return f"q{i + 1}"
         offset = self.chain.number(self.chain.offsets[i])

@@ -58,13 +58,15 @@ def inverse_sympy(derivation: InverseDerivation) -> dict[str, Any]:
             name = step.form.unknown.name
             letters = {letter: expression(element) for letter, element in step.form.letters.items()}
             found[name] = tuple(_solutions(sympy, step.form, letters))
-            sides = ((expression(left), expression(right)) for left, right in step.form.equations)
-            found["equations"][name] = tuple(sympy.Eq(left, right, evaluate=False) for left, right in sides)
+            equations = []
+            for left, right in step.form.equations:
+                equations.append(sympy.Eq(expression(left), expression(right), evaluate=False))
+            found["equations"][name] = tuple(equations)
     return found
 
 
 def _solutions(sympy: Any, form: Form, known: dict[str, Any]) -> list[Any]:
-    """Return the solutions of a form, its letters given."""
+    """Return the solutions of a form, from the values of its letters."""
     atan2 = sympy.atan2
     sqrt = sympy.sqrt
     if isinstance(form, Remainder):
@@ -73,15 +75,21 @@ def _solutions(sympy: Any, form: Form, known: dict[str, Any]) -> list[Any]:
         return [known["Z"]]
     if isinstance(form, Circle):
         A, B, C = (known[k] for k in "ABC")
-        turned = atan2(sqrt(A**2 + B**2 - C**2), C)
-        return [atan2(B, A) + turned, atan2(B, A) - turned]
+        difference = atan2(sqrt(A**2 + B**2 - C**2), C)
+        return [atan2(B, A) + difference, atan2(B, A) - difference]
     if isinstance(form, Square):
-        return [-known["M"] + sqrt(known["S"]), -known["M"] - sqrt(known["S"])]
+        M, S = (known[k] for k in "MS")
+        return [-M + sqrt(S), -M - sqrt(S)]
     if isinstance(form, CosineAndSquare):
-        return [atan2(sqrt(known["S"]), known["X"]), atan2(-sqrt(known["S"]), known["X"])]
+        X, S = (known[k] for k in "XS")
+        return [atan2(sqrt(S), X), atan2(-sqrt(S), X)]
     if isinstance(form, Line | Flip):
-        return [atan2(known["Y"], known["X"]), atan2(-known["Y"], -known["X"])]
+        X, Y = (known[k] for k in "XY")
+        return [atan2(Y, X), atan2(-Y, -X)]
     if isinstance(form, Direction):
-        return [atan2(known["k"] * known["Y"], known["k"] * known["X"])]
+        k, X, Y = (known[letter] for letter in "kXY")
+        return [atan2(k * Y, k * X)]
+
+    # Turned
     U, V, X, Y = (known[k] for k in "UVXY")
     return [atan2(U * Y - V * X, U * X + V * Y)]

@@ -13,10 +13,9 @@ from dhkit.symbolic.inverse.derivation import InverseDerivation
 from dhkit.symbolic.inverse.steps import Choice, DerivationStep
 
 GIVEN = "Given is the pose T of the tool in the world: its position px, py, pz and its rotation r11 ... r33."
-
-
+"""Sentence on the pose that the derivation starts from."""
 _LONGEST_LINE = 200
-"""Largest length of an equation in a notebook's table, in characters."""
+"""Largest number of characters of an equation in a notebook's table."""
 
 
 def inverse_text(derivation: InverseDerivation) -> str:
@@ -45,26 +44,32 @@ def inverse_table(derivation: InverseDerivation) -> str:
     write = Phrases(derivation, latex=False)
     rows = []
     for step in derivation.steps:
-        lines = [("", f"{write.name(d.name)} = {write.element(d.element)}") for d in step.definitions]
+        # Title, equation and solution; the title stands in the step's first row alone.
+        step_rows = [["", f"{write.name(d.name)} = {write.element(d.element)}", ""] for d in step.definitions]
         if step.form is not None:
             solution = write.solution(step.form)
             solved = f"{solution.unknown} = {' or '.join(solution.alternatives)}"
-            equations = [f"{left} = {right}" for left, right in write.equations(step)]
-            lines += [("", text) for text in equations if text != solved]
-            lines += [*(("", f"{letter} = {value}") for letter, value in solution.letters), (solved, "")]
-        for k, (solved, line) in enumerate(lines):
-            rows.append([_title(write, step) if k == 0 else "", line, solved])
+            for left, right in write.equations(step):
+                equation = f"{left} = {right}"
+                if equation != solved:
+                    step_rows.append(["", equation, ""])
+            step_rows += [["", f"{letter} = {value}", ""] for letter, value in solution.letters]
+            step_rows.append(["", "", solved])
+        if step_rows:
+            step_rows[0][0] = _title(write, step)
+        rows += step_rows
     caption = f"{derivation.description.name}: joint by joint"
     return html_table(("what is found", "equations", "solution"), rows, caption, most=len(rows), longest=_LONGEST_LINE)
 
 
 def introduction(derivation: InverseDerivation) -> list[str]:
     """Return the sentences before the first step."""
-    offsets = [
-        i for i, x in enumerate(derivation.chain.offsets) if not x.is_zero and derivation.description.kinds[i] == "R"
-    ]
+    kinds = derivation.description.kinds
+    has_offsets = any(
+        kind == "R" and not offset.is_zero for kind, offset in zip(kinds, derivation.chain.offsets, strict=True)
+    )
     angle = "theta_i is the table's angle of joint i: "
-    angle += "the joint value q_i plus its offset" if offsets else "the joint value q_i"
+    angle += "the joint value q_i plus its offset" if has_offsets else "the joint value q_i"
     symbols = "s1 and c1 are sin(theta1) and cos(theta1)"
     label = phi_label(derivation)
     if derivation.sum and label != "phi":
@@ -83,13 +88,20 @@ def branches_sentence(derivation: InverseDerivation) -> str:
 
 
 def _title(write: Phrases, step: DerivationStep) -> str:
+    """Return the name of a step's unknown, or its title if it only defines quantities."""
     return write.unknown(step.unknown) if step.unknown else step.title
 
 
 def _step(derivation: InverseDerivation, write: Phrases, step: DerivationStep) -> Iterator[str]:
+    """Yield the lines of a step after its title."""
     indent = "   "
-    yield from textwrap.wrap(step.look, WIDTH, initial_indent=indent, subsequent_indent=indent)
-    if used := solved_before(derivation, step):
+
+    def wrapped(sentence: str) -> list[str]:
+        return textwrap.wrap(sentence, WIDTH, initial_indent=indent, subsequent_indent=indent)
+
+    yield from wrapped(step.look)
+    used = solved_before(derivation, step)
+    if used:
         yield f"{indent}known from before: {', '.join(used)}"
     for definition in step.definitions:
         yield from broken_lines(f"{indent}{write.name(definition.name)} = ", write.element(definition.element))
@@ -104,12 +116,11 @@ def _step(derivation: InverseDerivation, write: Phrases, step: DerivationStep) -
         yield from broken_lines(f"{indent}{letter} = ", value)
     yield f"{indent}{solution.unknown} = {' or '.join(solution.alternatives)}"
     if step.choice:
-        yield from textwrap.wrap(
-            f"the two solutions: {write.rule(step.choice)}", WIDTH, initial_indent=indent, subsequent_indent=indent
-        )
-    for head, text in (("no solution where", step.nothing), ("singular where", step.singular)):
-        if text:
-            yield from textwrap.wrap(f"{head} {text}", WIDTH, initial_indent=indent, subsequent_indent=indent)
+        yield from wrapped(f"the two solutions: {write.rule(step.choice)}")
+    if step.nothing:
+        yield from wrapped(f"no solution where {step.nothing}")
+    if step.singular:
+        yield from wrapped(f"singular where {step.singular}")
 
 
 def inverse_latex(derivation: InverseDerivation) -> str:
@@ -129,11 +140,10 @@ def inverse_latex(derivation: InverseDerivation) -> str:
         parts.append("\\begin{align*}\n" + " \\\\\n".join(rows) + "\n\\end{align*}")
         if step.choice:
             parts.append(_latex_sentence(f"The two solutions: {rule_in_dollars(write, step.choice)}."))
-        parts += [
-            escaped(f"{head} {text}.")
-            for head, text in (("No solution where", step.nothing), ("Singular where", step.singular))
-            if text
-        ]
+        if step.nothing:
+            parts.append(escaped(f"No solution where {step.nothing}."))
+        if step.singular:
+            parts.append(escaped(f"Singular where {step.singular}."))
     joints = [f"{name} &= {value}" for name, value in write.joint_values()]
     if joints:
         parts += [
@@ -151,13 +161,13 @@ def rule_in_dollars(write: Phrases, choice: Choice) -> str:
     """Return the rule that names two roots, with its formulas between dollar signs."""
     factors = [write.element(factor) for factor in choice.factors]
     text = write.rule(choice)
+    # Longest first: a factor may be a part of another.
     for factor in sorted(factors, key=len, reverse=True):
-        if len(factor) > 1:
-            text = (
-                text.replace(f"{factor} > 0", f"${factor} > 0$")
-                if f"{factor} > 0" in text
-                else text.replace(factor, f"${factor}$")
-            )
+        inequality = f"{factor} > 0"
+        if len(factor) <= 1:
+            continue
+        formula = inequality if inequality in text else factor
+        text = text.replace(formula, f"${formula}$")
     return text
 
 

@@ -1,4 +1,4 @@
-"""Derivations of inverse kinematics in words and formulas: what text, LaTeX, pages and code have in common."""
+"""Derivations of inverse kinematics in words and formulas: the part that text, LaTeX, pages and code share."""
 
 from __future__ import annotations
 
@@ -15,11 +15,13 @@ from dhkit.symbolic.inverse.derivation import InverseDerivation
 from dhkit.symbolic.inverse.forms import Circle, CosineAndSquare, Flip, Form, Remainder, Unknown
 from dhkit.symbolic.inverse.steps import Choice, DerivationStep
 from dhkit.symbolic.ring import Element
-from dhkit.symbolic.ring.notation import Notation, notation, symbols_of
+from dhkit.symbolic.ring.notation import Notation, generators_of, notation, symbols_of
 
 _INLINE = 70
-"""Longest text of what stands in a solution instead of its letters; longer ones are listed behind it."""
+"""Largest number of characters of the letters' values that are written inside a solution; longer ones are listed after
+it. In LaTeX twice as many."""
 PLACEHOLDER = re.compile(r"<(\w+)>")
+"""A placeholder in the solution of a form."""
 _ANGLE = re.compile(r"\b(theta|phi)(\d*)\b")
 
 
@@ -30,11 +32,11 @@ class Solution:
     Attributes
     ----------
     unknown
-        What it gives.
+        The quantity that it gives.
     alternatives
         Its formulas: one, with a sign ± where there are two roots, or two.
     letters
-        Letters in them with what they stand for.
+        Letters in them with their values.
     """
 
     unknown: str
@@ -81,7 +83,7 @@ class Phrases:
         return self.element(self.derivation.chain.ring.constant(name))
 
     def unknown(self, unknown: Unknown) -> str:
-        """Return what a step solves for."""
+        """Return the name of an unknown."""
         return self.angles(unknown.name)
 
     def angles(self, text: str) -> str:
@@ -99,9 +101,11 @@ class Phrases:
         if isinstance(form, Remainder):
             return [(self.unknown(form.unknown), self._sum(form.terms))]
         sides = [(self.element(left), self.element(right)) for left, right in form.equations]
-        if isinstance(form, CosineAndSquare):  # the ring writes the square of a sine as 1 - c^2
+        if isinstance(form, CosineAndSquare):
+            # The ring writes the square of a sine as 1 - c^2.
+            cosine_equation, (_, square) = sides
             squared = "^{2}" if self.is_latex else "^2"
-            sides[1] = self.element(form.unknown.sine) + squared, sides[1][1]
+            sides = [cosine_equation, (self.element(form.unknown.sine) + squared, square)]
         return sides
 
     def solution(self, form: Form) -> Solution:
@@ -110,106 +114,128 @@ class Phrases:
         if isinstance(form, Remainder):
             return Solution(name, (self._sum(form.terms),), ())
         templates = form.latex if self.is_latex else form.text
-        used = dict.fromkeys(PLACEHOLDER.findall(" ".join(templates)))
+        placeholders = dict.fromkeys(PLACEHOLDER.findall(" ".join(templates)))
         derived = form.derived
-        inline = {k: derived[k][1] if k in derived else form.letters[k] for k in used}
-        texts = {k: self.element(element) for k, element in inline.items()}
-        if sum(map(len, texts.values())) <= _INLINE * (2 if self.is_latex else 1):
-            written = [_filled(template, texts).removeprefix("0 ") for template in templates]
-            return Solution(name, tuple(written), ())
-        zero = {k for k, element in form.letters.items() if element.is_zero}
-        words = {k: self._letters(derived[k][0]) if k in derived else "0" if k in zero else k for k in used}
-        needed = sorted(set(re.findall(r"[A-Zk](?![a-z])", " ".join(words.values()))))
-        letters = tuple((k, self.element(form.letters[k])) for k in needed if k in form.letters)
-        if isinstance(form, Circle) and "B" in zero:
-            zero_angle = r"\mathrm{atan2}(0,\, A)" if self.is_latex else "atan2(0, A)"
-            otherwise = r"0 \text{ where } A > 0, \text{ else } \pi" if self.is_latex else "0 where A > 0, else pi"
-            letters += ((zero_angle, otherwise),)
-        return Solution(name, tuple(_filled(template, words) for template in templates), letters)
+
+        # Short values are written into the formulas.
+        values = {k: self.element(derived[k][1] if k in derived else form.letters[k]) for k in placeholders}
+        if sum(map(len, values.values())) <= _INLINE * (2 if self.is_latex else 1):
+            alternatives = [_filled(template, values).removeprefix("0 ") for template in templates]
+            return Solution(name, tuple(alternatives), ())
+
+        # Otherwise letters stand in the formulas, and their values follow.
+        in_letters = {}
+        for k in placeholders:
+            if k in derived:
+                in_letters[k] = self._letters(derived[k][0])
+            elif form.letters[k].is_zero:
+                in_letters[k] = "0"
+            else:
+                in_letters[k] = k
+        occurring = sorted(set(re.findall(r"[A-Zk](?![a-z])", " ".join(in_letters.values()))))
+        letters = [(k, self.element(form.letters[k])) for k in occurring if k in form.letters]
+        if isinstance(form, Circle) and form.letters["B"].is_zero:
+            if self.is_latex:
+                letters.append((r"\mathrm{atan2}(0,\, A)", r"0 \text{ where } A > 0, \text{ else } \pi"))
+            else:
+                letters.append(("atan2(0, A)", "0 where A > 0, else pi"))
+        alternatives = [_filled(template, in_letters) for template in templates]
+        return Solution(name, tuple(alternatives), tuple(letters))
 
     def rule(self, choice: Choice) -> str:
         """Return the rule that names two roots, in words."""
-        plus, minus = choice.names
-        factors = [factor for factor in choice.factors if len(factor)]
+        # The first name is that of a positive product. Numbers are left out: negative ones exchange the names.
         sign = 1
-        shown = []
-        for factor in factors:
-            if self._is_number(factor):
-                sign *= -1 if float(next(iter(factor.terms.values()))) < 0 else 1
-            else:
-                shown.append(factor)
-        if sign < 0:
-            plus, minus = minus, plus
-        texts = [self.element(factor) for factor in shown]
+        texts = []
+        for factor in choice.factors:
+            if is_number(factor):
+                (number,) = factor.terms.values()
+                sign *= -1 if number < 0 else 1
+            elif len(factor):
+                texts.append(self.element(factor))
+        first, second = choice.names if sign > 0 else choice.names[::-1]
         if len(texts) == 1:
-            return f"{plus} where {texts[0]} > 0, else {minus}"
-        return f"{plus} where {' and '.join(texts)} have the same sign, else {minus}"
-
-    @staticmethod
-    def _is_number(element: Element) -> bool:
-        return len(element) == 1 and not any(next(iter(element.terms)))
+            return f"{first} where {texts[0]} > 0, else {second}"
+        return f"{first} where {' and '.join(texts)} have the same sign, else {second}"
 
     def _letters(self, text: str) -> str:
+        """Return an expression in letters in this notation."""
         return text.replace("*", r" ").replace("^2", "^{2}") if self.is_latex else text
 
     def _sum(self, terms: Sequence[tuple[str, int]]) -> str:
+        """Return a sum of angles, each with 1 or -1."""
         signed = "".join(f" {'+' if sign > 0 else '-'} {self.angles(name)}" for name, sign in terms)
         return signed[3:] if signed.startswith(" + ") else f"-{signed[3:]}"
 
     # Angles of joints
 
     def joint_values(self) -> Iterator[tuple[str, str]]:
-        """Yield joints whose table has an offset, with what their value is: q2, theta2 - pi/2."""
+        """Yield joints whose table has an offset, with their value: q2, theta2 - pi/2."""
         derivation = self.derivation
         for i, (kind, offset) in enumerate(zip(derivation.description.kinds, derivation.chain.offsets, strict=True)):
             if kind == "R" and not offset.is_zero:
-                own = self.constants(-offset)
-                sign = "" if own.startswith("-") else "+ "
-                text = f"theta{i + 1} {sign}{own}" if sign else f"theta{i + 1} - {own[1:]}"
-                yield self.angles(f"q{i + 1}"), self.angles(text)
+                summand = self.constants(-offset)
+                signed = f"- {summand[1:]}" if summand.startswith("-") else f"+ {summand}"
+                yield self.angles(f"q{i + 1}"), self.angles(f"theta{i + 1} {signed}")
 
     def constants(self, expression: object) -> str:
         """Return an expression of the file's parameters."""
         return self._printer.expression(expression).replace("\n", "")  # type: ignore[arg-type]
 
 
+def is_number(element: Element) -> bool:
+    """Return whether an element is a number other than 0."""
+    if len(element) != 1:
+        return False
+    (monomial,) = element.terms
+    return not any(monomial)
+
+
 def phi_label(derivation: InverseDerivation) -> str:
     """Return 23 for phi = theta2 + theta3; phi where an angle is subtracted, or there are two-digit joints."""
-    joints = [i for i, sense in derivation.sum if sense > 0]
-    plain = len(joints) == len(derivation.sum) and all(i < 10 for i in joints)
-    return "".join(map(str, joints)) if plain else "phi"
+    is_plain = all(sense > 0 and joint < 10 for joint, sense in derivation.sum)
+    return "".join(str(joint) for joint, _ in derivation.sum) if is_plain else "phi"
 
 
 def _phi_latex(function: str, derivation: InverseDerivation) -> str:
+    r"""Return the name of the cosine or sine of phi in LaTeX: c_{23}, or c_{\varphi}."""
     label = phi_label(derivation)
-    return rf"{function}_{{{label if label != 'phi' else chr(92) + 'varphi'}}}"
+    subscript = r"\varphi" if label == "phi" else label
+    return rf"{function}_{{{subscript}}}"
 
 
 def _written_names(derivation: InverseDerivation) -> Notation:
     """Return the printed names of the ring's constants: c23 for the cosine of phi."""
-    own = notation(derivation.chain.ring)
-    label = phi_label(derivation)
-    names = {derivation.chain.names[f"{k}phi"]: f"{k}{label}" for k in "cs"} if derivation.sum else {}
-    return Notation(own.names | names)
+    names = dict(notation(derivation.chain.ring).names)
+    if derivation.sum:
+        label = phi_label(derivation)
+        for function in ("c", "s"):
+            names[derivation.chain.names[f"{function}phi"]] = f"{function}{label}"
+    return Notation(names)
 
 
 def _filled(template: str, texts: dict[str, str]) -> str:
+    """Return a template with texts for its placeholders."""
     return PLACEHOLDER.sub(lambda match: texts[match[1]], template)
 
 
 def solved_before(derivation: InverseDerivation, step: DerivationStep) -> list[str]:
     """Return the joints and defined quantities of earlier steps that a step uses, in their order."""
-    elements = [*step.elements, *(definition.element for definition in step.definitions)]
-    if isinstance(step.form, Flip):  # what the unknown is multiplied by is not known yet
-        elements = [step.form.letters["X"], step.form.letters["Y"], *(d.element for d in step.definitions)]
-    joints = _joints_in(elements, _joints_of_quantities(derivation, step))
+    elements = [definition.element for definition in step.definitions]
+    if isinstance(step.form, Flip):
+        # k is not known yet.
+        elements += [step.form.letters["X"], step.form.letters["Y"]]
+    else:
+        elements += step.elements
+
     own = step.unknown.joint if step.unknown else None
+    joints = _joints_in(elements, _joints_of_quantities(derivation, step)) - {own}
     kinds = derivation.description.kinds
-    return [f"theta{i + 1}" if kinds[i] == "R" else f"q{i + 1}" for i in sorted(joints - {own}) if i >= 0]
+    return [f"theta{i + 1}" if kinds[i] == "R" else f"q{i + 1}" for i in sorted(joints) if i >= 0]
 
 
 def _joints_of_quantities(derivation: InverseDerivation, step: DerivationStep) -> dict[str, set[int]]:
-    """Return the joints behind each quantity that steps before one define, or find as phi, by name."""
+    """Return the joints that each quantity of the steps before one depends on, by name; phi is such a quantity."""
     names = derivation.chain.names
     found = dict[str, set[int]]()
     for earlier in derivation.steps:
@@ -223,11 +249,11 @@ def _joints_of_quantities(derivation: InverseDerivation, step: DerivationStep) -
 
 
 def _joints_in(elements: Iterable[Element], of_quantities: Mapping[str, set[int]]) -> set[int]:
-    """Return the joints in elements, from 0, and those behind the quantities in them."""
+    """Return the joints, from 0, that elements depend on, themselves or by the quantities in them."""
     joints: set[int] = set()
-    for element in elements:
-        used = {k for monomial in element.terms for k, exponent in enumerate(monomial) if exponent}
-        for generator in (element.ring.generators[k] for k in used):
-            is_quantity = generator.kind == "constant"
-            joints |= of_quantities.get(generator.text, set()) if is_quantity else {generator.joint}
+    for generator in generators_of(elements):
+        if generator.kind == "constant":
+            joints |= of_quantities.get(generator.text, set())
+        else:
+            joints.add(generator.joint)
     return joints

@@ -184,9 +184,9 @@ def _matrix(quantity: Quantity) -> str:
     cells = np.empty(table.shape, dtype=object)
     symbols = np.empty(table.shape, dtype=int)
     for place, element in np.ndenumerate(table):
-        text = latex_text(element)
-        cells[place] = text
-        symbols[place] = _symbols(text)
+        cell = latex_text(element)
+        cells[place] = cell
+        symbols[place] = _symbols(cell)
 
     head = _WHOLE.get(quantity.name) or _HEADS.get(quantity.name) or _head(quantity.name)
     width_of_columns = int(symbols.max(axis=0).sum())

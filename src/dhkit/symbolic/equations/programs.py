@@ -16,7 +16,7 @@ from itertools import chain
 import numpy as np
 
 from dhkit.symbolic.equations.collected import Product, collected, is_reciprocal
-from dhkit.symbolic.equations.quantities import Quantity
+from dhkit.symbolic.equations.quantities import Quantity, elements_of
 from dhkit.symbolic.equations.writing import Printer, is_name
 from dhkit.symbolic.exact.lagrangian import Lagrangian
 from dhkit.symbolic.kinematics import SymbolicKinematics
@@ -28,6 +28,7 @@ from dhkit.symbolic.ring.notation import angles_of, constants_of, generators_of,
 INPUTS = {"M": "q", "C": "q qd", "h": "q qd", "g": "q", "tau": "q qd qdd", "K": "q qd", "V": "q"}
 """Arguments of each quantity; quantities of kinematics depend on q alone."""
 _STATES = {"position": "q", "rate": "qd", "acceleration": "qdd"}
+"""Argument that holds each kind of generator, in the order in which they are read."""
 _RESERVED_WORDS = """
     auto break case char const continue default do double else enum extern float for goto if inline int long
     register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
@@ -95,8 +96,10 @@ class FunctionSet:
         The robot's name as an identifier.
     n
         The number of joints.
-    parameters, functions
-        See their classes.
+    parameters
+        The parameters, in the order of the robot file.
+    functions
+        The functions.
     notes
         One sentence for each name that differs from the robot file's.
     """
@@ -117,20 +120,22 @@ class FunctionSet:
 
 def program(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity], language: Syntax) -> FunctionSet:
     """Return quantities as functions in a language."""
-    elements = [element for quantity in quantities for element in quantity.elements.flat]
-    values = dict(lag.description.numbers.values) | lag.arm.parameters
-    constants = constants_of(generators_of(elements))
+    # The parameters that occur, in the order of the robot file.
+    constants = constants_of(generators_of(elements_of(quantities)))
     order = {name: k for k, name in enumerate([*lag.description.parameters, *lag.arm.parameters])}
     names = sorted(symbols_of(constants), key=lambda name: (order.get(name, len(order)), name))
     identifiers = _identifiers(names)
+    values = dict(lag.description.numbers.values) | lag.arm.parameters
+    parameters = [Parameter(identifiers[x], harmless(x), float(values.get(x, math.nan))) for x in names]
+
     code = _Code(language, identifiers)
     return FunctionSet(
-        harmless(lag.description.name),
-        identifier(lag.description.name),
-        lag.n,
-        tuple(Parameter(identifiers[name], harmless(name), float(values.get(name, math.nan))) for name in names),
-        tuple(code.function(quantity) for quantity in quantities),
-        tuple(f"{harmless(name)} is {own}" for name, own in identifiers.items() if name != own),
+        robot=harmless(lag.description.name),
+        identifier=identifier(lag.description.name),
+        n=lag.n,
+        parameters=tuple(parameters),
+        functions=tuple(code.function(quantity) for quantity in quantities),
+        notes=tuple(f"{harmless(name)} is {own}" for name, own in identifiers.items() if name != own),
     )
 
 
@@ -171,9 +176,11 @@ class _Code:
         return f"({inner})"
 
     def product(self, coefficient: Fraction, numerator: Sequence[str], denominator: Sequence[str]) -> str:
-        number = repr(float(coefficient))
-        factors = [number, *numerator] if coefficient != 1 or not numerator else numerator
-        return "*".join(factors) + "".join(f"/({x})" if "*" in x else f"/{x}" for x in denominator)
+        factors = list(numerator)
+        if coefficient != 1 or not numerator:
+            factors.insert(0, repr(float(coefficient)))
+        divisors = [f"/({x})" if "*" in x else f"/{x}" for x in denominator]
+        return "*".join(factors) + "".join(divisors)
 
     def total(self, terms: Sequence[tuple[bool, str]]) -> str:
         signed = "".join(f" {'-' if negative else '+'} {term}" for negative, term in terms)
@@ -184,37 +191,48 @@ class _Code:
     def function(self, quantity: Quantity) -> Function:
         """Return a quantity as a function."""
         generators = generators_of(quantity.elements.flat)
+        used: set[str] = set()
+
+        # Local variables: functions of parameters (k1, k2 ...), then the state, then sines and cosines.
         derived = [g for g in constants_of(generators) if not is_name(g) and not is_reciprocal(g)]
         short = {g.text: f"k{k}" for k, g in enumerate(derived, start=1)}
-        listed = [Let(short[g.text], self._meaning(g), harmless(g.text)) for g in derived]
-        states = sorted(
-            (g for g in generators if g.kind in _STATES), key=lambda g: (list(_STATES).index(g.kind), g.joint)
-        )
-        listed += [Let(g.text, self.language.entry(_STATES[g.kind], g.joint)) for g in states]
+        variables = [Let(short[g.text], self._meaning(g), harmless(g.text)) for g in derived]
+
+        kinds = list(_STATES)
+        states = [g for g in generators if g.kind in _STATES]
+        for g in sorted(states, key=lambda g: (kinds.index(g.kind), g.joint)):
+            argument = _STATES[g.kind]
+            variables.append(Let(g.text, self.language.entry(argument, g.joint)))
+            used.add(argument)
+
         for angle in angles_of(generators):
             total = " + ".join(self.language.entry("q", joint) for joint in angle.joints)
-            listed.append(Let(angle.name, f"{angle.function}({total})"))
-        entries = tuple(
-            Store(quantity.name, places, tuple(self._parts(element, short)))
-            for places, element in _upper(quantity)
-            if element
-        )
-        used = {_STATES[g.kind] for g in states} | ({"q"} if angles_of(generators) else set())
+            variables.append(Let(angle.name, f"{angle.function}({total})"))
+            used.add("q")
+
+        entries = []
+        for places, element in _upper(quantity):
+            if element:
+                entries.append(Store(quantity.name, places, tuple(self._parts(element, short))))
         return Function(
-            quantity,
-            tuple(INPUTS.get(quantity.name, "q").split()),
-            frozenset(used),
-            tuple(listed),
-            entries,
+            quantity=quantity,
+            inputs=tuple(INPUTS.get(quantity.name, "q").split()),
+            used=frozenset(used),
+            locals=tuple(variables),
+            entries=tuple(entries),
         )
 
     def _parts(self, element: Element, short: Mapping[str, str]) -> Iterator[str]:
+        """Yield expressions whose sum is an element; ``short`` names the functions of parameters."""
         printer = Printer(element.ring.generators, self, lambda generator: short[generator.text])
-        products = list(chain.from_iterable(map(_split, collected(element))))
+        products: list[Product] = []
+        for product in collected(element):
+            products += _split(product)
         for k in range(0, len(products), _MAX_TERMS):
             yield printer.sum(products[k : k + _MAX_TERMS])
 
     def _meaning(self, generator: Generator) -> str:
+        """Return the expression of a function of parameters."""
         assert generator.meaning is not None  # noqa: S101 - derived constants have one
         return Printer((), self).expression(generator.meaning)
 
@@ -229,6 +247,7 @@ def _split(product: Product) -> Iterator[Product]:
 
 
 def _upper(quantity: Quantity) -> Iterator[tuple[tuple[tuple[int, ...], ...], Element]]:
+    """Yield the entries, each with its places: two for those of a symmetric matrix off the diagonal."""
     for place, element in np.ndenumerate(quantity.elements):
         if not quantity.is_symmetric or place[0] == place[1]:
             yield (place,), element
@@ -237,6 +256,7 @@ def _upper(quantity: Quantity) -> Iterator[tuple[tuple[tuple[int, ...], ...], El
 
 
 def _identifiers(names: Iterable[str]) -> dict[str, str]:
+    """Return distinct identifiers for names."""
     found: dict[str, str] = {}
     for name in names:
         own = identifier(name)
