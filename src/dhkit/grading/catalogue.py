@@ -16,20 +16,20 @@ PARAMETER_FACTORS = {
     "parameter_forgotten": Fraction(0),
     "parameter_sign": Fraction(-1),
 }
-"""By mistake: the factor by which a parameter of the robot is multiplied."""
+"""Factor, by mistake, by which a parameter of the robot is multiplied."""
 UNITS = {
     "millimetres_for_metres": Fraction(1000),
     "centimetres_for_metres": Fraction(100),
     "inches_for_metres": Fraction(10000, 254),
 }
-"""By mistake: the factor by which a length in m is multiplied."""
+"""Factor, by mistake, by which a length in m is multiplied."""
 FACTORS = {
     "entry_sign": Fraction(-1),
     "entry_halved": Fraction(1, 2),
     "entry_doubled": Fraction(2),
     "entry_zero": Fraction(0),
 }
-"""By mistake: the factor by which a whole entry is multiplied."""
+"""Factor, by mistake, by which a whole entry is multiplied."""
 
 
 def _catalogue(groups: Mapping[tuple[Subject, str], Mapping[str, str]]) -> dict[str, Mistake]:

@@ -56,7 +56,7 @@ class NoteKind(Enum):
     TABLE_ANGLES = "table_angles"
     """Angles of steps are read as those of the table, joint values plus offsets: more steps pass so."""
     PROGRAM = "program"
-    """How a program or paper was read: ``values`` has the reader's text, with its line."""
+    """Remark on how a program or paper was read: ``values`` has the reader's text, with its line."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from dhkit.grading.bounds import BOUNDS
 from dhkit.grading.remarks import Note
 
 NO_STEP = "no step finds"
-"""How the statement of an entry begins that stands for a joint without a step."""
+"""Beginning of the statement of an entry that stands for a joint without a step."""
 _MAX_ENTRIES_NAMED = 6
 """Entries that a message names; of more, the rest is counted."""
 

@@ -29,7 +29,7 @@ WEIGHED = re.compile(
 QUANTITIES = ("M", "C", "h", "g", "tau", "K", "V", "L", "T", "J", "dh", "ik", "A1")
 
 Feedback: TypeAlias = Literal["full", "hint", "verdict"]
-"""How much a report shows: everything; verdicts and where to look; verdicts alone."""
+"""Level of detail of a report: everything; verdicts and where to look; verdicts alone."""
 
 Share = Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)]
 Weight = Annotated[float, Field(strict=True, ge=0, le=1e6, allow_inf_nan=False)]
@@ -37,7 +37,7 @@ Weight = Annotated[float, Field(strict=True, ge=0, le=1e6, allow_inf_nan=False)]
 
 @dataclass(frozen=True, config=_STRICT)
 class Credit:
-    """Which share of its points an entry gets that is not simply right, from 0 to 1."""
+    """Share of its points, from 0 to 1, that an entry gets which is not simply right."""
 
     rounding: Share = 1.0
     """Correct within rounding."""
@@ -68,19 +68,19 @@ class Rubric:
     """
 
     points: Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)] = 100.0
-    """Of a sheet that is right throughout."""
+    """Points of a sheet that is right throughout."""
     weights: dict[str, Weight] = Field(default_factory=dict, max_length=1000)
-    """Of quantities (M = 4) and of entries within their quantity (M12 = 0; 1 unless given).
+    """Weights of quantities (M = 4) and of entries within their quantity (M12 = 0; 1 unless given).
 
-    Where a quantity has a weight above 0, those are what is asked for: one that is missing from a sheet gets none of
+    Where a quantity has a weight above 0, those are asked for: one that is missing from a sheet gets none of
     its points, and one that is not named counts nothing. Otherwise the quantities of the sheet weigh the same.
     """
     credit: Credit = Field(default_factory=Credit)
-    """Shares for what is not simply right."""
+    """Shares for answers that are not simply right."""
     digits: Annotated[int, Field(strict=True, ge=3, le=15)] = 4
     """Significant digits from which a decimal may be rounded."""
     feedback: Feedback = "full"
-    """How much a report tells: everything (full), where to look (hint), or verdicts alone (verdict)."""
+    """Level of detail of a report: everything (full), where to look (hint), or verdicts alone (verdict)."""
 
     @classmethod
     def read(cls, path: str | Path) -> Rubric:
