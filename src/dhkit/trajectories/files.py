@@ -27,6 +27,7 @@ from dhkit.trajectories.trajectory import Trajectory
 log = logging.getLogger(__name__)
 
 TABLES = (".csv", ".yaml", ".yml")
+"""Suffixes of files with samples that dhkit writes."""
 _SAMPLES = (*TABLES, ".mat")
 """Suffixes of files with samples from other programs."""
 TRAJECTORY = FileKind(
@@ -81,12 +82,14 @@ def save_trajectory(trajectory: Trajectory, path: str | Path, rate: float | None
         arrays = {"breaks": trajectory.breaks, "coefficients": trajectory.coefficients} | _load_numbers(trajectory)
         write_atomically(path, archive_bytes(suffix, TRAJECTORY.archived(trajectory.description, arrays)))
         return path
-    comments = []
+
+    comments: list[str] = []
     for name, numbers in _load_numbers(trajectory).items():
-        texts = [f"{x:.17g}" for x in numbers.tolist()]
-        comments.append(f"{name}: {' '.join(texts)}")
+        words = [f"{x:.17g}" for x in numbers.tolist()]
+        comments.append(f"{name}: {' '.join(words)}")
     times = trajectory.sample_times(_DEFAULT_RATE if rate is None else rate)
-    text = (_csv if suffix == ".csv" else _yaml)(trajectory, times, tuple(comments))
+    write = _csv if suffix == ".csv" else _yaml
+    text = write(trajectory, times, tuple(comments))
     write_atomically(path, TRAJECTORY.labelled(trajectory.description, text))
     return path
 
@@ -220,9 +223,12 @@ def read_samples(
         raise ValueError(f"columns is given; expected none for {suffix}, whose joint_names say which joint is which")
     try:
         samples = _samples(suffix, content, description, names)
-        if not degrees and (question := samples.degrees_question(description)):
+        if degrees:
+            return samples.in_radians(description).trajectory(description)
+        question = samples.degrees_question(description)
+        if question:
             log.warning("%s: %s", path, question)
-        return samples.in_radians(description).trajectory(description) if degrees else samples.trajectory(description)
+        return samples.trajectory(description)
     except (DescriptionError, ValueError, TypeError) as error:
         raise DescriptionError(f"{path}: {error}") from None
 
@@ -239,6 +245,7 @@ class _FileSamples:
     """Payload and friction."""
 
     def in_radians(self, description: Description) -> _FileSamples:
+        """Return samples whose angles were in degrees in radians."""
         unit = np.where(description.numbers.prismatic, 1.0, np.pi / 180)
         return replace(self, arrays=[array * unit for array in self.arrays])
 
@@ -257,12 +264,16 @@ class _FileSamples:
         return f"{found}{degrees_hint(value, slides=False)}; degrees=True (--degrees) reads them"
 
     def trajectory(self, description: Description) -> Trajectory:
-        return replace(Trajectory.from_samples(description, self.times, *self.arrays), **self.load)
+        """Return the motion through the samples, with payload and friction."""
+        motion = Trajectory.from_samples(description, self.times, *self.arrays)
+        return replace(motion, **self.load)
 
 
 def _from_archive(values: dict[str, Any], description: Description | None) -> Trajectory:
+    """Return the motion of an archive's content."""
     robot = TRAJECTORY.robot_of_archive(values, description)
-    breaks, coefficients = values["breaks"], values["coefficients"]
+    breaks = values["breaks"]
+    coefficients = values["coefficients"]
     if coefficients.ndim > 1 and coefficients.shape[1] > BOUNDS.coefficients:
         found = f"polynomials of degree {coefficients.shape[1] - 1}"
         raise ValueError(f"{found}; expected at most {BOUNDS.coefficients - 1}")
@@ -340,13 +351,16 @@ def _require_continuous(motion: Trajectory) -> None:
 
 
 def _csv(trajectory: Trajectory, times: Array, comments: tuple[str, ...]) -> str:
-    places = range(1, trajectory.n + 1)
-    columns = ("t", *(f"{prefix}{i}" for prefix in ("q", "qd", "qdd") for i in places))
+    """Return samples as a table, without its label."""
+    columns = ["t"]
+    for prefix in ("q", "qd", "qdd"):
+        columns += [f"{prefix}{i}" for i in range(1, trajectory.n + 1)]
     values = (times[:, None], trajectory.q(times), trajectory.qd(times), trajectory.qdd(times))
-    return table_text(columns, np.concatenate(values, axis=1), comments)
+    return table_text(tuple(columns), np.concatenate(values, axis=1), comments)
 
 
 def _yaml(trajectory: Trajectory, times: Array, comments: tuple[str, ...]) -> str:
+    """Return samples as a ROS JointTrajectory, without its label; times are whole nanoseconds, all different."""
     nanoseconds = [round(time * _NANOSECONDS) for time in times.tolist()]
     kept = [k for k, time in enumerate(nanoseconds) if not k or time > nanoseconds[k - 1]]
     nanoseconds = [nanoseconds[k] for k in kept]
@@ -367,10 +381,13 @@ def _samples(suffix: str, content: bytes, description: Description, columns: Map
 
 
 def _table_samples(text: str, description: Description, columns: Mapping[str, str] | None = None) -> _FileSamples:
-    return _FileSamples(*select_columns(description, read_table(text), columns), _load(_commented(text)))
+    """Return the samples of a table, with the payload and friction of its comments."""
+    times, arrays = select_columns(description, read_table(text), columns)
+    return _FileSamples(times, arrays, _load(_commented(text)))
 
 
 def _message_samples(text: str, description: Description) -> _FileSamples:
+    """Return the samples of a ROS JointTrajectory, with the payload and friction of its comments."""
     message = parse_message(text)
     if unknown := next((key for key in message if key not in MESSAGE), None):
         raise DescriptionError(f"unknown key {unknown[:40]!r}; expected {', '.join(MESSAGE)}")
@@ -384,6 +401,7 @@ def _message_samples(text: str, description: Description) -> _FileSamples:
             f"joint_names: found {', '.join(map(str, names))[:120]}; expected {', '.join(own)}, in any order"
         )
     order = [names.index(name) for name in own]
+
     times = []
     columns = []
     for k, point in enumerate(points):
@@ -392,9 +410,10 @@ def _message_samples(text: str, description: Description) -> _FileSamples:
         if unknown := next((key for key in point if key not in POINT), None):
             raise DescriptionError(f"points[{k}]: unknown key {unknown[:40]!r}; expected {', '.join(POINT)}")
         times.append(_seconds(point.get("time_from_start"), k))
-        rows = [_row(point.get(key), key, k, len(own)) for key in ROWS]
-        columns.append([row for row in rows if row is not None])
-        if rows[0] is None or (rows[1] is None and rows[2] is not None) or len(columns[-1]) != len(columns[0]):
+        q, qd, qdd = (_row(point.get(key), key, k, len(own)) for key in ROWS)
+        columns.append([row for row in (q, qd, qdd) if row is not None])
+        is_complete = q is not None and (qd is not None or qdd is None)
+        if not is_complete or len(columns[-1]) != len(columns[0]):
             raise DescriptionError(f"points[{k}]: expected positions, and velocities and accelerations as in points[0]")
     arrays = np.array(columns)[:, :, order]
     listed = [arrays[:, i] for i in range(arrays.shape[1])]
@@ -412,12 +431,14 @@ def _seconds(value: Any, k: int) -> float:
 
 
 def _whole(text: Any, k: int) -> int:
+    """Return a whole number of point k from its text."""
     if not isinstance(text, str) or len(text) > BOUNDS.digits or not text.isascii() or not text.isdigit():
         raise DescriptionError(f"points[{k}].time_from_start: found {str(text)[:40]!r}; expected a whole number")
     return int(text)
 
 
 def _row(value: Any, key: str, k: int, n: int) -> list[float] | None:
+    """Return a row of n numbers of point k; None if the point leaves it out."""
     if value in LEFT_OUT:
         return None
     if not isinstance(value, list) or len(value) != n:

@@ -27,24 +27,28 @@ _CHECKED_POINTS = 9
 _KNOT_ERROR = 1e-12
 """Largest error at a knot, rad and shares of the reach; rounding leaves 1e-15."""
 _NEWTON_STEPS = 8
+"""Largest number of Newton's steps to a knot."""
 _DAMPING = 1e-13
+"""Damping of Newton's steps."""
 _FIRST_STEP = 1 / 16
-"""First step of s along the path, and the largest."""
+"""First and largest step of s along the path."""
 _MIN_STEP = 1e-9
-"""Smallest step of s along the path."""
+"""Smallest step of s along the path; a path that needs a smaller one cannot be followed."""
 _MAX_SECOND_ORDER = 0.25
 """Largest share of a step's second-order part, or of its error, in the step: near a singularity, where another branch
 is close, this share grows, and steps become short enough to stay on the branch."""
 _MAX_CORRECTION = 0.02
 """Largest distance of a knot from its prediction, rad and shares of the reach."""
 _SINGULAR = 1e-6
-"""A direction counts as lost where its singular value of the Jacobian, lengths over the reach, is below this."""
+"""Smallest singular value of the Jacobian, lengths over the reach, of a direction in which the tool can move."""
 _NEAR_SINGULAR = 0.05
-"""A path that cannot be followed further has met a singularity if a singular value is below this."""
+"""Singular value below which a singularity is named as the reason that a path cannot be followed further."""
 _LOOK_AHEAD = np.array([0.0, 0.01, 0.03])
 """Distances of s ahead of a point that cannot be passed at which reachability is tested, to name the cause."""
 _POSE_COORDINATES = 6
+"""Number of independent coordinates of a pose."""
 _MOST_KNOTS = 4097
+"""Largest number of knots of a path."""
 _LIMIT_SLACK = 1e-9
 """Distance by which rounding may exceed joint limits, rad and m."""
 
@@ -76,7 +80,7 @@ def joint_path(
     ------
     PlanningError
         The first pose is not reached, or the path leaves the workspace, meets a singularity or the end of its branch,
-        or leaves the joint limits; says where.
+        or leaves the joint limits; the message names the place.
     ValueError
         q0 has another shape.
     """
@@ -105,6 +109,7 @@ class _Follower:
 
     @classmethod
     def of(cls, description: Description, tool: ToolPath) -> _Follower:
+        """Return the follower of a path; it follows positions alone if they determine the orientation."""
         position_only = _aims_position(description)
         rank = freedoms(description, "translational" if position_only else "whole")
         return cls(tool, Newton.of(description, position_only=position_only, limits=False), rank)
@@ -115,17 +120,20 @@ class _Follower:
         while True:
             qs, qss = self.derivatives(s, q)
             pieces = Pieces(s, quintic_hermite(s, q, qs, qss))
-            wrong = np.flatnonzero(self._deviations(pieces) > _MAX_DEVIATION)
-            if not len(wrong):
+            too_long = np.flatnonzero(self._deviations(pieces) > _MAX_DEVIATION)
+            if not len(too_long):
                 return JointPath(self.newton.description, s, pieces.coefficients)
-            if len(s) + len(wrong) > _MOST_KNOTS:
-                raise PlanningError(f"the joints turn ever faster {self._where(float(s[wrong[0]]), q[wrong[0]])}")
-            middles = (s[wrong] + s[wrong + 1]) / 2
+            if len(s) + len(too_long) > _MOST_KNOTS:
+                k = too_long[0]
+                raise PlanningError(f"the joints turn ever faster {self._where(float(s[k]), q[k])}")
+
+            # A knot in the middle of each interval in which the tool leaves its path.
+            middles = (s[too_long] + s[too_long + 1]) / 2
             found, closed = self.closed(middles, pieces(middles))
             if not closed.all():
                 raise self._lost(float(middles[~closed][0]), found[~closed][0])
-            s = np.insert(s, wrong + 1, middles)
-            q = np.insert(q, wrong + 1, found, axis=0)
+            s = np.insert(s, too_long + 1, middles)
+            q = np.insert(q, too_long + 1, found, axis=0)
 
     def derivatives(self, s: Array, q: Array) -> tuple[Array, Array]:
         """Return q' and q'' on the path, shape (N, n) each, by the least norm of q' for a redundant arm.
@@ -133,25 +141,35 @@ class _Follower:
         With J^+ from the singular values that the arm has: q' = J^+ v = J^T w, so that
         q'' = J^+ (v' - J' q') + (1 - J^+ J) J'^T w.
         """
+        # Rows of the pose are scaled by 1 / reach for lengths, columns by the joints' units.
         newton = self.newton
-        J = self._jacobian(q)
         rows = self._rows
         units = newton.units
-        v, v_rate = (rows[:, 0] * array[:, : newton.size] for array in (self.tool.twists(s), self.tool.twist_rates(s)))
+        J = self._jacobian(q)
+        v = rows[:, 0] * self.tool.twists(s)[:, : newton.size]
+        v_rate = rows[:, 0] * self.tool.twist_rates(s)[:, : newton.size]
+
+        # J^+ = V sigma^-1 U^T
         U, sigma, Vt = np.linalg.svd(J, full_matrices=False)
-        if (sigma[:, self.rank - 1] < _SINGULAR).any():
-            k = int(np.argmax(sigma[:, self.rank - 1] < _SINGULAR))
+        is_singular = sigma[:, self.rank - 1] < _SINGULAR
+        if is_singular.any():
+            k = int(np.argmax(is_singular))
             raise PlanningError(f"the path meets a singularity {self._where(float(s[k]), q[k])}")
         U = U[:, :, : self.rank]
         sigma = sigma[:, : self.rank]
         Vt = Vt[:, : self.rank]
-        inverse = np.swapaxes(Vt, 1, 2) / sigma[:, None] @ np.swapaxes(U, 1, 2)
-        first = np.einsum("kij,kj->ki", inverse, v)
+        J_plus = np.swapaxes(Vt, 1, 2) / sigma[:, None] @ np.swapaxes(U, 1, 2)
+
+        # q' = J^+ v
+        first = np.einsum("kij,kj->ki", J_plus, v)
+
+        # w = J^+T q', and (1 - V V^T) J'^T w is the part of q'' that moves the redundant arm alone.
         J_rate = rows * jacobian_dot(newton.description, q, units * first)[:, : newton.size] * units
-        w = np.einsum("kji,kj->ki", inverse, first)
-        free = np.einsum("kji,kj->ki", J_rate, w)
-        free -= np.einsum("kji,kjl,kl->ki", Vt, Vt, free)
-        second = np.einsum("kij,kj->ki", inverse, v_rate - np.einsum("kij,kj->ki", J_rate, first)) + free
+        w = np.einsum("kji,kj->ki", J_plus, first)
+        redundant = np.einsum("kji,kj->ki", J_rate, w)
+        redundant -= np.einsum("kji,kjl,kl->ki", Vt, Vt, redundant)
+
+        second = np.einsum("kij,kj->ki", J_plus, v_rate - np.einsum("kij,kj->ki", J_rate, first)) + redundant
         return units * first, units * second
 
     @property
@@ -187,28 +205,28 @@ class _Follower:
         q = [start]
         step = _FIRST_STEP
         while s[-1] < 1.0:
-            here = np.array(s[-1:])
-            at = q[-1][None]
-            qs, qss = self.derivatives(here, at)
-            there = min(s[-1] + step, 1.0)
-            h = there - s[-1]
-
-            # Taylor's series q(s + h) = q + h q' + h^2/2 q'', corrected on the path; a step whose second-order part or
-            # correction is too large is halved.
+            # Prediction: q + h q' + h^2 / 2 q''
+            here = q[-1][None]
+            qs, qss = self.derivatives(np.array(s[-1:]), here)
+            next_s = min(s[-1] + step, 1.0)
+            h = next_s - s[-1]
             first = (h * qs)[0]
             second = (h**2 / 2 * qss)[0]
-            if self._largest(second) <= _MAX_SECOND_ORDER * self._largest(first):
-                expected = at + first + second
-                found, closed = self.closed(np.array([there]), expected)
-                largest_correction = _MAX_SECOND_ORDER * self._largest(first) + _KNOT_ERROR
-                if closed[0] and self._largest(found - expected) <= largest_correction:
-                    s = [*s, there]
-                    q = [*q, found[0]]
+            allowed = _MAX_SECOND_ORDER * self._largest(first)
+
+            # Correction; the step is taken if prediction and correction are small against its first-order part.
+            if self._largest(second) <= allowed:
+                expected = here + first + second
+                found, closed = self.closed(np.array([next_s]), expected)
+                if closed[0] and self._largest(found - expected) <= allowed + _KNOT_ERROR:
+                    s.append(next_s)
+                    q.append(found[0])
                     step = min(2 * step, _FIRST_STEP)
                     continue
+
             step = h / 2
             if step < _MIN_STEP:
-                raise self._lost(there, q[-1])
+                raise self._lost(next_s, q[-1])
         return np.array(s), np.array(q)
 
     def _largest(self, moves: Array) -> float:
@@ -245,11 +263,12 @@ class _Follower:
         return bool(found.valid.all())
 
     def _where(self, s: float, q: Array) -> str:
+        """Return the place on the path and the joint values in words."""
         return f"at s = {s:.4g}, {_place(self.tool, s)}; q is {np.array2string(q, precision=4)}"
 
 
 def _starts(description: Description, tool: ToolPath, q0: ArrayLike | None) -> Iterator[Array]:
-    """Yield joint values for the path's beginning: nearest to q0, or of all branches, nearest to the middle first."""
+    """Yield joint values for the path's beginning: near q0 if given, else all branches, nearest to the middle first."""
     T = tool.poses(np.array([0.0]))[0]
     position_only = _aims_position(description)
     if q0 is not None:
@@ -272,8 +291,8 @@ def _starts(description: Description, tool: ToolPath, q0: ArrayLike | None) -> I
 
 def _wind_near(q: Array, near: Array, description: Description) -> list[Array]:
     """Return joint values (N, n) with the whole turns added that bring them nearest to ``near``."""
-    turns = np.where(description.numbers.prismatic, 0.0, 2 * np.pi * np.rint((near - q) / (2 * np.pi)))
-    return list(q + turns)
+    whole_turns = 2 * np.pi * np.rint((near - q) / (2 * np.pi))
+    return list(q + np.where(description.numbers.prismatic, 0.0, whole_turns))
 
 
 def _aims_position(description: Description) -> bool:
@@ -282,6 +301,13 @@ def _aims_position(description: Description) -> bool:
 
 
 def _require_inside(path: JointPath, limits: Limits) -> None:
+    """Check that a path stays inside the joint limits.
+
+    Raises
+    ------
+    PlanningError
+        It leaves them; the message names the joint, the limit and the place.
+    """
     farthest = farthest_outside(limits, path.pieces)
     if farthest.excess <= _LIMIT_SLACK:
         return
@@ -299,5 +325,6 @@ def _require_inside(path: JointPath, limits: Limits) -> None:
 
 
 def _place(tool: ToolPath, s: float) -> str:
+    """Return the tool's position on the path in words."""
     x, y, z = tool.poses(np.array([s]))[0, :3, 3]
     return f"the tool at ({x:.4g}, {y:.4g}, {z:.4g}) m"

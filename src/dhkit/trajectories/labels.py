@@ -37,7 +37,7 @@ class FileKind:
     optional: tuple[str, ...] = ()
     """Names of further arrays that an archive may have."""
     otherwise: str = ""
-    """Advice in messages for reading a table that does not name its robot."""
+    """Advice in messages on tables that do not name their robot."""
 
     @property
     def title(self) -> str:

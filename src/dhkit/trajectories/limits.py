@@ -29,8 +29,9 @@ class Limits:
     """
 
     lower: Array
-    """Lowest joint values, rad or m; ``upper`` likewise."""
+    """Lowest joint values, rad or m."""
     upper: Array
+    """Highest joint values, rad or m."""
     velocity: Array
     """Largest absolute velocities, rad/s or m/s."""
     acceleration: Array
@@ -120,8 +121,10 @@ class Limits:
             "jerk": jerk,
             "torque": torque,
         }
-        n = description.n
-        return cls(**{name: own[name] if value is None else one_each(value, name, n) for name, value in given.items()})
+        values = {}
+        for name, value in given.items():
+            values[name] = own[name] if value is None else one_each(value, name, description.n)
+        return cls(**values)
 
     def scaled(
         self, velocity: float = 1.0, acceleration: float = 1.0, jerk: float = 1.0, torque: float = 1.0
@@ -166,6 +169,7 @@ class Farthest(NamedTuple):
     """The joint value of a motion or a path that is farthest outside its limits, or nearest to them."""
 
     joint: int
+    """Index of the joint, from 0."""
     excess: float
     """Distance from the limit, rad or m; negative inside."""
     is_below: bool

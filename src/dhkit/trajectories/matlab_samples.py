@@ -71,23 +71,28 @@ def _chosen(
 
     Case is ignored except in names of matrices: beside q, Q is often a weight.
     """
-    lower = {name.lower(): name for name in variables} | {name: name for name in variables}
+    # The file's names that each of ours may have.
     candidates: dict[str, list[str]] = {"t": list(TIMES)}
     for prefixes in PREFIXES:
         candidates[prefixes[0]] = [name for name in prefixes if name in variables]
     for order, ours in enumerate(MATRICES):
-        candidates |= {f"{ours}{i}": names for i, names in enumerate(joint_columns(description, order), start=1)}
+        for i, names in enumerate(joint_columns(description, order), start=1):
+            candidates[f"{ours}{i}"] = names
+
+    spelled = {name.lower(): name for name in variables} | {name: name for name in variables}
     chosen: dict[str, MatVariable] = {}
     for ours, known in candidates.items():
         if ours in columns:
             chosen[ours] = variables[place_of_name(columns[ours], variables, "variable")]
         elif ours.rstrip("0123456789") not in chosen:
-            name = next((lower[name] for name in known if name in lower), None)
-            chosen |= {} if name is None else {ours: variables[name]}
+            found = next((name for name in known if name in spelled), None)
+            if found is not None:
+                chosen[ours] = variables[spelled[found]]
     return chosen
 
 
 def _numbers(variable: MatVariable) -> Array:
+    """Return the array of a variable."""
     value = variable.value if variable.readable else None
     if isinstance(value, str):
         raise DescriptionError(f"{variable.name}: found text; expected numbers")
@@ -97,26 +102,31 @@ def _numbers(variable: MatVariable) -> Array:
 
 
 def _vector(name: str, array: Array) -> Array:
+    """Return a row or a column as a vector."""
     if array.size != max(array.shape):
         raise DescriptionError(f"{name} has shape {array.shape}; expected a vector")
     return array.ravel()
 
 
 def _check_matrix(name: str, array: Array, n: int) -> None:
+    """Check that a matrix has a column for each joint, and perhaps one of times before them."""
     if array.ndim == 2 and array.shape[1] in (n, n + 1):
         return
-    turned = f"; {name}' in MATLAB has" if array.ndim == 2 and array.shape[0] in (n, n + 1) else ""
+    is_transposed = array.ndim == 2 and array.shape[0] in (n, n + 1)
+    advice = f"; {name}' in MATLAB has" if is_transposed else ""
     raise DescriptionError(
         f"{name} has shape {array.shape}; expected (N, {n}), a row for each time, or (N, {n + 1}) with times in the"
-        f" first column{turned}"
+        f" first column{advice}"
     )
 
 
 def _add_times(found: dict[str, Array], name: str, times: Array) -> None:
+    """Add the times of a matrix, or check that they are those of the other variables."""
     if not np.array_equal(found.setdefault("t", times), times):
         raise DescriptionError(f"{name} has times in its first column that are not those of the other variables")
 
 
 def _listed(variables: Mapping[str, MatVariable]) -> str:
+    """Return the names of variables for a message, with the kinds of those that are not read."""
     kinds = [name if each.readable else f"{name} ({each.kind})" for name, each in variables.items()]
     return ", ".join(kinds)[:120] or "nothing"

@@ -24,20 +24,21 @@ Torques: TypeAlias = Callable[[Array, Array, Array], Array]
 _TORQUE_NOISE = 1e-12
 """Differences of torque below this share of the largest torque are rounding and limit nothing."""
 _MIN_JUMP = 1e-6
-"""A velocity or acceleration jumps at a break if it changes by more than this share of its largest value."""
+"""Smallest change of a velocity or acceleration at a break that is a jump, as a share of its largest value."""
 _PROVED = 1e-12
 """Distance of a derivative's proved bound from values that are reached, as a share of its size."""
 _LIMIT_SLACK = 1e-9
 """Distance by which rounding may exceed joint limits, rad and m."""
 _REFINEMENTS = 2
-"""Number of passes in which the neighbourhoods of critical samples are sampled more finely."""
+"""Number of refinement passes, in which the neighbourhoods of critical samples are sampled more finely."""
 _TIGHTEST_SAMPLES = 3
-"""Number of critical samples per joint that each pass refines."""
+"""Number of critical samples of each joint that a pass refines."""
 _ACCEPTED_TORQUE = 1e-7
 """Share by which a torque may exceed its limit."""
 _MAX_ROUNDS = 20
 """Number of times that a motion is slowed down for a torque between samples."""
 _ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
+"""Order of the derivative that each limit is of."""
 
 
 def least_slowdown(
@@ -62,8 +63,8 @@ def least_slowdown(
     limits
         Limits of velocity, acceleration, jerk and torque to keep; positions do not change.
     torques
-        From q, qd and qdd, shape (N, n) each, to torques (N, n), without friction; inverse dynamics if not given. Not
-        called where no torque is limited.
+        Function from q, qd and qdd, shape (N, n) each, to torques (N, n), without friction; inverse dynamics if not
+        given. Not called if no torque is limited.
     points
         Number of times per interval, both ends included, at which torques are checked, and more finely about the
         tightest; velocities, accelerations and jerks are checked at their extremes.
@@ -102,27 +103,29 @@ def least_slowdown(
 def _with_torques_between(trajectory: Trajectory, limits: Limits, c: float) -> float:
     """Return the slowdown with which torques between the samples keep their limits too, from one that may be too small.
 
-    Where a torque tau of the motion, slowed down c times, exceeds its limit, with g that holds the arm there, it keeps
-    the limit with c^2 (tau - g) / (limit - g) instead of c^2, for positive tau. The worst place is mended until none
-    is left.
+    If a torque tau of the motion, slowed down c times, exceeds its limit, with g that holds the arm there, it keeps the
+    limit with c^2 (tau - g) / (limit - g) instead of c^2, for positive tau. The largest excess is removed until none is
+    left.
     """
     description = trajectory.description
     for _ in range(_MAX_ROUNDS):
         slower = trajectory.slowed(c)
         peaks = torque_peaks(description, slower, limits.torque)
-        over = np.where(peaks.is_proved, peaks.largest, peaks.seen)
-        i = int(over.argmax())
-        if over[i] <= 1 + _ACCEPTED_TORQUE:
+        use = np.where(peaks.is_proved, peaks.largest, peaks.seen)
+        i = int(use.argmax())
+        if use[i] <= 1 + _ACCEPTED_TORQUE:
             return c
+
         t = peaks.times[i]
-        g = float(gravity_torque(description, slower.q(t))[i])
-        tau = float(inverse_dynamics(description, slower.q(t), slower.qd(t), slower.qdd(t))[i])
-        side = np.sign(tau)
+        q = slower.q(t)
+        g = float(gravity_torque(description, q)[i])
+        tau = float(inverse_dynamics(description, q, slower.qd(t), slower.qdd(t))[i])
         limit = float(limits.torque[i])
-        if side * g >= limit:
+        sign = np.sign(tau)
+        if sign * g >= limit:
             _refuse_holding(description, i, g, limit, float(t))
-        beyond = max(side * tau, over[i] * limit)
-        c *= float(np.sqrt((beyond - side * g) / (limit - side * g))) * (1 + _ACCEPTED_TORQUE / 4)
+        largest = max(sign * tau, use[i] * limit)
+        c *= float(np.sqrt((largest - sign * g) / (limit - sign * g))) * (1 + _ACCEPTED_TORQUE / 4)
     raise PlanningError(
         f"torque of {description.joints[i].name} is above its limit at {t:.4g} s after {_MAX_ROUNDS} slow-downs; give a"
         " duration"
@@ -143,9 +146,9 @@ def least_slowdowns(
     if np.isfinite(limits.torque).any():
         slowest = np.maximum(slowest, _by_torques(trajectories, limits, torques, points))
     for trajectory, c in zip(trajectories, slowest, strict=True):
-        moving = np.abs(trajectory.coefficients[:, 1:]).max(axis=(0, 1), initial=0.0) > 0
-        if c == 0 and moving.any() and not may_be_unlimited:
-            name = trajectory.description.joints[int(np.flatnonzero(moving)[0])].name
+        moves = np.abs(trajectory.coefficients[:, 1:]).max(axis=(0, 1), initial=0.0) > 0
+        if c == 0 and moves.any() and not may_be_unlimited:
+            name = trajectory.description.joints[int(np.flatnonzero(moves)[0])].name
             raise PlanningError(
                 f"nothing limits the motion: {name} moves, and has neither a velocity, acceleration, jerk nor torque"
                 " limit that it could reach; give one, or a duration"
@@ -159,7 +162,7 @@ def require_inside(trajectory: Trajectory, limits: Limits) -> None:
     Raises
     ------
     PlanningError
-        It leaves them; names the joint, the limit and the time.
+        It leaves them; the message names the joint, the limit and the time.
     ValueError
         The limits are of another number of joints.
     """
@@ -169,7 +172,8 @@ def require_inside(trajectory: Trajectory, limits: Limits) -> None:
         return
     i = farthest.joint
     q = farthest.value
-    side, limit = ("lower", limits.lower[i]) if farthest.is_below else ("upper", limits.upper[i])
+    side = "lower" if farthest.is_below else "upper"
+    limit = limits.lower[i] if farthest.is_below else limits.upper[i]
     slides = bool(trajectory.description.numbers.prismatic[i])
     bound = joint_text(limit, slides=slides)
     found = joint_text(q, slides=slides)
@@ -180,17 +184,21 @@ def require_inside(trajectory: Trajectory, limits: Limits) -> None:
 
 
 def _check_joints(trajectory: Trajectory, limits: Limits) -> None:
+    """Check that a motion and limits are of the same number of joints."""
     if limits.velocity.shape != (trajectory.n,):
         raise ValueError(f"limits are of {len(limits.velocity)} joints; expected {trajectory.n}")
 
 
 def _by_derivatives(trajectory: Trajectory, limits: Limits) -> float:
+    """Return the least slowdown by velocities, accelerations and jerks."""
     slowest = 0.0
     for name, order in _ORDERS.items():
         limit = getattr(limits, name)
         if np.isinf(limit).all():
             continue
         _refuse_jumps(trajectory, order - 1, name, limit)
+
+        # A motion c times as slow has the k-th derivative over c^k: c^k = largest / limit
         values = trajectory.pieces.differentiated(order)
         found = values.bounds(_PROVED * np.abs(values.bernstein).max(axis=(0, 1)))
         largest = np.maximum(found.highest, -found.lowest)
@@ -234,40 +242,55 @@ class _SamplePoints:
     @classmethod
     def spread(cls, trajectories: Sequence[Trajectory], points: int) -> _SamplePoints:
         """Return sample points at both ends of every interval and between."""
-        pieces = [len(trajectory.breaks) - 1 for trajectory in trajectories]
-        owner = np.repeat(np.arange(len(trajectories)), pieces)
-        piece = np.concatenate([np.arange(count) for count in pieces])
+        # One row an interval, then ``points`` rows an interval.
+        counts = [len(trajectory.breaks) - 1 for trajectory in trajectories]
+        owner = np.repeat(np.arange(len(trajectories)), counts)
+        piece = np.concatenate([np.arange(count) for count in counts])
         width = np.concatenate([np.diff(trajectory.breaks) for trajectory in trajectories])
-        each = [np.repeat(array, points) for array in (owner, piece, width / (points - 1), width)]
-        return cls(each[0], each[1], np.outer(width, np.linspace(0, 1, points)).ravel(), each[2], each[3])
+        return cls(
+            owner=np.repeat(owner, points),
+            piece=np.repeat(piece, points),
+            u=np.outer(width, np.linspace(0, 1, points)).ravel(),
+            step=np.repeat(width / (points - 1), points),
+            width=np.repeat(width, points),
+        )
 
     def around(self, rows: NDArray[np.intp], points: int) -> _SamplePoints:
         """Return sample points between the neighbours of some rows; rows are sorted by motion."""
         r = np.repeat(rows, points)
-        u = self.u[r] + np.tile(np.linspace(-1, 1, points), len(rows)) * self.step[r]
-        finer = self.step[r] * 2 / (points - 1)
-        return _SamplePoints(self.owner[r], self.piece[r], np.clip(u, 0.0, self.width[r]), finer, self.width[r])
+        step = self.step[r]
+        width = self.width[r]
+        u = self.u[r] + np.tile(np.linspace(-1, 1, points), len(rows)) * step
+        return _SamplePoints(
+            owner=self.owner[r],
+            piece=self.piece[r],
+            u=np.clip(u, 0.0, width),
+            step=step * 2 / (points - 1),
+            width=width,
+        )
 
     def states(self, trajectories: Sequence[Trajectory]) -> tuple[Array, Array, Array]:
         """Return q, qd and qdd, shape (N, n) each."""
-        parts = np.split(np.arange(len(self.u)), np.searchsorted(self.owner, np.arange(1, len(trajectories))))
-
-        def derivative(order: int) -> Array:
-            values = []
-            for trajectory, rows in zip(trajectories, parts, strict=True):
-                values.append(trajectory.pieces.differentiated(order).on(self.piece[rows], self.u[rows]))
-            return np.concatenate(values)
-
-        return derivative(0), derivative(1), derivative(2)
+        q: list[Array] = []
+        qd: list[Array] = []
+        qdd: list[Array] = []
+        first_rows = np.searchsorted(self.owner, np.arange(len(trajectories) + 1))
+        for trajectory, (begin, end) in zip(trajectories, pairwise(first_rows), strict=True):
+            piece = self.piece[begin:end]
+            u = self.u[begin:end]
+            q.append(trajectory.pieces.on(piece, u))
+            qd.append(trajectory.pieces.differentiated(1).on(piece, u))
+            qdd.append(trajectory.pieces.differentiated(2).on(piece, u))
+        return np.concatenate(q), np.concatenate(qd), np.concatenate(qdd)
 
 
 def _by_torques(trajectories: Sequence[Trajectory], limits: Limits, torques: Torques | None, points: int) -> Array:
     """Return the least slowdown by torques, shape (m,)."""
     description = trajectories[0].description
-    places = _SamplePoints.spread(trajectories, points)
-    most = np.full(len(trajectories), np.inf)
+    samples = _SamplePoints.spread(trajectories, points)
+    smallest_room = np.full(len(trajectories), np.inf)
     for _ in range(_REFINEMENTS + 1):
-        q, qd, qdd = places.states(trajectories)
+        q, qd, qdd = samples.states(trajectories)
         if torques is None:
             tau = inverse_dynamics(description, q, qd, qdd)
             g = gravity_torque(description, q)
@@ -275,32 +298,37 @@ def _by_torques(trajectories: Sequence[Trajectory], limits: Limits, torques: Tor
             tau = torques(q, qd, qdd)
             g = torques(q, 0 * q, 0 * q)
 
-        # Slowed down c times, the torque is g + (tau - g) / c^2: it keeps its limit on the side to which it moves if
-        #     c^2 >= |tau - g| / (limit - g),
-        # and no slowdown helps where g itself exceeds the limit. room is 1 / c^2.
+        # A motion c times as slow has torques g + (tau - g) / c^2, which keep the limit on the side of tau - g if
+        #   1 / c^2 <= room = (limit - sign(tau - g) g) / |tau - g|
         moves = np.abs(tau - g) > _TORQUE_NOISE * np.abs(tau).max()
         spare = limits.torque - np.where(moves, np.sign(tau - g), np.sign(g)) * g
-        falls = (np.abs(g) > limits.torque) | (moves & (spare <= 0))
-        if falls.any():
-            row, i = (int(k) for k in np.argwhere(falls)[0])
-            when = trajectories[places.owner[row]].breaks[places.piece[row]] + places.u[row]
+        cannot_hold = (np.abs(g) > limits.torque) | (moves & (spare <= 0))
+        if cannot_hold.any():
+            row, i = (int(k) for k in np.argwhere(cannot_hold)[0])
+            when = trajectories[samples.owner[row]].breaks[samples.piece[row]] + samples.u[row]
             _refuse_holding(description, i, float(g[row, i]), float(limits.torque[i]), float(when))
         room = np.divide(spare, np.abs(tau - g), out=np.full_like(g, np.inf), where=moves)
-        np.minimum.at(most, places.owner, room.min(axis=1))
-        places = places.around(_tightest(places.owner, room, len(trajectories)), points)
-    return np.asarray(1 / np.sqrt(most))
+
+        np.minimum.at(smallest_room, samples.owner, room.min(axis=1))
+        samples = samples.around(_tightest(samples.owner, room, len(trajectories)), points)
+    return np.asarray(1 / np.sqrt(smallest_room))
 
 
 def _tightest(owner: NDArray[np.intp], room: Array, count: int) -> NDArray[np.intp]:
-    """Return the rows of the ``count`` smallest local minima of each joint's room in each motion."""
+    """Return the rows of the smallest local minima of each joint's room in each of ``count`` motions."""
     beside = np.pad(room, ((1, 1), (0, 0)), constant_values=np.inf)
-    dips = np.where((room <= beside[:-2]) & (room <= beside[2:]), room, np.inf)
-    bounds = np.searchsorted(owner, np.arange(count + 1))
-    rows = [a + np.argsort(dips[a:b], axis=0, kind="stable")[:_TIGHTEST_SAMPLES].ravel() for a, b in pairwise(bounds)]
+    is_minimum = (room <= beside[:-2]) & (room <= beside[2:])
+    minima = np.where(is_minimum, room, np.inf)
+
+    rows = []
+    for begin, end in pairwise(np.searchsorted(owner, np.arange(count + 1))):
+        in_order = np.argsort(minima[begin:end], axis=0, kind="stable")
+        rows.append(begin + in_order[:_TIGHTEST_SAMPLES].ravel())
     return np.asarray(np.concatenate(rows), dtype=np.intp)
 
 
 def _refuse_holding(description: Description, i: int, needed: float, limit: float, when: float) -> None:
+    """Raise the error that joint i, from 0, needs more than its limit to hold the arm."""
     unit = "N" if description.numbers.prismatic[i] else "N m"
     raise PlanningError(
         f"{description.joints[i].name} cannot hold the arm while it moves at {when:.4g} s, at any speed: that takes"

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from itertools import chain
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -16,17 +15,20 @@ from dhkit.trajectories.bounds import BOUNDS
 TIMES = ("t", "time", "time_s", "time [s]", "t [s]", "timestamp", "tout")
 """Names of a column of times; the last is Simulink's."""
 PREFIXES = (("q", "pos", "position"), ("qd", "dq", "vel", "velocity"), ("qdd", "ddq", "acc", "acceleration"))
-"""Prefixes of columns of values, rates and accelerations, before a joint's number; suffixes after a joint's name."""
+"""Prefixes of columns of values, rates and accelerations before a joint's number, or suffixes after its name."""
 
 _NO_HEADER = "no header: the first line has numbers; expected the names of the columns in it, such as t,q1,q2"
-Table = tuple[tuple[str, ...], Array]
+Table: TypeAlias = tuple[tuple[str, ...], Array]
 """Column names, and numbers, shape (N, columns)."""
 
 
 def table_text(columns: tuple[str, ...], rows: Array, comments: tuple[str, ...]) -> str:
     """Return a CSV of rows (N, columns), in any units, with 17 digits; comments begin with '# '."""
-    lines = [*(f"# {comment}" for comment in comments), ",".join(columns)]
-    lines += [",".join(f"{value:.17g}" for value in row) for row in rows.tolist()]
+    lines = [f"# {comment}" for comment in comments]
+    lines.append(",".join(columns))
+    for row in rows.tolist():
+        cells = [f"{value:.17g}" for value in row]
+        lines.append(",".join(cells))
     return "\n".join(lines) + "\n"
 
 
@@ -45,6 +47,8 @@ def read_table(text: str) -> Table:
         if not line or line.startswith("#"):
             continue
         cells = [cell.strip().strip('"') for cell in line.split(",", BOUNDS.columns)]
+
+        # The first line that is not a comment has the names.
         if names is None:
             if len(cells) > BOUNDS.columns:
                 raise DescriptionError(f"line {number}: more than {BOUNDS.columns} columns")
@@ -54,6 +58,7 @@ def read_table(text: str) -> Table:
                 raise DescriptionError(f"line {number}: a column's name stands there twice; expected different names")
             names = tuple(cells)
             continue
+
         if len(cells) != len(names):
             raise DescriptionError(f"line {number}: {len(cells)} values; expected {len(names)}, as in the header")
         try:
@@ -88,17 +93,18 @@ def check_columns(
     ValueError
         Another of our names, or one that is there twice.
     TypeError
-        No mapping of texts to texts.
+        Not a mapping of texts to texts.
     """
     given: Any = {} if columns is None else columns
-    is_mapping = isinstance(given, Mapping)
-    if not is_mapping or not all(isinstance(name, str) for name in chain(given, given.values())):
+    if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in (*given, *given.values())):
         raise TypeError(f"columns is {columns!r:.60}; expected a mapping of our names to those of the file")
+
+    # Our names by the names that stand for them: a joint's name for its values, unless it is one of our names.
     joints = [joint.name for joint in description.joints]
-    own = {name: f"q{i}" for i, name in enumerate(joints, start=1)}
-    for i in range(1, len(joints) + 1):
-        for symbol, *_ in PREFIXES:
-            own[f"{symbol}{i}"] = f"{symbol}{i}"
+    own = {joint: f"q{i}" for i, joint in enumerate(joints, start=1)}
+    for prefix, *_ in PREFIXES:
+        for i in range(1, len(joints) + 1):
+            own[f"{prefix}{i}"] = f"{prefix}{i}"
     own |= {name: name for name in ("t", *matrices)}
     checked: dict[str, str] = {}
     for ours, theirs in given.items():
@@ -137,27 +143,36 @@ def select_columns(
     DescriptionError
         A column is missing; names it.
     """
-    # Case is ignored, but a name that is equal goes first.
-    names = {name.lower(): k for k, name in reversed(list(enumerate(table[0])))}
-    names |= {name: k for k, name in enumerate(table[0])}
-    names |= {ours: table[0].index(place_of_name(theirs, table[0])) for ours, theirs in (columns or {}).items()}
-    time = _first_known(TIMES, names)
-    if time is None and all(is_plain_number(name) for name in table[0]):
+    header, numbers = table
+
+    # Index of each column by its names: case is ignored, but a name that is equal goes first, and given ones before.
+    index = {name.lower(): k for k, name in reversed(list(enumerate(header)))}
+    index |= {name: k for k, name in enumerate(header)}
+    for ours, theirs in (columns or {}).items():
+        index[ours] = header.index(place_of_name(theirs, header))
+
+    def first_known(candidates: Iterable[str]) -> int | None:
+        return next((index[name] for name in candidates if name in index), None)
+
+    time = first_known(TIMES)
+    if time is None and all(is_plain_number(name) for name in header):
         raise DescriptionError(_NO_HEADER)
     if time is None:
-        raise DescriptionError(f"no column of times: found {', '.join(table[0])[:80]}; expected t or time")
+        raise DescriptionError(f"no column of times: found {', '.join(header)[:80]}; expected t or time")
+
     chosen: list[Array] = []
     for order, prefixes in enumerate(PREFIXES):
-        places = [_first_known(candidates, names) for candidates in joint_columns(description, order)]
+        places = [first_known(candidates) for candidates in joint_columns(description, order)]
         known = [place is not None for place in places]
         if not any(known) and order:
             break
         if not all(known):
             i = known.index(False)
-            wanted = f"{prefixes[0]}{i + 1} or {description.joints[i].name}{'_' + prefixes[-1] if order else ''}"
-            raise DescriptionError(f"no column {wanted}: found {', '.join(table[0])[:80]}")
-        chosen.append(table[1][:, np.array(places, dtype=np.intp)])
-    return table[1][:, time], chosen
+            suffix = f"_{prefixes[-1]}" if order else ""
+            wanted = f"{prefixes[0]}{i + 1} or {description.joints[i].name}{suffix}"
+            raise DescriptionError(f"no column {wanted}: found {', '.join(header)[:80]}")
+        chosen.append(numbers[:, np.array(places, dtype=np.intp)])
+    return numbers[:, time], chosen
 
 
 def _first_known(candidates: Iterable[str], places: Mapping[str, int]) -> int | None:
@@ -170,15 +185,18 @@ def joint_columns(description: Description, order: int) -> list[list[str]]:
     found = []
     for i, joint in enumerate(description.joints, start=1):
         name = joint.name.lower()
-        candidates = []
+        candidates: list[str] = []
         for prefix in PREFIXES[order]:
             candidates += [f"{prefix}{i}", f"{prefix}_{i}"]
         candidates += [f"{name}_{prefix}" for prefix in PREFIXES[order]]
-        found.append(candidates + ([name] if not order else []))
+        if order == 0:
+            candidates.append(name)
+        found.append(candidates)
     return found
 
 
 def _is_number(text: str) -> bool:
+    """Return whether a text is that of a float."""
     try:
         float(text)
     except ValueError:
