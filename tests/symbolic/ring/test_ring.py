@@ -163,3 +163,15 @@ def test_rings_and_elements_are_pickled(ring):
     assert other.ring == ring
     assert hash(other.ring) == hash(ring)
     assert str(other) == str(element)
+
+
+@pytest.mark.parametrize("flint", ["on", "off"])
+def test_a_root_inside_a_root_is_reduced_too(flint, monkeypatch):
+    """x^2 = 2 + y, y^2 = 3: both ways of multiplying x x y are 3 + 2 y."""
+    monkeypatch.setenv("DHKIT_FLINT", flint)
+    ring = Ring("R", list(Constants.of([parse("sqrt(2 + sqrt(3))")], []).found.values()))
+    x = ring.read(parse("sqrt(2 + sqrt(3))"))
+    y = ring.read(parse("sqrt(3)"))
+    assert ((x * y) * x - (x * x) * y).is_zero
+    assert ((x * y) * x - 3 - 2 * y).is_zero
+    assert (x**4 - 4 * x**2 + 1).is_zero

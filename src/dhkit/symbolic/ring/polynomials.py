@@ -93,10 +93,23 @@ class _Flint:
         return polynomial.derivative(k)
 
     def reduced(self, polynomial: Any, relations: Sequence[Relation]) -> Any:
-        degrees = polynomial.degrees() if len(polynomial) else None
-        for relation in relations:
-            if degrees and degrees[relation.place] >= relation.power:
-                polynomial = divmod(polynomial, relation.polynomial)[1]
+        if not len(polynomial):
+            return polynomial
+        degrees = polynomial.degrees()
+        is_changed = True
+        while is_changed:
+            is_changed = False
+            for relation in relations:
+                if degrees[relation.place] < relation.power:
+                    continue
+                remainder = divmod(polynomial, relation.polynomial)[1]
+                if not len(remainder):
+                    return remainder
+
+                # A root's square may contain other roots, and so raise their degrees: x^2 = 2 + y, y^2 = 3.
+                is_changed |= remainder != polynomial
+                polynomial = remainder
+                degrees = polynomial.degrees()
         return polynomial
 
     def quotient(self, dividend: Any, divisor: Any) -> Any:
