@@ -193,6 +193,18 @@ def test_entries_of_a_vector_of_casadi_count_from_zero_if_the_answer_shows_it():
     assert ARM.grade(g=casadi.vertcat(first, second), explain=False).verdict is Verdict.CORRECT
 
 
+def test_a_list_of_scalars_of_casadi_is_one_answer():
+    """An entry with q_1 alone counts as the others show: here from 1, by q_2 in another entry."""
+    q1 = casadi.SX.sym("q_1")
+    q2 = casadi.SX.sym("q_2")
+    first, second = casadi.vertsplit(casadi.vertcat(q1, q2 + casadi.sin(q1)))
+    assert ARM.grade(g=[first, second], explain=False).verdict is Verdict.WRONG
+    m1, m2, l1, l2 = LENGTHS
+    V = casadi.SX.sym("g") * (m1 * l1 / 2 * casadi.sin(q1) + m2 * (l1 * casadi.sin(q1) + l2 / 2 * casadi.sin(q1 + q2)))
+    gradient = casadi.vertsplit(casadi.gradient(V, casadi.vertcat(q1, q2)))
+    assert ARM.grade(g=gradient, explain=False).verdict is Verdict.CORRECT
+
+
 def test_a_function_of_casadi_has_the_arms_own_joint_variables():
     values = ARM.description.numbers.values
     q = casadi.SX.sym("q", 2)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from decimal import Decimal
 from fractions import Fraction
 from itertools import islice
@@ -42,21 +42,22 @@ def entries_of(value: object, n: int) -> object:
         An object of another kind.
     """
     try:
-        return _entries(value, n)
+        return _entries(value, n, frozenset(_casadi_names(value)))
     except RecursionError:
         raise AnswerError("nested too deep") from None
 
 
-def _entries(value: Any, n: int) -> Any:
+def _entries(value: Any, n: int, names: frozenset[str]) -> Any:
+    """Return an object's entries; ``names`` are those of all symbols of CasADi in the whole answer."""
     library = _library(value)
     if library == "casadi":
-        return _casadi_entries(value, n)
+        return _casadi_entries(value, n, names)
     if library == "sympy" and hasattr(value, "tolist"):
         return _squeeze(value.tolist())
     if isinstance(value, np.ndarray):
-        return _entries(value.tolist(), n)
+        return _entries(value.tolist(), n, names)
     if isinstance(value, list | tuple):
-        return [_entries(entry, n) for entry in value]
+        return [_entries(entry, n, names) for entry in value]
     if isinstance(value, str | int | float | Fraction | np.number) or library == "sympy" or callable(value):
         return value
     raise AnswerError(f"found {type(value).__name__}; expected text, numbers, sympy, CasADi or a function")
@@ -139,7 +140,20 @@ _NUMBERED = re.compile(r"(\w*?)_(\d{1,4})", re.ASCII)
 """Name of a numbered symbol, such as q_0 of SX.sym("q", 2)."""
 
 
-def _casadi_entries(value: Any, n: int) -> Any:
+def _casadi_names(value: Any) -> Iterator[str]:
+    """Yield the names of all symbols of CasADi in an object, or in lists and arrays of them."""
+    if isinstance(value, np.ndarray) and value.dtype == object:
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        for entry in value:
+            yield from _casadi_names(entry)
+    elif _library(value) == "casadi" and type(value).__name__ == "SX":
+        import casadi
+
+        yield from (symbol.name() for symbol in casadi.symvar(value))
+
+
+def _casadi_entries(value: Any, n: int, names: frozenset[str]) -> Any:
     import casadi
 
     if isinstance(value, casadi.Function):
@@ -154,7 +168,6 @@ def _casadi_entries(value: Any, n: int) -> Any:
         return _squeeze(value.full().tolist())
     if not isinstance(value, casadi.SX):
         raise AnswerError(f"found casadi.{type(value).__name__}; expected SX, DM or a Function that takes SX")
-    names = frozenset(symbol.name() for symbol in casadi.symvar(value))
     rows = [[_CasadiScalar(value[i, j], names) for j in range(value.shape[1])] for i in range(value.shape[0])]
     return rows[0][0] if value.shape == (1, 1) else _squeeze(rows)
 

@@ -96,20 +96,15 @@ class _Flint:
         if not len(polynomial):
             return polynomial
         degrees = polynomial.degrees()
-        is_changed = True
-        while is_changed:
-            is_changed = False
-            for relation in relations:
-                if degrees[relation.place] < relation.power:
-                    continue
-                remainder = divmod(polynomial, relation.polynomial)[1]
-                if not len(remainder):
-                    return remainder
+        for relation in relations:
+            if degrees[relation.place] < relation.power:
+                continue
+            polynomial = divmod(polynomial, relation.polynomial)[1]
+            if not len(polynomial):
+                return polynomial
 
-                # A root's square may contain other roots, and so raise their degrees: x^2 = 2 + y, y^2 = 3.
-                is_changed |= remainder != polynomial
-                polynomial = remainder
-                degrees = polynomial.degrees()
+            # A root's square may contain other roots, and so raise their degrees: x^2 = 2 + y, y^2 = 3.
+            degrees = polynomial.degrees()
         return polynomial
 
     def quotient(self, dividend: Any, divisor: Any) -> Any:
