@@ -491,8 +491,8 @@ def _transform(arm: ExactArm, row: ExactRow) -> tuple[Elements, Elements]:
     zero = arm.ring.zero
     a = row.a
     d = row.d
-    (c, s) = row.theta
-    (ca, sa) = row.alpha
+    c, s = row.theta
+    ca, sa = row.alpha
     if arm.is_standard:
         # Rz(theta) Tz(d) Tx(a) Rx(alpha)
         R = [

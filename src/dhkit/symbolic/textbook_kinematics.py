@@ -262,7 +262,7 @@ class TextbookKinematics:
         if self._has("alpha_sign", i):
             alpha = _negative(alpha)
         if self._has("alpha_sin_cos", i):
-            (c, s) = alpha
+            c, s = alpha
             alpha = (s, c)
 
         # theta = joint variable + constant offset; the variable of a prismatic joint is not an angle.
@@ -279,13 +279,13 @@ class TextbookKinematics:
             theta = _negative(theta)
 
         # cos(x +- 90 deg) = -+sin x, sin(x +- 90 deg) = +-cos x
-        (c, s) = theta
+        c, s = theta
         if self._has("theta_quarter_more", i):
-            (c, s) = (-s, c)
+            c, s = (-s, c)
         if self._has("theta_quarter_less", i):
-            (c, s) = (s, -c)
+            c, s = (s, -c)
         if self._has("theta_sin_cos", i):
-            (c, s) = (s, c)
+            c, s = (s, c)
         return replace(row, alpha=alpha, theta=(c, s))
 
     def _column(self, i: int) -> tuple[Elements, Elements]:
@@ -436,5 +436,5 @@ def _product(first: Elements, second: Elements, unrotated: bool) -> Elements:
 
 def _negative(direction: Direction) -> Direction:
     """Return cosine and sine of the negative of an angle."""
-    (c, s) = direction
+    c, s = direction
     return c, -s

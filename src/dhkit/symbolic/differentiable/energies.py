@@ -21,14 +21,12 @@ def kinetic_energy(table: InertialTable, q: casadi.SX, qd: casadi.SX) -> casadi.
     """
     import casadi
 
-    # Each link adds to 2 K:  m v^2 + w . (J w) + 2 v . (w x m c); stored are second moments, so that
-    #     J = trace(S) 1 - S  and  w . (J w) = (S_yy + S_zz) w_x^2 + ... - 2 (S_xy w_x w_y + ...).
     frames = equation_frames(table, q)
     twice_K: Scalar = casadi.SX(0)
     for i, (frame, (w, v)) in enumerate(zip(frames, link_velocities(frames, qd), strict=True)):
         link = frame.moments
 
-        # w . (J w) with J = tr(S) 1 - S
+        # w . (J w) with J = tr(S) 1 - S:  (S_yy + S_zz) w_x^2 + ... - 2 (S_xy w_x w_y + ...)
         (xx, xy, xz), (_, yy, yz), (_, _, zz) = link.tensor
         x, y, z = w
         squares = (yy + zz) * (x * x) + (xx + zz) * (y * y) + (xx + yy) * (z * z)

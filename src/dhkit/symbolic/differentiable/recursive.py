@@ -103,8 +103,6 @@ def recursive_inverse_dynamics(
     """
     import casadi
 
-    # Outwards: angular motion and acceleration of each link, and the force and moment that it needs,
-    #     f = m a + U h,    n = integral of r x U r + h x a,    h = m c.
     frames = equation_frames(table, q)
 
     # From the base to the last link: a is the acceleration of each joint's origin minus gravity.

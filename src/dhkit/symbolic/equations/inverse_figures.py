@@ -318,8 +318,8 @@ def _text(at: _Pixel, text: str, colour: str, lines: Sequence[tuple[_Pixel, _Pix
 
 def _beside(a: _Pixel, b: _Pixel, text: str, colour: str) -> str:
     """Return a text beside the middle of a line, on its right where it rises and on its left where it falls."""
-    (x1, y1) = a
-    (x2, y2) = b
+    x1, y1 = a
+    x2, y2 = b
     x = (x1 + x2) / 2
     y = (y1 + y2) / 2
 

@@ -111,7 +111,7 @@ def _sines_and_cosines(old: Ring, new: Ring) -> dict[int, Element]:
             # q_i = (q_a + ... + q_h + q_i) - (q_a + ... + q_h), two angles of the new ring
             before = joints[-2]
             direction = difference_of_angles(direction, (new.cosine(before), new.sine(before)))
-        (c, s) = direction
+        c, s = direction
         replacements[old.place("sine", i)] = s
         replacements[old.place("cosine", i)] = c
     return replacements
@@ -144,9 +144,9 @@ _Pair: TypeAlias = tuple[int, int]
 
 def _add(terms: dict[Monomial, Fraction], a: _Places, b: _Places, total: _Places) -> bool:
     """Write cos a cos b - sin a sin b as cos(a + b), and sin a cos b + cos a sin b as sin(a + b)."""
-    (sa, ca) = a
-    (sb, cb) = b
-    (s, c) = total
+    sa, ca = a
+    sb, cb = b
+    s, c = total
     cosines = _merge_pairs(terms, (ca, cb), (sa, sb), c, -1)
     sines = _merge_pairs(terms, (sa, cb), (ca, sb), s, 1)
     return cosines or sines
@@ -154,9 +154,9 @@ def _add(terms: dict[Monomial, Fraction], a: _Places, b: _Places, total: _Places
 
 def _subtract(terms: dict[Monomial, Fraction], a: _Places, b: _Places, difference: _Places) -> bool:
     """Write cos a cos b + sin a sin b as cos(a - b), and sin a cos b - cos a sin b as sin(a - b)."""
-    (sa, ca) = a
-    (sb, cb) = b
-    (s, c) = difference
+    sa, ca = a
+    sb, cb = b
+    s, c = difference
     cosines = _merge_pairs(terms, (ca, cb), (sa, sb), c, 1)
     sines = _merge_pairs(terms, (sa, cb), (ca, sb), s, -1)
     return cosines or sines

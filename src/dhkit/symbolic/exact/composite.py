@@ -30,8 +30,8 @@ class JointTransform:
     @classmethod
     def of(cls, ring: Ring, a: Element, alpha: tuple[Element, Element], row: ExactRow) -> JointTransform:
         """Return Tx(a) Rx(alpha) Rz(theta) Tz(d)."""
-        (ca, sa) = alpha
-        (c, s) = row.theta
+        ca, sa = alpha
+        c, s = row.theta
         d = row.d
         R = np.array(
             [

@@ -239,8 +239,8 @@ def without_rounding(description: Description) -> tuple[Description, list[str]]:
         return rounded(name, value, number, PI * Fraction(quarter_turns, 2), ZERO_LENGTH)
 
     def end(name: str, placement: Placement) -> Placement:
-        (x, y, z) = placement.xyz
-        (roll, pitch, yaw) = placement.rpy
+        x, y, z = placement.xyz
+        roll, pitch, yaw = placement.rpy
         xyz = (length(f"x of the {name}", x), length(f"y of the {name}", y), length(f"z of the {name}", z))
         rpy = (
             angle(f"roll of the {name}", roll),

@@ -334,8 +334,8 @@ class _Builder:
         if first.operation != "select" or second.operation != "select":
             return None
 
-        (condition_1, value_1, otherwise_1) = first.arguments
-        (condition_2, value_2, otherwise_2) = second.arguments
+        condition_1, value_1, otherwise_1 = first.arguments
+        condition_2, value_2, otherwise_2 = second.arguments
         zero = self.constant(0.0)
         if otherwise_1 != zero or otherwise_2 != zero:
             return None

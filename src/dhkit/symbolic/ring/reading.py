@@ -76,9 +76,9 @@ class ExpressionReader:
         cosine = self.ring.constant(f"cos({angle.text})")
         sine = self.ring.constant(f"sin({angle.text})")
 
-        (c, s) = (self.ring.one, self.ring.zero)
+        c, s = (self.ring.one, self.ring.zero)
         for _ in range(int(abs(coefficient) / unit)):
-            (c, s) = sum_of_angles((c, s), (cosine, sine))
+            c, s = sum_of_angles((c, s), (cosine, sine))
 
         # cos(-x) = cos(x) and sin(-x) = -sin(x)
         return (c, s) if coefficient > 0 else (c, -s)
@@ -95,16 +95,16 @@ class ExpressionReader:
 
 def sum_of_angles(a: Direction, b: Direction) -> Direction:
     """Return cosine and sine of the sum of two angles, from the cosine and sine of each."""
-    (c_a, s_a) = a
-    (c_b, s_b) = b
+    c_a, s_a = a
+    c_b, s_b = b
     # cos(a + b) = cos a cos b - sin a sin b,  sin(a + b) = sin a cos b + cos a sin b
     return c_a * c_b - s_a * s_b, s_a * c_b + c_a * s_b
 
 
 def difference_of_angles(a: Direction, b: Direction) -> Direction:
     """Return cosine and sine of the difference of two angles, from the cosine and sine of each."""
-    (c_a, s_a) = a
-    (c_b, s_b) = b
+    c_a, s_a = a
+    c_b, s_b = b
     # cos(a - b) = cos a cos b + sin a sin b,  sin(a - b) = sin a cos b - cos a sin b
     return c_a * c_b + s_a * s_b, s_a * c_b - c_a * s_b
 
