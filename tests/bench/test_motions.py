@@ -91,6 +91,7 @@ def test_hard_cases_are_measured_and_reported():
     assert "| cobra600, jerk |" in report.markdown()
 
 
+@pytest.mark.slow
 def test_scenes_are_the_same_again_and_their_straight_way_collides():
     kind = SceneKind("ur5")
     first, again = next(scenes(kind, 3)), next(scenes(kind, 3))

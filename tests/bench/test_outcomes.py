@@ -194,6 +194,7 @@ def test_our_own_inverse_kinematics_agree_where_they_meet_positions_alone(name):
     assert {row.verdict.solutions for row in report.rows} == {len(arm.family.fit.branches)}
 
 
+@pytest.mark.slow
 def test_out_is_for_closed_forms():
     """An arm that ssik solves takes no out=: dhkit is timed without, and has not failed."""
     pytest.importorskip("ssik")

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from acceptance import slow_if
 from dhkit import Arm, Obstacle, Trajectory
 from dhkit.cli import main
 from dhkit.cli.arguments import objective
@@ -84,7 +85,7 @@ def test_the_motion_is_the_one_of_python(facts):
     assert said["duration_s"] == pytest.approx(arm.plan([0, 0.5], goal, intervals=16).duration, rel=1e-9)
 
 
-@pytest.mark.parametrize("where", ["to", "like", "matrix", "file"])
+@pytest.mark.parametrize("where", ["to", "like", slow_if(True, "matrix"), slow_if(True, "file")])
 def test_a_goal_may_be_given_in_several_ways(where, facts, tmp_path):
     arm = Arm.load("planar2r")
     q = np.array([0.9, 0.6])
@@ -124,7 +125,7 @@ def test_files_are_written_and_read_back(plan, tmp_path):
     assert "planar2r" in files[1].read_text("utf-8")
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".mat", ".yaml"])
+@pytest.mark.parametrize("suffix", [".csv", slow_if(True, ".mat"), slow_if(True, ".yaml")])
 def test_every_format_of_trajectories_is_written(suffix, plan, tmp_path):
     path = tmp_path / f"run{suffix}"
     status, out, _ = plan("planar2r", "--to", "1", "0.5", *COARSE, "-o", str(path))
@@ -157,6 +158,7 @@ def test_a_payload_takes_time(facts):
     assert empty["duration_s"] < point["duration_s"] < ahead["duration_s"]
 
 
+@pytest.mark.slow
 def test_an_objective_with_a_duration(facts):
     where = ("planar2r", "--to", "1", "0.5", "--duration", "1.5", "--objective")
     _, effort = facts(*where, "effort")
@@ -166,6 +168,7 @@ def test_an_objective_with_a_duration(facts):
     assert effort["objective"] == "effort"
 
 
+@pytest.mark.slow
 def test_on_the_way_it_passes_where_it_is_told(plan, tmp_path):
     path = str(tmp_path / "run.npz")
     via = [[0.5, 1.2], [0.9, 0.1]]
@@ -320,6 +323,7 @@ def test_the_page_plays_the_motion_that_is_written(monkeypatch, plan, tmp_path):
     assert np.abs(played.q - motion.q(played.times)).max() < FLOAT32
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("bar_at_once")
 def test_a_search_that_takes_long_says_how_far_it_is(plan):
     """The line is there from the start; what it said last is drawn when it ends, however fast the search was."""

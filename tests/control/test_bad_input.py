@@ -192,6 +192,7 @@ def test_torques_of_noise_have_no_continuous_solution(size):
     assert calls < MOST_CALLS
 
 
+@pytest.mark.slow
 def test_a_controller_may_switch_at_times():
     def square_wave(t, q, qd, setpoint):
         return damped(t, q, qd, setpoint) + 3 * np.sign(np.sin(200 * t))

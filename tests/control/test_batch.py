@@ -150,6 +150,7 @@ def test_what_is_kept():
         everything[5]
 
 
+@pytest.mark.slow
 def test_threads_and_sensors(compiled):
     arm = Arm.load("puma560")
     q, _ = states(arm, 9000)

@@ -69,6 +69,7 @@ def test_what_the_sensors_make_of_a_state():
     assert np.array_equal(np.array([x for x, _ in seen]), first)
 
 
+@pytest.mark.slow
 def test_independent_joints_and_gravity(law):
     law.samples(1)
     law.holds("rad, PID", peak(PID.tuned(ARM)), 1e-2)
@@ -85,6 +86,7 @@ def test_friction_is_compensated(law):
     assert helped < plain / 10
 
 
+@pytest.mark.slow
 def test_a_load_that_nobody_told_of():
     loaded = ARM.with_payload(2.5)
     wrong = peak(ComputedTorque.tuned(ARM), plant=loaded)

@@ -36,6 +36,7 @@ def test_it_follows_a_line(law):
     law.holds("rad, a line in 2 s", rotation, 7e-6)
 
 
+@pytest.mark.slow
 def test_it_passes_a_wrist_singularity(law):
     """The wrist is straightened and bent the other way; q5 crosses 0 at about 0.3 rad/s."""
     law.samples(1)

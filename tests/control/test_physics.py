@@ -294,6 +294,7 @@ def test_pushes_do_work(law):
     assert np.abs(run.qdd[200] - qdd).max() < 1e-9 * np.abs(qdd).max()
 
 
+@pytest.mark.slow
 def test_the_audit_closes_under_control(law):
     law.samples(1)
     control = ComputedTorque.tuned(PUMA)

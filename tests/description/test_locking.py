@@ -147,6 +147,7 @@ def test_right_angles_and_numbers_stay_exact():
     assert all(joint.theta.half_turns is not None and joint.alpha.half_turns is not None for joint in ours.joints)
 
 
+@pytest.mark.slow
 def test_parameters_stay_parameters():
     arm = lock(library_robot("planar3r"), {1: 0})
     assert arm.joints[0].a.text == "l1 + l2"

@@ -129,6 +129,7 @@ def test_a_payload_is_a_body_of_its_own():
         with_payload(loaded, 1)
 
 
+@pytest.mark.slow
 def test_locking_keeps_bodies_apart_where_links_stay_apart():
     arm = with_uniform_links(from_dh([(0, 0, 0.3, 0)] * 3))
     bodies = (*arm.joints[0].bodies, Body(exact(1), (exact(-0.1), ZERO, ZERO), name="motor"))

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given, settings, strategies as st
 
 from dhkit.description import library_robot
@@ -68,6 +69,7 @@ def test_the_rate_of_M_less_2_C_is_skew(law, arm):
     law.holds("Mdot - 2 C, skew", error.max(), RATES, arm)
 
 
+@pytest.mark.slow
 @settings(max_examples=ARMS)
 @given(tilted_arms(least=1))
 def test_terms_belong_together(law, arm):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
+from acceptance import slow_if
 from dhkit.description import from_dh, library_robot
 from dhkit.dynamics import inertial_parameters, inverse_dynamics, regressor
 from dhkit.model import pinocchio_model
@@ -17,6 +18,7 @@ from dhkit.verification.states import random_motions
 from random_arms import arms
 
 
+@pytest.mark.slow
 @given(arms(least=1, most=7))
 def test_torques_are_linear_in_the_parameters(law, description):
     motion = random_motions(description, law.samples(100))
@@ -29,7 +31,7 @@ def test_torques_are_linear_in_the_parameters(law, description):
     law.holds("regressor against Pinocchio's", float(relative_error(Y, reference, falling).max()), 1e-12)
 
 
-@pytest.mark.parametrize("name", ["planar2r", "cart_pendulum", "stanford", "puma560_akb"])
+@pytest.mark.parametrize("name", ["planar2r", "cart_pendulum", "stanford", slow_if(True, "puma560_akb")])
 def test_the_exact_regressor_is_the_numeric_one(name):
     description = library_robot(name)
     found = exact_regressor(lagrangian(description, "inertial"))

@@ -717,6 +717,7 @@ def test_a_state_that_sets_the_zero_is_as_exact_as_the_smallest_value_after_it()
 IN_HALF_ANGLES = V.replace("s1", "(2*sin(q1/2)*cos(q1/2))", 1)
 
 
+@pytest.mark.slow
 def test_a_right_energy_in_half_angles_is_undecided():
     assert verdict(V=IN_HALF_ANGLES) is Verdict.UNDECIDED
 

@@ -233,6 +233,7 @@ def test_progress_counts_poses_and_may_end_the_work():
         solve_numerically(arm, T, progress=stop)
 
 
+@pytest.mark.slow
 def test_threads_change_nothing():
     arm = library_robot("ur5")
     q, T = inside(arm, 9_000, seed=10)

@@ -392,6 +392,7 @@ def test_a_page_that_only_shows_says_so_however_often_it_is_asked():
         assert run(ask(view.url)) == {"this page only shows; it has nothing to ask for"}
 
 
+@pytest.mark.slow
 def test_a_flood_of_requests_is_answered_or_refused(lab):
     server, most = lab.view._live(), []
 
@@ -541,6 +542,7 @@ def test_what_a_page_asked_for_is_not_done_when_it_has_gone(lab):
 # Pages that are slow, runs that are long
 
 
+@pytest.mark.slow
 def test_what_waits_for_a_page_that_never_acknowledges_is_bounded(lab):
     """A page takes the scene and never says that it has drawn it, while a simulation streams."""
     server = lab.view._live()
@@ -603,6 +605,7 @@ def test_a_long_run_is_kept_whole_in_bounded_memory(monkeypatch):
     assert run._rows.nbytes == 100 * 15 * 8
 
 
+@pytest.mark.slow
 def test_pushes_at_a_time_are_bounded(monkeypatch):
     run = short_run(monkeypatch, 100)
     for _ in range(MAX_PUSHES):

@@ -53,6 +53,7 @@ def own(lab):
     return states(lab)["own"]
 
 
+@pytest.mark.slow
 def test_it_is_compared_where_the_arm_is_and_scored(beside):
     lab, _ = beside(solution("sign of the elbow"))
     lab.answer("joints.set", {"q": [0.2, 0.3, -0.3, 0.4, 0.7, 0.2]})

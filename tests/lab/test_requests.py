@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from acceptance import slow_if
 from dhkit import Arm
 from dhkit.description import from_toml, pose_parts
 from dhkit.lab.control_panel import ControlPanel
@@ -208,7 +209,7 @@ def test_an_arm_that_loses_its_closed_form_is_followed_by_iteration(open_lab):
     assert target["numeric"] and target["reached"] and len(target["branches"]) == 1
 
 
-@pytest.mark.parametrize("name", ["puma560", "planar2r", "stanford"])
+@pytest.mark.parametrize("name", ["puma560", "planar2r", slow_if(True, "stanford")])
 def test_motions_are_those_of_the_api(name, open_lab):
     lab = open_lab(name)
     arm = lab.desk.arm

@@ -174,6 +174,7 @@ def test_lengths_of_a_table_with_a_tilted_first_axis():
     assert np.abs([numbers.d, numbers.a]).max() < 5
 
 
+@pytest.mark.slow
 def test_verify_agrees_for_nearly_parallel_axes():
     assert Arm.load(DATA / "u03_nearly_parallel_verify" / "arm.urdf").verify(200).ok
 

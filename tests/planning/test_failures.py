@@ -203,6 +203,7 @@ def test_a_limit_of_time_is_there_for_those_who_ask(planner):
     )
 
 
+@pytest.mark.slow
 def test_the_default_limit_does_not_read_the_clock(monkeypatch):
     """On a machine that is busy for hours between two iterations the same motion is found, among obstacles too."""
     arm = library_robot("planar2r")

@@ -125,6 +125,7 @@ class Unfinished(Constraint):
     pass
 
 
+@pytest.mark.slow
 def test_a_planner_is_pickled_without_its_programs():
     made = planner(constraints=[ToolSpeed(5.0)], friction=True)
     made.solve([0, 0], [0.3, 0.1])

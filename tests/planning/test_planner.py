@@ -436,6 +436,7 @@ def test_progress_is_told_and_can_interrupt(planner):
     assert planner.solve(START, GOAL).report.certificate.ok
 
 
+@pytest.mark.slow
 def test_threads_take_turns(planner):
     goals = [GOAL + 0.05 * k * np.array([0, 1, 0, 1, 0, 1]) for k in range(4)]
     expected = [planner.solve(START, goal).duration for goal in goals]

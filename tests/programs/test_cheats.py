@@ -26,7 +26,7 @@ def score(arm, path, text, **options):
 
 @pytest.mark.parametrize(
     ("name", "torques"),
-    [slow_if(True, "puma560_cao", [0, 49.00754232, 0, 0, 0, 0]), ("cobra600", [0, 0, -19.62, 0])],
+    [slow_if(True, "puma560_cao", [0, 49.00754232, 0, 0, 0, 0]), slow_if(True, "cobra600", [0, 0, -19.62, 0])],
 )
 def test_a_constant_torque_follows_nothing(tmp_path, name, torques):
     share, _ = score(Arm.load(name), tmp_path / "c.py", f"def controller(t, q, qd, s): return {torques}\n")
@@ -97,6 +97,7 @@ def test_many_rows_are_refused_and_judged_in_no_time(tmp_path):
     assert "expected at most 64" in str(report)
 
 
+@pytest.mark.slow
 def test_who_never_reads_is_late_and_nobody_waits_for_ever(tmp_path):
     text = """
 import json, os, time

@@ -415,6 +415,7 @@ def fk(q):
 """
 
 
+@pytest.mark.slow
 def test_all_calls_together_are_limited_by_processor_time(program, monkeypatch):
     monkeypatch.setattr("dhkit.programs.caller.BOUNDS", replace(BOUNDS, time=0.5))
     monkeypatch.setattr("dhkit.programs.caller.WAITING_FACTOR", HANGS)  # of the clock, on a busy machine

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from acceptance import slow_if
 from dhkit import Arm, JointPath, Payload, Push, ToolDirection, ToolSpeed
 from dhkit.control import LQR
 
@@ -70,6 +71,6 @@ def test_a_duration_that_is_none_is_refused_in_one_line(name, duration, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("name", ["quintic", "plan, effort", "plan_path"])
+@pytest.mark.parametrize("name", ["quintic", "plan, effort", slow_if(True, "plan_path")])
 def test_long_durations_are_taken(name):
     assert MOTIONS[name](1e4).duration == pytest.approx(1e4)

@@ -103,6 +103,7 @@ def test_whole_turns_between_two_states_are_seen():
     assert not arm.certify(motion).ok
 
 
+@pytest.mark.slow
 def test_a_cubic_as_fast_as_torques_allow_keeps_them_between_samples():
     arm = dhkit.Arm.load("ur5").with_limits(velocity=np.full(6, 1e3))
     rng = np.random.default_rng(1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import dhkit
-from acceptance import ACCEPTING
+from acceptance import ACCEPTING, slow_if
 from dhkit.description import from_dh, library_robot
 from dhkit.viewer.diagrams import CURVE_COLORS, joint_color, joint_kinds, joint_style
 from dhkit.viewer.simulation_figures import CONTROLLER_COLORS, plot_comparison
@@ -28,7 +28,7 @@ def curves(axes, color=None):
     return [line for line in lines if color is None or line.get_color() == color]
 
 
-@pytest.mark.parametrize("name", ["planar2r", "puma560", "panda", "stanford"])
+@pytest.mark.parametrize("name", ["planar2r", "puma560", slow_if(True, "panda"), slow_if(True, "stanford")])
 def test_curves_are_the_results(name):
     arm = library_robot(name)
     result = swinging(arm)
@@ -53,6 +53,7 @@ def test_curves_are_the_results(name):
     assert np.allclose(curves(axes["rotation [mrad]"])[0].get_ydata(), 1e3 * result.tool_rotation_error)
 
 
+@pytest.mark.slow
 def test_bars_beyond_the_limit_cover_the_saturated_times():
     arm = library_robot("puma560")
     result = swinging(arm)
@@ -85,7 +86,9 @@ def test_torques_without_limits_are_in_newton_metres():
     assert "torque [N m]" in drawn(dhkit.plot(swinging(arm)))
 
 
-@pytest.mark.parametrize(("error", "unit"), [(1e-10, "prad"), (3e-5, "µrad"), (0.3, "mrad"), (2.5, "rad")])
+@pytest.mark.parametrize(
+    ("error", "unit"), [(1e-10, "prad"), slow_if(True, 3e-5, "µrad"), slow_if(True, 0.3, "mrad"), (2.5, "rad")]
+)
 def test_errors_are_in_units_that_are_read_easily(error, unit):
     result = swinging(library_robot("planar2r"), error=error, seconds=5.0)
     assert f"joint error [{unit}]" in drawn(dhkit.plot(result))

@@ -5,6 +5,7 @@ import io
 import numpy as np
 import pytest
 
+from acceptance import slow_if
 from dhkit.description import from_dh, library_robot, world_to_tool
 from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory, cubic, trapezoidal
@@ -20,7 +21,7 @@ def solid(axes):
     return [line for line in axes.lines if len(line.get_xdata()) > 2]
 
 
-@pytest.mark.parametrize("name", ["puma560", "planar2r", "cobra600", "panda"])
+@pytest.mark.parametrize("name", ["puma560", "planar2r", slow_if(True, "cobra600"), slow_if(True, "panda")])
 def test_curves_are_the_motions(name):
     arm = library_robot(name)
     lower, upper = np.maximum(arm.numbers.lower, -1), np.minimum(arm.numbers.upper, 1)

@@ -343,6 +343,7 @@ def test_verdicts_do_not_depend_on_the_seed(name):
 # Several mistakes
 
 
+@pytest.mark.slow
 def test_several_mistakes_of_a_branch_are_all_named():
     formulas = ["atan(py/px)", "sqrt(px^2 + py^2)*1000"]
     assert mistakes(judge("polar_rp", [formulas])) == [("quadrant", 0), ("millimetres_for_metres", 1)]

@@ -172,6 +172,7 @@ def test_a_length_of_the_table_is_not_another_of_the_same_value():
     assert NoteKind.ONLY_AT_VALUES in [note.kind for note in report.notes]
 
 
+@pytest.mark.slow
 def test_angles_of_the_table_are_read_as_such_where_all_steps_then_pass():
     """The Manutec r3 has an offset at joint 2; the worked solution writes theta2."""
     links = [f"(a2+a3*c3)*c2 - a3*s3*s2 = {TABLE_X}", "a3*s3*c2 + (a2+a3*c3)*s2 = pz"]

@@ -128,6 +128,7 @@ def test_limits_friction_and_shapes_are_the_files(tree):
     assert frame @ matrix(box.placement, {}) == pytest.approx(chain.zero_poses["hand"] @ T, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_several_tips_are_listed_and_none_is_taken_in_silence(tree):
     with pytest.raises(
         ModelError,

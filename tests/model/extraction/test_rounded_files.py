@@ -47,7 +47,7 @@ def example_urdfs():
     return [(one.name, one.path, one.base, one.tip) for one in chains if 2 <= len(one.joints) <= 7]
 
 
-@pytest.mark.parametrize("decimals", [3, slow_if(True, 4), slow_if(True, 5), 6])
+@pytest.mark.parametrize("decimals", [3, slow_if(True, 4), slow_if(True, 5), slow_if(True, 6)])
 def test_tables_of_rounded_files_are_as_large_as_the_arm(law, decimals, tmp_path):
     file = tmp_path / "rounded.urdf"
     every = [*library_urdfs(), *example_urdfs()]
@@ -66,7 +66,7 @@ def test_tables_of_rounded_files_are_as_large_as_the_arm(law, decimals, tmp_path
         law.holds("residual over reach times a unit of the last decimal", float(off) / rounding, 1.0, name)
 
 
-@pytest.mark.parametrize("name", ["ur5", slow_if(True, "panda"), "irb140"])
+@pytest.mark.parametrize("name", ["ur5", slow_if(True, "panda"), slow_if(True, "irb140")])
 def test_what_is_computed_of_a_rounded_file_agrees(name, tmp_path):
     """verify, the comparison with the file, and inverse kinematics by iteration, as for the exact file."""
     file = tmp_path / "rounded.urdf"

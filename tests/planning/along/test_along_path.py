@@ -6,6 +6,7 @@ import casadi
 import numpy as np
 import pytest
 
+from acceptance import slow_if
 from dhkit.description import library_robot, pose, world_to_tool
 from dhkit.dynamics import friction_torque, gravity_torque, inverse_dynamics, mass_matrix
 from dhkit.errors import PlanningError
@@ -145,7 +146,7 @@ def test_it_is_as_quick_as_toppra(speed, law):
         law.holds("excess", excess(motion, limits), KEPT, seed)
 
 
-@pytest.mark.parametrize("name", LINES)
+@pytest.mark.parametrize("name", [slow_if(name == "panda", name) for name in LINES])
 def test_it_is_as_quick_as_toppra_along_a_line(name):
     toppra = pytest.importorskip("toppra")
     arm, *_, path = line_of(name)
@@ -244,7 +245,7 @@ def test_tool_speed_is_kept():
 
 @pytest.mark.parametrize(
     "constraint",
-    [MotorPower(20.0), TorqueSpeedLine(tuple(Limits.of(PUMA).torque), 3.0), ToolAcceleration(3.0)],
+    [MotorPower(20.0), slow_if(True, TorqueSpeedLine(tuple(Limits.of(PUMA).torque), 3.0)), ToolAcceleration(3.0)],
     ids=lambda constraint: constraint.what,
 )
 def test_other_constraints_are_kept_and_used(constraint, tool_motion):
@@ -446,6 +447,7 @@ def power(motion):
     return np.sum(reference_torques(motion.description)(motion.q(t), qd, motion.qdd(t)) * qd, axis=1)
 
 
+@pytest.mark.slow
 def test_friction_slows_a_motion_down_and_is_in_its_torques(tool_motion):
     arm, path, free = tool_motion
     for wanted in ("time", "effort"):

@@ -39,6 +39,7 @@ def test_a_polynomial_that_overflows_is_not_certified():
     assert check.excess == np.inf
 
 
+@pytest.mark.slow
 def test_what_is_not_checked_is_said():
     rows = [(0, 0.3, 0, "pi/2"), (0, 0, 0.4, 0), (0, 0, 0.3, 0)]
     bare = dhkit.Arm.from_dh(rows).with_limits(velocity=[2.0] * 3, torque=[50.0] * 3)

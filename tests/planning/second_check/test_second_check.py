@@ -16,6 +16,7 @@ PLANNED = ("library", "locked", "table", "urdf")
 """Kinds of arms of planned motions."""
 
 
+@pytest.mark.slow
 def test_no_certificate_is_refuted(law, tmp_path):
     """Of random motions with limits and clearances that a certificate just accepts, or with room."""
     certified = 0

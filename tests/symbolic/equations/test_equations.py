@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from acceptance import slow_if
 from dhkit.description import library_robot, read_robot, robots
 from dhkit.expressions import parse
 from dhkit.symbolic.equations import equations_sympy, equations_text, plain_text, quantities
@@ -127,7 +128,8 @@ def test_what_is_printed_in_sums_of_angles_reads_back(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "symbols", "what"), [("puma560", "none", "Mg"), ("jaco", "none", "g"), ("puma560", "inertial", "Mg")]
+    ("name", "symbols", "what"),
+    [("puma560", "none", "Mg"), ("jaco", "none", "g"), slow_if(True, "puma560", "inertial", "Mg")],
 )
 def test_collecting_keeps_every_term(name, symbols, what):
     lag = lagrangian(library_robot(name), symbols)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from acceptance import slow_if
 from conftest import require
 from dhkit.description import library_robot, read_robot
 from dhkit.symbolic.equations import equations_c, equations_matlab, equations_python, matlab_files, quantities
@@ -106,7 +107,7 @@ def test_python(name, symbols, what, equations):
         assert_equal(np.asarray(function(*(x[0] for x in inputs))), wanted[0])
 
 
-@pytest.mark.parametrize(("name", "symbols", "what"), CASES)
+@pytest.mark.parametrize(("name", "symbols", "what"), [slow_if(case[0] in {"al5d", "jaco"}, *case) for case in CASES])
 def test_c(name, symbols, what, equations, tmp_path):
     gcc = require("gcc", "the compiler of Debian's gcc")
     lag, states = equations(name, symbols)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 
 import dhkit
-from acceptance import different_robots_first, sample_size
+from acceptance import different_robots_first, sample_size, slow_if
 from dhkit.description import from_dh, library_robot, with_uniform_links
 from dhkit.model import pinocchio_model
 from dhkit.symbolic.exact.base_parameters import base_parameters
@@ -51,13 +51,14 @@ def test_equations_in_base_parameters_are_the_full_ones(name):
     assert base_parameters(library_robot(name)).prove()
 
 
-@pytest.mark.parametrize("name", ["planar3r", "stanford", "cobra600", "al5d", "puma560"])
+@pytest.mark.parametrize("name", ["planar3r", "stanford", "cobra600", "al5d", slow_if(True, "puma560")])
 def test_base_parameters_agree_with_pinocchio(name):
     lag = base_parameters(library_robot(name)).lagrangian
     for error in errors(lag, 5, ("M", "C", "h", "g", "tau", "K")).values():
         assert error <= 1e-12
 
 
+@pytest.mark.slow
 @settings(max_examples=sample_size(20, quick=8))
 @given(arms(least=1, most=3).filter(in_general_position))
 def test_random_arms(description):

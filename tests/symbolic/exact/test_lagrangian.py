@@ -344,6 +344,7 @@ def test_exact_puma_without_flint_is_fast(law):
     law.takes("both proofs of it, sympy alone, s", perf_counter() - start, 5.0)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("sympy_rings")
 def test_exact_panda_without_flint_is_fast(law):
     law.samples(1)

@@ -167,12 +167,14 @@ def test_any_arm_of_the_pumas_family(law, arm):
     check_family(law, arm)
 
 
+@pytest.mark.slow
 @settings(max_examples=sample_size(1000, quick=8))
 @given(arm=three_parallel_arms())
 def test_any_arm_of_the_urs_family(law, arm):
     check_family(law, arm)
 
 
+@pytest.mark.slow
 @settings(max_examples=sample_size(1000, quick=8))
 @given(arm=slide_arms())
 def test_any_arm_of_the_stanfords_family(law, arm):
