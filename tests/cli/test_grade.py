@@ -12,7 +12,7 @@ import pytest
 from dhkit.cli import grade
 from dhkit.cli.grade_output import Delivery
 from dhkit.errors import AnswerError
-from dhkit.grading.report import Entry, GradeReport, Verdict
+from dhkit.grading.grade_report import Entry, GradeReport, Verdict
 from dhkit.grading.rubric import Credit, Rubric
 from grading.judged import REPORT
 

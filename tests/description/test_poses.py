@@ -102,3 +102,11 @@ def test_batches_broadcast():
 def test_what_is_no_pose_is_said(call, complaint):
     with pytest.raises(ValueError, match=complaint):
         call()
+
+
+def test_rotations_typed_with_six_decimals_are_poses():
+    rng = np.random.default_rng(0)
+    R = Rotation.random(20_000, random_state=rng).as_matrix().round(6)
+    T = np.tile(np.eye(4), (len(R), 1, 1))
+    T[:, :3, :3] = R
+    assert check_pose(T).shape == T.shape

@@ -2,8 +2,8 @@
 
 from hypothesis import strategies as st
 
+from dhkit.grading.grade_report import Diagnosis, Entry, GradeReport, Verdict, Witness
 from dhkit.grading.remarks import Note, NoteKind
-from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict, Witness
 
 SIGN = Diagnosis("gravity_sign", "gravity has the wrong sign", "g", ("g1",), hint="look at the sign of V")
 REPORT = GradeReport(

@@ -34,8 +34,8 @@ from dhkit.grading.answers.reading import read_answer
 from dhkit.grading.answers.vocabulary import Vocabulary
 from dhkit.grading.batch import GIGABYTE, grade_all
 from dhkit.grading.entry_points import grade_answers, prepare
+from dhkit.grading.grade_report import GradeReport, Verdict
 from dhkit.grading.marks import marks
-from dhkit.grading.report import GradeReport, Verdict
 from dhkit.grading.rubric import Rubric
 from dhkit.grading.sheets import Sheet, find_sheets
 from grading_attacks import (

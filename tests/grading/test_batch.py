@@ -14,8 +14,8 @@ import pytest
 from dhkit.errors import AnswerError
 from dhkit.grading.batch import GIGABYTE, grade_all
 from dhkit.grading.bounds import BOUNDS
+from dhkit.grading.grade_report import Entry, GradeReport, Verdict
 from dhkit.grading.isolation import WorkerLimits
-from dhkit.grading.report import Entry, GradeReport, Verdict
 from dhkit.grading.sheets import Sheet, find_sheets
 from grading.judged import REPORT
 
@@ -178,7 +178,7 @@ def test_a_parent_without_standard_files():
         "from pathlib import Path\n"
         "from dhkit.grading.batch import grade_all\n"
         "from dhkit.grading.sheets import Sheet\n"
-        "from dhkit.grading.report import GradeReport\n"
+        "from dhkit.grading.grade_report import GradeReport\n"
         "(report,) = grade_all([Sheet(Path('a'))], lambda path: GradeReport('planar2r'))\n"
         "os._exit(7 if report.robot == 'planar2r' else 1)\n"
     )

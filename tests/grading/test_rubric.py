@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from dhkit.errors import AnswerError
+from dhkit.grading.grade_report import Diagnosis, GradeReport, Verdict
 from dhkit.grading.marks import marks
-from dhkit.grading.report import Diagnosis, GradeReport, Verdict
 from dhkit.grading.reports import with_feedback
 from dhkit.grading.rubric import Credit, Rubric
 from grading.judged import REPORT, reports

@@ -49,7 +49,7 @@ class ThreadScaling:
 
     @property
     def share(self) -> float:
-        """Dhkit's gain over that of the control loop, which is what the machine can give."""
+        """Dhkit's gain over that of the control loop, which is the machine's own."""
         return self.dhkit / self.control
 
     @property
@@ -89,7 +89,7 @@ class PeakMemory:
 
     @property
     def peak(self) -> int:
-        """Memory that the call needs, bytes: its arrays, and what it allocates besides."""
+        """Memory that the call needs, bytes: its arrays, and other allocations."""
         held = self.inputs + (self.outputs if self.called == "out=" else 0)
         return held + self.extra
 

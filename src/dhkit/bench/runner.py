@@ -20,6 +20,7 @@ from dhkit.bench.rounds import calm, items_within, lasting, repeated, rounds
 from dhkit.description import Array
 
 _DYNAMICS = {"inverse_dynamics", "mass_matrix", "forward_dynamics"}
+"""Quantities with which derivations are timed too."""
 _MAX_DERIVATION_TIME = 90.0
 """Longest time of a peer's derivation, s: nobody would wait longer."""
 REPEATS = 9
@@ -30,18 +31,18 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class _Entrant:
-    """A contender that takes part, with a call that computes ``items`` items ``times`` times."""
+    """A contender that takes part, with a call that repeats a batch of ``items`` items ``repetitions`` times."""
 
     contender: Contender
     verdict: Verdict
     items: int
-    times: int
+    repetitions: int
     call: Call
 
 
 @dataclass
 class _Measurements:
-    """The measurements so far, which are reported also by an interrupted run."""
+    """The measurements so far, kept if the run is interrupted; fields have the names of :class:`BenchReport`'s."""
 
     rows: list[Row] = field(default_factory=list)
     missing: list[Missing] = field(default_factory=list)
@@ -85,7 +86,8 @@ def run(
     progress
         Called with a line before each step.
     probes
-        Whether threads, memory and new processes are measured too and, with dynamics, derivations.
+        Whether threads, memory and first calls in new processes are measured too. For quantities of dynamics, peers'
+        derivations are timed as well.
     contenders
         The contenders; by default all.
     targets
@@ -144,7 +146,7 @@ def outcome_of(quantity: str, rows: Iterable[Row], missing: Iterable[Missing]) -
     """Return how the comparison of a quantity ended.
 
     A contender fails if it raises an error, or if its answers disagree with the reference. A contender that is not
-    installed, or not made for the arm, does not fail: it counts only if dhkit itself, or every contender, is so.
+    installed, or not made for the arm, does not fail: this matters only if dhkit is unavailable, or all contenders are.
 
     Parameters
     ----------
@@ -161,17 +163,17 @@ def outcome_of(quantity: str, rows: Iterable[Row], missing: Iterable[Missing]) -
     fk: every contender failed; peer: failed: TypeError: 7 arguments
     """
     rows = [row for row in rows if row.quantity == quantity]
-    missing = [gap for gap in missing if gap.quantity == quantity]
-    raised = [(gap.own, f"{gap.name}: {gap.reason}") for gap in missing if gap.failed]
+    absent = [one for one in missing if one.quantity == quantity]
+    raised = [(one.own, f"{one.name}: {one.reason}") for one in absent if one.failed]
     disagreeing = [(row.own, f"{row.contender}: {row.verdict}") for row in rows if not row.verdict.ok]
     own_failed = tuple(cause for own, cause in (*raised, *disagreeing) if own)
     peers_failed = tuple(cause for own, cause in (*raised, *disagreeing) if not own)
-    own_unavailable = tuple(f"{gap.name}: {gap.reason}" for gap in missing if gap.own and not gap.failed)
+    own_unavailable = tuple(f"{one.name}: {one.reason}" for one in absent if one.own and not one.failed)
 
     if not any(row.verdict.ok for row in rows):
         if own_failed or peers_failed:
             return Outcome(quantity, Ending.ALL_FAILED, (*own_unavailable, *own_failed, *peers_failed))
-        return Outcome(quantity, Ending.NOTHING_TIMED, tuple(f"{gap.name}: {gap.reason}" for gap in missing))
+        return Outcome(quantity, Ending.NOTHING_TIMED, tuple(f"{one.name}: {one.reason}" for one in absent))
     if own_failed:
         return Outcome(quantity, Ending.OWN_FAILED, own_failed)
     if own_unavailable and not any(row.own for row in rows):
@@ -208,6 +210,7 @@ def _compare(
 def _entrants(
     workload: Workload, contenders: Sequence[Contender], measurements: _Measurements, tell: Progress
 ) -> Iterator[_Entrant]:
+    """Yield the contenders that can be timed; the others are added to the missing ones of ``measurements``."""
     for contender in contenders:
         tell(f"{contender.quantity}: {contender.name}")
         try:
@@ -215,10 +218,12 @@ def _entrants(
             verdict = judge(workload, contender.quantity, task)
             items = items_within(task, contender.mode, len(workload.q))
             call = task.prepare(items)
-            times = lasting(call)
-            yield _Entrant(contender, verdict, items, times, repeated(call, times))
+            repetitions = lasting(call)
+            entrant = _Entrant(contender, verdict, items, repetitions, repeated(call, repetitions))
         except Exception as error:  # a peer may fail in any way; the report names it
             measurements.missing.append(_missing(contender.quantity, contender.name, error, own=contender.own))
+        else:
+            yield entrant
 
 
 def _missing(quantity: str, name: str, error: Exception, *, own: bool = False) -> Missing:
@@ -229,8 +234,12 @@ def _missing(quantity: str, name: str, error: Exception, *, own: bool = False) -
 
 
 def _rows(entrants: Sequence[_Entrant], seconds: Array) -> list[Row]:
-    """Return the rows of timings, shape (rounds, entrants), s; ratios are those within a round."""
-    per_item = seconds / np.array([entrant.items * entrant.times for entrant in entrants])
+    """Return the rows of timings, shape (rounds, entrants), s.
+
+    A ratio is the median over the rounds of an entrant's time an item by that of dhkit's reference call.
+    """
+    per_item = seconds / np.array([entrant.items * entrant.repetitions for entrant in entrants])
+    # Quartiles, s
     lower, middle, upper = np.quantile(per_item, [0.25, 0.5, 0.75], axis=0)
     names = [entrant.contender.name for entrant in entrants]
 

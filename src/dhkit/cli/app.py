@@ -27,10 +27,11 @@ MAX_WORD_LENGTH = 120
 MAX_MESSAGE_LENGTH = 600
 """Longest message on stderr, characters."""
 LONG_WORD = re.compile(rf"\S{{{2 * MAX_WORD_LENGTH},}}")
+"""A word that is cut to MAX_WORD_LENGTH, since it is twice as long or more."""
 
 UsageError = cast(type[Exception], typer.BadParameter.__mro__[2])
-"""Click's base class of usage errors. Newer versions of typer contain their own click, so that ``import click`` has
-another one."""
+"""``click.ClickException``, the base class of usage errors: BadParameter is a UsageError, and that a ClickException.
+Newer versions of typer contain their own click, so that ``import click`` has another one."""
 
 
 COMMANDS = {

@@ -22,22 +22,27 @@ from dhkit.description.files import check_place
 
 app = typer.Typer(rich_markup_mode=None)
 
+_ERASE_LINE = "\r\x1b[K"
+"""Terminals' control sequence: to the beginning of the line, and erase it."""
+
 
 @app.command()
 def bench(
     quantities: Annotated[list[str] | None, typer.Argument(help="Quantities to time; default: all.")] = None,
     robot: Annotated[str, typer.Option(help="A library name or a robot file.")] = "puma560",
-    batch: Annotated[int, typer.Option(min=1, max=10_000_000, help="Number of items of a batch.")] = 100_000,
+    batch: Annotated[int, typer.Option(min=1, max=10_000_000, help="Configurations or poses in a batch.")] = 100_000,
     threads: Annotated[int, typer.Option(min=1, max=1024, help="Number of threads that batch calls may use.")] = 1,
     repeats: Annotated[int, typer.Option(min=1, max=1000, help="Number of interleaved rounds.")] = 9,
     seed: Seed = 0,
     probes: Annotated[bool, typer.Option(help="Measure thread scaling, memory and first calls too.")] = True,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write NAME.md and NAME.json as well.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="NAME", help="Write NAME.md and NAME.json as well.")
+    ] = None,
     json: Json = False,
 ) -> ExitStatus:
     """Time our kinematics and dynamics beside every installed peer: median, spread and ratios.
 
-    Exit status 1: dhkit itself, or every contender of a quantity, failed or could not be timed.
+    Exit status 1: dhkit itself, or every contender of a quantity, disagreed, failed or could not be timed.
 
     Quantities: fk, ik, jacobian, inverse_dynamics, mass_matrix, forward_dynamics.
     """
@@ -67,25 +72,38 @@ def run(
     json: bool,
     targets: Callable[[BenchReport], tuple[Requirement, ...]] | None = None,
 ) -> ExitStatus:
-    """Run the benchmark, print its report, and name the quantities that failed on stderr.
+    """Run the benchmark, print its report, judged by ``targets``, and name the quantities that failed on stderr.
 
-    The status is NO if dhkit itself, or every contender of a quantity, failed or could not be timed; INTERRUPTED if
-    Ctrl-C ended the run early. Peers that fail beside dhkit are noted.
+    The status is NO if dhkit itself, or every contender of a quantity, disagreed, failed or could not be timed;
+    INTERRUPTED if Ctrl-C ended the run early. Peers that fail beside dhkit are noted.
     """
     if output is not None:
-        check_place(output)
+        for file in _files(output):
+            check_place(file)
     progress = _Progress()
-    report = run_bench(arm, quantities, batch, threads, repeats, seed, progress.show, probes=probes, targets=targets)
+    report = run_bench(
+        arm,
+        quantities,
+        batch=batch,
+        threads=threads,
+        repeats=repeats,
+        seed=seed,
+        progress=progress.show,
+        probes=probes,
+        targets=targets,
+    )
     progress.clear()
-    for path in write(report, output) if output else ():
-        sys.stderr.write(f"dhkit: wrote {path}\n")
+    if output is not None:
+        for file in write(report, output):
+            sys.stderr.write(f"dhkit: wrote {file}\n")
     if json:
         print_json(report.json())
     else:
         say(str(report))
     for outcome in report.outcomes:
         if outcome.ending is not Ending.COMPLETE:
-            sys.stderr.write(f"dhkit: {'note: ' if outcome.ok else ''}{outcome}\n")
+            note = "note: " if outcome.ok else ""  # peers failed, and dhkit did not
+            sys.stderr.write(f"dhkit: {note}{outcome}\n")
     if report.interrupted:
         return ExitStatus.INTERRUPTED
     return ExitStatus.FINE if all(outcome.ok for outcome in report.outcomes) else ExitStatus.NO
@@ -93,10 +111,15 @@ def run(
 
 def write(report: Report, path: Path) -> tuple[Path, Path]:
     """Write a report as Markdown and as JSON, whatever the path's suffix; return the two files."""
-    files = path.with_suffix(".md"), path.with_suffix(".json")
-    write_atomically(files[0], report.markdown())
-    write_atomically(files[1], json_format.dumps(report.json(), ensure_ascii=False, allow_nan=False, indent=1) + "\n")
-    return files
+    markdown, json = _files(path)
+    write_atomically(markdown, report.markdown())
+    write_atomically(json, json_format.dumps(report.json(), ensure_ascii=False, allow_nan=False, indent=1) + "\n")
+    return markdown, json
+
+
+def _files(path: Path) -> tuple[Path, Path]:
+    """Return the Markdown and the JSON file of a report; the path's own suffix is replaced."""
+    return path.with_suffix(".md"), path.with_suffix(".json")
 
 
 class _Progress:
@@ -108,10 +131,10 @@ class _Progress:
     def show(self, line: str) -> None:
         """Show the present step."""
         line = visible(line)
-        styled(sys.stderr).write(f"\r\x1b[K{line}" if self.terminal else f"{line}\n")
+        styled(sys.stderr).write(f"{_ERASE_LINE}{line}" if self.terminal else f"{line}\n")
         sys.stderr.flush()
 
     def clear(self) -> None:
         """Clear the terminal's line."""
         if self.terminal:
-            styled(sys.stderr).write("\r\x1b[K")
+            styled(sys.stderr).write(_ERASE_LINE)

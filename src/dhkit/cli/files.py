@@ -123,7 +123,7 @@ def _pairs(words: Sequence[str], option: str, example: str) -> dict[int, str]:
     Raises
     ------
     DescriptionError
-        A word is no such pair, or a link is there twice.
+        A word is not such a pair, or a link is there twice.
     """
     pairs: dict[int, str] = {}
     for word in words:

@@ -26,8 +26,8 @@ from dhkit.grading.answers.sheet import read_sheet, read_task
 from dhkit.grading.batch import GIGABYTE, Judge, grade_all
 from dhkit.grading.entry_points import prepare, robot_of
 from dhkit.grading.explanation import explanation_html, explanation_text
+from dhkit.grading.grade_report import GradeReport, Verdict
 from dhkit.grading.options import GradeOptions
-from dhkit.grading.report import GradeReport, Verdict
 from dhkit.grading.reports import read_reports
 from dhkit.grading.rubric import Rubric
 from dhkit.grading.schema import template as empty_sheet

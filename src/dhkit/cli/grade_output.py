@@ -18,8 +18,8 @@ from dhkit.description import write_atomically
 from dhkit.description.files import check_place
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.answers.sources import SHEET_SUFFIXES
+from dhkit.grading.grade_report import GradeReport
 from dhkit.grading.marks import Marks, marks
-from dhkit.grading.report import GradeReport
 from dhkit.grading.reports import (
     gradescope,
     html_class,

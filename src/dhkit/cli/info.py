@@ -47,7 +47,7 @@ def robots(
 
 @app.command()
 def info(robot: Robot, json: Json = False) -> None:
-    """Show a robot: its DH table, limits, masses, configurations and what is odd about it."""
+    """Show a robot: its DH table, limits, masses, configurations and warnings."""
     arm = read_arm(robot)
     if json:
         print_json(_facts(arm))

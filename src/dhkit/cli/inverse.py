@@ -88,7 +88,7 @@ class ReachedPose:
         return min(self.shown, key=lambda k: float(distances[k]))
 
     def flags(self, k: int) -> list[str]:
-        """Return descriptions of what is special about a branch."""
+        """Return descriptions of a branch's special properties."""
         return [text for flag, text in FLAG_DESCRIPTIONS.items() if self.solutions.flags[k] & flag]
 
     @property

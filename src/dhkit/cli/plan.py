@@ -143,7 +143,7 @@ def plan(
 ) -> ExitStatus:
     """Plan the best motion to joint values or a pose, certified; exit status 1 where there is none.
 
-    Sliding joints are in m and N. Numbers may be expressions such as 17*inch or pi/2.
+    Prismatic joints are in m and N. Numbers may be expressions such as 17*inch or pi/2.
     """
     arm = load_arm(robot, uniform)
     pose = {"xyz": xyz, "matrix": matrix, "like": like}
@@ -239,7 +239,7 @@ def _line(arm: Arm, start: Array, goal: Array, options: PlanOptions) -> JointPat
 
 
 def _caption(report: PlanReport) -> str:
-    """Return what a page says about a motion: what it is, what it keeps, and what limits it."""
+    """Return a page's text about a motion: its kind, its constraints, and the limits that are active."""
     active = ", ".join(f"{name} ({100 * share:.0f} % of the time)" for name, share in report.active_limits()[:3])
     sentences = [
         f"A planned motion: {report.title}, certified by {report.certificate.reference}.",

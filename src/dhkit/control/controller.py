@@ -128,7 +128,7 @@ def call_controller(controller: Callable[..., object], t: float, *arguments: obj
 
 
 def _failure(what: str, error: Exception, when: str = "") -> SimulationError:
-    """Return the error of a run that says, in one line, what of the controller raised which exception."""
+    """Return a run's error: one line with the method of the controller and the exception that it raised."""
     return SimulationError(f"{what} raised {type(error).__name__}{when}: {' '.join(str(error).split())}")
 
 

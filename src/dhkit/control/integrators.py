@@ -30,7 +30,7 @@ MAX_EXCESS_STEPS = 50_000
 HALVINGS = 24
 """Number of bisections in the search for a jump: a smooth change becomes 2^-24 of itself, 6e-8."""
 JUMP_SHARE = 1e-6
-"""Share of the change of the torques on the line searched above which what is left after all bisections is a jump."""
+"""Share of the torques' whole change on the line searched: a larger change left after all bisections is a jump."""
 LOOK_AHEAD = 10.0
 """Length of the line on which a jump is looked for, in steps: a step that is accepted often ends just before the jump
 that the rejected, longer steps crossed."""

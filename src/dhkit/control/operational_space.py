@@ -136,7 +136,7 @@ class OperationalSpace:
         a_0 = a_0 / scale
 
         # With J = U S V^T the inverse of Lambda = (J M^-1 J^T)^-1 is U (S V^T M^-1 V S) U^T. Near a singular direction,
-        # where sigma < threshold, its diagonal is what it would be at the threshold, so that forces stay finite.
+        # where sigma < threshold, its diagonal has the value at the threshold, so that forces stay finite.
         rank = self._rank
         U, sigma, Vt = np.linalg.svd(J, full_matrices=False)
         U = U[:, :rank]

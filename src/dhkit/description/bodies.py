@@ -62,6 +62,10 @@ class Inertia:
         return repr_line("Inertia", "", f"{entries} kg m^2")
 
 
+PAYLOAD = "payload"
+"""Name of the body that :func:`dhkit.description.changes.with_payload` adds; of several, further ones are numbered."""
+
+
 @dataclass(frozen=True)
 class Body:
     """A rigid body's mass, kg, centre of mass, m, and inertia about it, in the axes of its link's own DH frame."""
@@ -73,6 +77,11 @@ class Body:
     """The inertia is known to be impossible and kept as published: a warning, no error."""
     name: str = ""
     """Empty for a link's only body; of several, the joint names those without a name ``body 1``, ``body 2`` ..."""
+
+    @property
+    def is_payload(self) -> bool:
+        """Whether its name is that of a payload: ``payload``, ``payload 2`` ..."""
+        return self.name.partition(" ")[0] == PAYLOAD
 
     def __repr__(self) -> str:
         return repr_line("Body", self.name, f"{self.mass} kg, centre of mass {vector_text(self.com)} m")

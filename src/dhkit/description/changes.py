@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description.arrays import Array, number_array
-from dhkit.description.bodies import ORIGIN, Body, ExactPose, Inertia, Vector, moved_body, rod
+from dhkit.description.bodies import ORIGIN, PAYLOAD, Body, ExactPose, Inertia, Vector, moved_body, rod
 from dhkit.description.exact_poses import fixed_row, inverse, pose_of
 from dhkit.description.frames import one_each
 from dhkit.description.named import Named
@@ -144,8 +144,8 @@ def with_payload(
     x, y, z = (quantity(f"payload: com[{i}]", entry, parameters) for i, entry in enumerate(com))
     weight = quantity("payload: mass", mass, parameters)
     taken = {body.name for body in last.bodies}
-    numbered_names = (f"payload {k}" for k in itertools.count(2))
-    name = next(name for name in itertools.chain(["payload"], numbered_names) if name not in taken)
+    numbered_names = (f"{PAYLOAD} {k}" for k in itertools.count(2))
+    name = next(name for name in itertools.chain([PAYLOAD], numbered_names) if name not in taken)
     tensor = Inertia() if inertia is None else Inertia.of_tensor(_inertia_tensor(inertia))
     load = Body(weight, (x, y, z), tensor, name=name)
     check_body(load, "payload", resolved(parameters))

@@ -26,7 +26,7 @@ def read_bounded(
     expected: str = "a robot file",
     error_type: type[DhkitError] = DescriptionError,
 ) -> bytes:
-    """Return a regular file's bytes; ``expected`` says in a message what the file should be.
+    """Return a regular file's bytes; ``expected`` is the kind of file, for messages.
 
     Raises
     ------

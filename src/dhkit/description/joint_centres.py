@@ -1,8 +1,9 @@
 """Joint centres of an arm whose table has lengths far beyond its size: points on its axes that lie close together.
 
 The common normal of two nearly parallel axes may be kilometres away, and a and d with it. The arm itself is where its
-joints are: on each axis the point p_i is taken such that the sum of |p_(i+1) - p_i|^2 along the chain, from frame 0 to
-the tool, is smallest.
+joints are: on the axis of joint i, i = 1 to n, the point p_i is taken such that the sum over i = 0 to n of
+|p_(i+1) - p_i|^2 is smallest, where p_0 is the origin of frame 0 and p_(n+1) the tool's origin. Each term is the length
+of a link, which joint angles do not change.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ _Z = np.array([0.0, 0.0, 1.0])
 
 
 class LinkEnds(NamedTuple):
-    """The points on its two joint axes at which each link, 0 to n, begins and ends, in its DH frame, m."""
+    """The points at which each link, 0 to n, begins and ends, in its own DH frame, m: joint centres p_i and p_(i+1)."""
 
     begin: Array
-    """Shape (n+1, 3)."""
+    """Shape (n+1, 3); row 0 is the origin of frame 0."""
     end: Array
-    """Shape (n+1, 3); that of the last link is the tool."""
+    """Shape (n+1, 3); row n is the tool's origin."""
 
     @property
     def lengths(self) -> Array:

@@ -1,11 +1,14 @@
 """Joints locked in place: a shorter arm with a table of its own, the same motion and the same masses.
 
-Between two moving joints the locked row is a fixed transform Y. Written as
+Between the axes of the joints before and after it, the locked row A_i(q_i) is part of a fixed transform,
 
-    Y = Rz(beta) Tz(epsilon) Tx(a) Rx(alpha) Rz(gamma) Tz(delta)
+    standard:  Y = Tx(a) Rx(alpha) of the row before, times A_i;    modified:  Y = A_i times Tx(a) Rx(alpha) of the row
+    after.
 
-it is again a row: rotations about and shifts along a joint's own axis commute with the joint and go into its theta and
-d. This is the common normal of the two axes, computed from Y's entries (Denavit & Hartenberg 1955).
+Written as Y = Rz(beta) Tz(epsilon) Tx(a) Rx(alpha) Rz(gamma) Tz(delta), it is again a part of a row: rotations about
+and shifts along a joint's own axis commute with the joint, so that beta and epsilon are added to theta and d of the row
+before, gamma and delta to those of the row after. This is the common normal of the two axes, computed from Y's entries
+(Denavit & Hartenberg 1955).
 """
 
 from __future__ import annotations
@@ -35,7 +38,7 @@ from dhkit.description.parameters import needs, resolved
 from dhkit.description.robot import Description, takes_robot
 from dhkit.description.table_rows import Quantity, quantity
 from dhkit.description.traversal import expressions_in, names_in, with_values
-from dhkit.description.values import Base, Convention, Joint, Shape, Tool
+from dhkit.description.values import ONE, Base, Convention, Joint, Shape, Tool
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import (
     PI,
@@ -43,11 +46,9 @@ from dhkit.expressions import (
     Budget,
     Expression,
     arc_tangent,
-    cos,
     exact_angle,
     parse,
     settled,
-    sin,
     sqrt,
     substitute,
 )
@@ -92,8 +93,9 @@ def lock(description: Description, joints: Mapping[int | str, Quantity]) -> Desc
     """Return the arm with some joints locked, their links joined to the link before, or to the base.
 
     Every remaining joint keeps its zero, limits and drive; configurations lose the locked entries. The drives of
-    locked joints are removed, and their couplings: their rotors add nothing to the torques of the others. If a link
-    has no body, the joined link has none either.
+    locked joints are removed, and their couplings: a rotor that also turns with another joint is part of that joint's
+    link (:class:`dhkit.description.values.Coupling`). If a link has no body, the joined link has none either; a base
+    without a body takes that of the link joined to it.
 
     Lengths and masses that are parameters stay parameters. Parameters that determine angles of the locked rows are
     replaced by their numbers, everywhere in the arm, since the new row's form depends on them; all parameters are,
@@ -121,10 +123,10 @@ def lock(description: Description, joints: Mapping[int | str, Quantity]) -> Desc
             for expression in expressions_in(shorter):
                 if expression.symbols:
                     parse(expression.text, shorter.parameters)
-            replace(shorter)
+            replace(shorter)  # runs the checks of a description
         return shorter
     except ExpressionError:
-        pass
+        log.debug("%s: the budget of exact arithmetic is spent", description.name)
     except DescriptionError as error:
         # The check of the new description may have exhausted the same budget; a real fault is raised again below.
         log.debug("%s: %s", description.name, error)
@@ -163,8 +165,8 @@ def _angle_names(description: Description, locked: Mapping[int, Expression]) -> 
     names = names_in((description.base.placement.rpy, description.tool.placement.rpy))
     for place, q in locked.items():
         joint = description.joints[place]
-        neighbours = description.joints[max(place - 1, 0) : place + 2]
-        names |= names_in(tuple(neighbour.alpha for neighbour in neighbours)) | joint.theta.symbols
+        rows = description.joints[max(place - 1, 0) : place + 2]  # with one on either side
+        names |= names_in(tuple(row.alpha for row in rows)) | joint.theta.symbols
         names |= q.symbols if joint.is_revolute else frozenset()
     return names
 
@@ -172,15 +174,16 @@ def _angle_names(description: Description, locked: Mapping[int, Expression]) -> 
 def _with_numbers(
     description: Description, locked: Mapping[int, Expression], names: frozenset[str]
 ) -> tuple[Description, dict[int, Expression]]:
-    """Replace parameters, and those that depend on each other with them, by their numbers everywhere."""
+    """Replace parameters by their numbers everywhere, with all that their values contain and all that contain them."""
     parameters = description.parameters
     values = resolved(description.parameters)
-    # Neither what a replaced parameter is made of nor what is made of it may change on its own any more.
+    # Parameters in the value of a replaced one, and those computed from it, may not change on their own any more.
     previous = frozenset[str]()
     while names != previous:
         previous = names
         names |= {name for name in values if needs(name, parameters) & names}
         names = names.union(*(needs(name, parameters) for name in names))
+    # All parameters as numbers first, so that no value of one that remains contains one that goes.
     known = {name: values[name] for name in names}
     remaining = Named({name: value for name, value in parameters.items() if name not in known})
     fixed = with_values(replace(description, parameters=Named(values)), known)
@@ -190,7 +193,9 @@ def _with_numbers(
 def _lock_all(description: Description, locked: Mapping[int, Expression]) -> Description:
     """Lock joints one by one: those next to the base outwards, the others from the tip inwards.
 
-    So no common normal is taken of two axes of which one is joined to the base: nearly parallel ones would cost digits.
+    A joint next to the base becomes part of the base's placement, without a common normal. From the tip inwards it
+    would first join the link before, by the common normal of two axes, which costs digits where these are parallel
+    to a few digits.
     """
     bodies = tuple(joint.bodies or (None,) for joint in description.joints)
     base: _LinkBodies = (description.base.body,) if description.base.body is not None else ()
@@ -198,10 +203,12 @@ def _lock_all(description: Description, locked: Mapping[int, Expression]) -> Des
     values = resolved(description.parameters)
     first = next(place for place in range(description.n + 1) if place not in locked)
     inwards = sorted((place for place in locked if place > first), reverse=True)
-    for place, shift in (*((place, place) for place in range(first)), *((place, first) for place in inwards)):
-        chain = _lock_one(chain, description.convention, place - shift, locked[place], values)
+    for place in range(first):
+        chain = _lock_one(chain, description.convention, 0, locked[place], values)  # those before it are gone
+    for place in inwards:
+        chain = _lock_one(chain, description.convention, place - first, locked[place], values)
     moving = [i for i in range(description.n) if i not in locked]
-    numbers = {i + 1: k for k, i in enumerate(moving, start=1)}  # of the joints that remain
+    new_numbers = {i + 1: k for k, i in enumerate(moving, start=1)}  # couplings count joints from 1
     on_base = [body for body in chain.bodies[0] if body is not None]
     return replace(
         description,
@@ -212,9 +219,9 @@ def _lock_all(description: Description, locked: Mapping[int, Expression]) -> Des
         ),
         tool=chain.tool,
         couplings=tuple(
-            replace(coupling, joints=(numbers[coupling.joints[0]], numbers[coupling.joints[1]]))
+            replace(coupling, joints=(new_numbers[coupling.joints[0]], new_numbers[coupling.joints[1]]))
             for coupling in description.couplings
-            if numbers.keys() >= set(coupling.joints)
+            if new_numbers.keys() >= set(coupling.joints)
         ),
         configurations=Named({name: tuple(q[i] for i in moving) for name, q in description.configurations.items()}),
     )
@@ -264,16 +271,21 @@ def _join_link_before(
     before, locked, after = chain.joints[place - 1 : place + 2]
     if convention is Convention.STANDARD:
         normal = _common_normal(translation(x=before.a) @ rotation_x(before.alpha) @ row, values)
-        # From the locked frame to the new one: what is right of a and alpha in Y, the shortest expression of it.
-        to_new = rotation_z(normal.gamma) @ translation(z=normal.delta) @ inverse(row)
+        # The new frame stands after a and alpha in Y, and the locked one at its end, so that
+        # T_new_locked = Rz(gamma) Tz(delta) and T_new_before = T_new_locked A_i^-1.
+        T_new_before = rotation_z(normal.gamma) @ translation(z=normal.delta) @ inverse(row)
         before = replace(before, a=normal.a, alpha=normal.alpha)
     else:
         normal = _common_normal(row @ translation(x=after.a) @ rotation_x(after.alpha), values)
-        to_new = inverse(rotation_z(normal.beta) @ translation(z=normal.epsilon))
+        # The frame before stands at the beginning of Y, the new one after beta and epsilon.
+        T_new_before = inverse(rotation_z(normal.beta) @ translation(z=normal.epsilon))
         after = replace(after, a=normal.a, alpha=normal.alpha)
-    before = _screw_about_axis(_with_shapes_of(before, locked, to_new, to_new @ row), normal.beta, normal.epsilon)
+    T_new_locked = T_new_before @ row
+    joined_link = _with_shapes_of(before, locked, T_new_before, T_new_locked)
+    before = _screw_about_axis(joined_link, normal.beta, normal.epsilon)
     after = _screw_about_axis(after, normal.gamma, normal.delta)
-    bodies = _moved_bodies(chain.bodies[place], to_new) + _moved_bodies(chain.bodies[place + 1], to_new @ row)
+    own_bodies = _moved_bodies(chain.bodies[place], T_new_before)
+    bodies = own_bodies + _moved_bodies(chain.bodies[place + 1], T_new_locked)
     return _ArmParts(
         chain.base,
         (*chain.joints[: place - 1], before, after, *chain.joints[place + 2 :]),
@@ -285,12 +297,14 @@ def _join_link_before(
 def _with_shapes_of(before: Joint, locked: Joint, T_new_before: ExactPose, T_new_locked: ExactPose) -> Joint:
     """Return the link before with the locked link's shapes, both moved into the new frame."""
     shapes = _joined_shapes(_moved_shapes(before.shapes, T_new_before), _moved_shapes(locked.shapes, T_new_locked))
-    assumed = tuple(dict.fromkeys(before.assumed + ("body",) * ("body" in locked.assumed)))
+    assumed = before.assumed
+    if "body" in locked.assumed and "body" not in assumed:
+        assumed = (*assumed, "body")
     return replace(before, shapes=shapes, assumed=assumed)
 
 
 def _joined_shapes(before: tuple[Shape, ...], locked: tuple[Shape, ...]) -> tuple[Shape, ...]:
-    """Return the shapes of a link and of one that is locked to it, whose bodies are numbered on."""
+    """Return the shapes of a link and of one that is locked to it, whose ``body`` numbers continue those before."""
     count = 1 + max((shape.body for shape in before), default=0)
     return before + tuple(replace(shape, body=count + shape.body) for shape in locked)
 
@@ -317,15 +331,19 @@ def _common_normal(Y: ExactPose, values: Mapping[str, Expression]) -> _Row:
     if math.hypot(number(Y[0, 2]), number(Y[1, 2])) < _PARALLEL_SINE:
         row = _parallel_axes_row(Y, is_opposite=number(Y[2, 2]) < 0)
     else:
-        row = _skew_axes_row(Y, number)
+        row = _nonparallel_axes_row(Y, number)
     angles = ("beta", "alpha", "gamma")
     return _Row(*(settled(value, angle=name in angles) for name, value in row._asdict().items()))
 
 
 def _parallel_axes_row(Y: ExactPose, is_opposite: bool) -> _Row:
-    """Return the row of axes that point in equal or opposite directions: a normal through the first joint's frame."""
-    # delta = 0 and epsilon = z: the normal of length a = hypot(x, y) points to (x, y), so
-    # tan(beta) = y / x. Y turns x by beta + gamma if the axes point alike, by beta - gamma if they are opposite.
+    """Return the row of axes in equal or opposite directions, by the normal through the origin of the first frame.
+
+    The angle between them is taken to be exactly 0 or pi, which moves a point 1 m away by up to 1e-10 m.
+    """
+    # delta = 0 and epsilon = z. The normal points to (x, y): a (cos(beta), sin(beta)) = (x, y), with a = x or a = y,
+    # of either sign, along an axis of the frame. Y rotates x by beta + gamma if the axes point alike, by beta - gamma
+    # if they are opposite.
     x, y, z = Y[:3, 3]
     turn = arc_tangent(Y[1, 0], Y[0, 0])
     if y.is_zero:
@@ -337,36 +355,39 @@ def _parallel_axes_row(Y: ExactPose, is_opposite: bool) -> _Row:
     else:
         beta = arc_tangent(y, x)
         a = sqrt(x * x + y * y)
-    return _Row(beta, z, a, PI if is_opposite else ZERO, beta - turn if is_opposite else turn - beta, ZERO)
+    alpha = PI if is_opposite else ZERO
+    gamma = beta - turn if is_opposite else turn - beta
+    return _Row(beta, z, a, alpha, gamma, ZERO)
 
 
-def _skew_axes_row(Y: ExactPose, number: Callable[[Expression], float]) -> _Row:
-    """Return the row of other axes: beta from the second axis' direction, the rest from its position."""
+def _nonparallel_axes_row(Y: ExactPose, number: Callable[[Expression], float]) -> _Row:
+    """Return the row of skew or intersecting axes: angles from Y's rotation; a, delta and epsilon from its position."""
     # The second axis (u, v, w) is perpendicular to the normal (cos beta, sin beta, 0), so
     #     (u, v) = sin(alpha) (sin beta, -cos beta),    w = cos(alpha).
     x, y, z = Y[:3, 3]
     u, v, w = Y[:3, 2]
     if u.is_zero:
         beta = ZERO
-        sine = -v
+        cos_beta = ONE
+        sin_beta = ZERO
+        sin_alpha = -v
     elif v.is_zero:
         beta = PI / 2
-        sine = u
+        cos_beta = ZERO
+        sin_beta = ONE
+        sin_alpha = u
     else:
         beta = arc_tangent(u, -v)
-        sine = sqrt(u * u + v * v)
-    if u.is_zero or v.is_zero:
-        c = cos(beta)
-        s = sin(beta)
-    else:
-        c = -v / sine
-        s = u / sine
+        sin_alpha = sqrt(u * u + v * v)
+        cos_beta = -v / sin_alpha
+        sin_beta = u / sin_alpha
 
-    # Y's position is a (c, s, 0) + epsilon (0, 0, 1) + delta (u, v, w). Across the normal only delta counts:
-    #     x s - y c = delta sin(alpha),    x c + y s = a,    z = epsilon + delta w.
-    delta = (x * s - y * c) / sine
+    # Y's position is a (cos(beta), sin(beta), 0) + epsilon (0, 0, 1) + delta (u, v, w), so
+    #     x sin(beta) - y cos(beta) = delta sin(alpha),    x cos(beta) + y sin(beta) = a,    z = epsilon + delta w.
+    delta = (x * sin_beta - y * cos_beta) / sin_alpha
+    a = x * cos_beta + y * sin_beta
 
     # Row z of Y is (sin(alpha) sin(gamma), sin(alpha) cos(gamma), cos(alpha)).
-    sign = -1 if number(sine) < 0 else 1
+    sign = -1 if number(sin_alpha) < 0 else 1
     gamma = arc_tangent(Y[2, 0] * sign, Y[2, 1] * sign)
-    return _Row(beta, z - delta * w, x * c + y * s, arc_tangent(sine, w), gamma, delta)
+    return _Row(beta, z - delta * w, a, arc_tangent(sin_alpha, w), gamma, delta)

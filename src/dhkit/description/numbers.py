@@ -78,7 +78,7 @@ class Numbers:
     configurations: dict[str, Array]
     """Joint vectors by name, shape (n,), rad and m."""
     reach: float
-    """The sum of abs(a) + abs(d) + stroke, m; with ``link_ends``, of their lengths and the strokes."""
+    """The sum of abs(a) + abs(d) and of the finite strokes, m; with ``link_ends``, of their lengths and the strokes."""
     link_ends: LinkEnds | None
     """Ends of the links where a and d are not sizes of the arm, since axes are nearly parallel; see
     :mod:`dhkit.description.joint_centres`."""

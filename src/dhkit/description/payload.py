@@ -1,4 +1,4 @@
-"""A load that the tool carries, as a value, for planned motions and joint torques."""
+"""A rigid load that the tool carries: mass, centre of mass and inertia, for planned motions and joint torques."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ class Payload:
     Raises
     ------
     DescriptionError
-        Other shapes, numbers that are not finite, a negative mass, or an inertia with a negative eigenvalue.
+        Other shapes, numbers that are not finite, a negative mass, or an inertia that is not symmetric or has a
+        negative eigenvalue. The triangle inequality of the moments is checked where it is joined to an arm.
     TypeError
         Not numbers.
 
@@ -37,7 +38,7 @@ class Payload:
     com: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Centre of mass in the tool's frame, m."""
     inertia: tuple[tuple[float, ...], ...] | None = None
-    """Shape (3, 3), about the centre of mass in the tool's axes, kg m^2; None: a point."""
+    """Shape (3, 3), about the centre of mass in the tool's axes, kg m^2; None, as zeros become: a point mass."""
 
     def __post_init__(self) -> None:
         given_inertia = np.zeros((3, 3)) if self.inertia is None else self.inertia
@@ -52,7 +53,7 @@ class Payload:
 
         if self.mass < 0:
             raise DescriptionError(f"payload: mass is {self.mass:g} kg; expected none below 0")
-        moments = np.linalg.eigvalsh(tensor)
+        moments = np.linalg.eigvalsh(tensor)  # ascending
         if moments[0] < -eigenvalue_tolerance(float(moments[-1])):
             raise DescriptionError(
                 f"payload: inertia has the eigenvalue {moments[0]:.6g} kg m^2; expected none below 0"
@@ -70,7 +71,10 @@ class Payload:
 
     @property
     def numbers(self) -> Array:
-        """Mass, kg, centre of mass, m, and xx, yy, zz, xy, yz, xz, kg m^2, shape (10,)."""
+        """Mass, kg, centre of mass, m, and entries xx, yy, zz, xy, yz, xz of the inertia, kg m^2, shape (10,).
+
+        The inertia is about the centre of mass; off-diagonal entries have the tensor's sign, xy = -integral of x y dm.
+        """
         tensor = np.zeros((3, 3)) if self.inertia is None else np.array(self.inertia)
         return np.array([self.mass, *self.com, *(tensor[place] for place in INERTIA_PLACES.values())], dtype=float)
 
@@ -78,7 +82,7 @@ class Payload:
     def of_numbers(cls, numbers: Array) -> Payload:
         """Return the payload of ten :attr:`numbers`."""
         if numbers.shape != (10,):
-            raise DescriptionError(f"payload has shape {numbers.shape}; expected (10,)")
+            raise DescriptionError(f"payload: numbers has shape {numbers.shape}; expected (10,)")
         tensor = np.zeros((3, 3))
         for value, (i, j) in zip(numbers[4:], INERTIA_PLACES.values(), strict=True):
             tensor[i, j] = tensor[j, i] = value

@@ -7,8 +7,9 @@ from numpy.typing import ArrayLike
 
 from dhkit.description.arrays import Array, number_array
 
-ORTHONORMAL = 1e-6
-"""Largest entry of R^T R - 1 of a matrix that is accepted as a rotation: users type six digits."""
+ORTHONORMAL = 2e-6
+"""Largest entry of R^T R - 1 of a matrix that is accepted as a rotation. Users type six decimals: errors of up to 5e-7
+in each entry of R change R^T R by up to 2 sqrt(3) 5e-7 = 1.7e-6."""
 
 
 def pose(
@@ -26,7 +27,7 @@ def pose(
     xyz
         Position, shape (..., 3), m.
     euler
-        Three angles, shape (..., 3), rad or degrees, in the order's sequence.
+        Three angles, shape (..., 3), rad or degrees, one for each letter of ``order``.
     order
         Three axes, neighbours different. Capitals turn about the moving axes, as in SciPy: ``"XYZ"`` is Rx Ry Rz;
         small letters about the fixed ones: ``"xyz"`` is Rz Ry Rx, a URDF's rpy.
@@ -44,6 +45,8 @@ def pose(
     ------
     ValueError
         Another shape or order, both euler and quat, or a quaternion of zero length.
+    TypeError
+        Not numbers.
 
     Examples
     --------
@@ -68,8 +71,9 @@ def pose(
 def pose_parts(T: ArrayLike, *, order: str = "XYZ", degrees: bool = False) -> tuple[Array, Array]:
     """Return position and Euler angles of a pose.
 
-    Where the first and third axis coincide (gimbal lock) only their sum or difference is determined: the third angle
-    is then 0. Angles come from arc tangents alone, which keep full precision near it.
+    Where the first and third axis coincide (gimbal lock), only the sum or difference of their angles is determined: the
+    third angle is then 0, and for an order in small letters the first. Angles come from arc tangents alone, which keep
+    full precision near gimbal lock.
 
     Parameters
     ----------
@@ -101,7 +105,13 @@ def pose_parts(T: ArrayLike, *, order: str = "XYZ", degrees: bool = False) -> tu
 
 
 def pose_quaternion(T: ArrayLike) -> Array:
-    """Return the unit quaternions (x, y, z, w) with w >= 0, shape (..., 4), of poses, shape (..., 4, 4), m."""
+    """Return the unit quaternions (x, y, z, w) with w >= 0, shape (..., 4), of poses, shape (..., 4, 4), m.
+
+    Raises
+    ------
+    ValueError
+        Another shape, a matrix that is not a rigid transform, or NaN.
+    """
     from scipy.spatial.transform import Rotation
 
     R = check_pose(T)[..., :3, :3]
@@ -110,12 +120,12 @@ def pose_quaternion(T: ArrayLike) -> Array:
 
 
 def check_pose(T: ArrayLike, name: str = "T") -> Array:
-    """Return T as an array of poses, shape (..., 4, 4), m; poses with NaN pass.
+    """Return T as an array of poses, shape (..., 4, 4), m; NaN passes: it stands for a pose that is not known.
 
     Raises
     ------
     ValueError
-        Not of shape (..., 4, 4), or some matrix is not a rigid transform within 1e-6.
+        Not of shape (..., 4, 4), or some matrix is not a rigid transform within 2e-6.
     """
     array = number_array(T, name, "(..., 4, 4)")
     if array.shape[-2:] != (4, 4):
@@ -135,15 +145,26 @@ def one_pose(T: ArrayLike, name: str = "T") -> Array:
     Raises
     ------
     ValueError
-        Another shape, values that are not finite, or no rigid transform within 1e-6.
+        Another shape, values that are not finite, or no rigid transform within 2e-6.
     """
     array = number_array(T, name, "(4, 4)")
-    if array.shape != (4, 4) or not np.isfinite(array).all():
-        raise ValueError(f"{name} has shape {array.shape}; expected (4, 4), finite values")
+    if array.shape != (4, 4):
+        raise ValueError(f"{name} has shape {array.shape}; expected (4, 4)")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} has values that are not finite; expected a pose")
     return check_pose(array, name)
 
 
+def inverse_pose(T: Array) -> Array:
+    """Return the inverse of a rigid transform (R, p), T (4, 4), m, shape (4, 4): (R^T, -R^T p)."""
+    inverse = np.eye(4)
+    inverse[:3, :3] = T[:3, :3].T
+    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    return inverse
+
+
 def _array(name: str, value: ArrayLike, size: int) -> Array:
+    """Return a value as an array of numbers, shape (..., size)."""
     array = number_array(value, name, f"(..., {size})")
     if array.shape[-1:] != (size,):
         raise ValueError(f"{name} has shape {array.shape}; expected (..., {size})")
@@ -151,7 +172,7 @@ def _array(name: str, value: ArrayLike, size: int) -> Array:
 
 
 def _axes(order: str) -> tuple[tuple[int, int, int], bool]:
-    """Return the axes' indices in the sequence of intrinsic rotations, and whether the order is extrinsic."""
+    """Return the indices i, j, k of R = R_i R_j R_k, x = 0, and whether the order is extrinsic (about fixed axes)."""
     upper = order.upper()
     intrinsic = order == upper
     extrinsic = order == order.lower()
@@ -175,7 +196,7 @@ def _cos_sin(angles: Array, degrees: bool) -> tuple[Array, Array]:
     quadrant = np.where(np.isfinite(quarter), np.mod(quarter, 4), 0)
     cosine = np.select([quadrant == 0, quadrant == 1, quadrant == 2], [c, -s, -c], s)
     sine = np.select([quadrant == 0, quadrant == 1, quadrant == 2], [s, c, -s], -c)
-    return cosine + 0.0, sine + 0.0
+    return cosine + 0.0, sine + 0.0  # no -0.0
 
 
 def _from_euler(angles: Array, order: str, degrees: bool) -> Array:
@@ -198,7 +219,15 @@ def _from_euler(angles: Array, order: str, degrees: bool) -> Array:
 
 
 def _to_euler(R: Array, order: str) -> Array:
-    """Return the angles of R = R_i(p) R_j(q) R_k(r) (Shoemake, Graphics Gems IV, 1994, with atan2 throughout)."""
+    """Return the angles of R = R_i(first) R_j(middle) R_k(third) (Shoemake, Graphics Gems IV, 1994).
+
+    o is the axis that is neither i nor j, and e = +1 where (i, j, o) is right-handed, -1 otherwise. With p, q and r for
+    the three angles, the entries that are used are
+
+        k = o:  R_io = e sin q,    (R_ii, R_ij) = cos q (cos r, -e sin r),    (R_jo, R_oo) = cos q (-e sin p, cos p);
+        k = i:  R_ii = cos q,      (R_ji, R_oi) = sin q (sin p, -e cos p);
+        gimbal lock, r = 0:        (R_jj, R_oj) = (cos p, e sin p).
+    """
     (i, j, k), extrinsic = _axes(order)
     o = 3 - i - j
     parity = 1.0 if (j - i) % 3 == 1 else -1.0

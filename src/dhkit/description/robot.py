@@ -50,12 +50,19 @@ class Description(RobotData):
 
     @property
     def reach(self) -> float:
-        """An upper bound of the distance from frame 0 to frame n: the sum of abs(a) + abs(d) + stroke, m."""
+        """Length of the arm, m: the sum of abs(a) + abs(d) and of the prismatic joints' finite strokes.
+
+        Where nearly parallel axes make a and d far longer than the arm, the lengths between joint centres, the tool
+        included, are summed instead (:mod:`dhkit.description.joint_centres`). With limits on all prismatic joints it
+        bounds the distance from frame 0 to frame n or, in the second case, to the tool.
+        """
         return self.numbers.reach
 
     @cached_property
     def digest(self) -> str:
-        """First twelve hexadecimal digits of the SHA-256 of its robot file's text; equal robots have equal digests.
+        """First twelve hexadecimal digits of the SHA-256 of its robot file's text.
+
+        Equal robots written in the same units have equal digests; the units are part of the text.
 
         Examples
         --------
@@ -96,7 +103,7 @@ class Description(RobotData):
         if (x, y, z) != (0.0, 0.0, 0.0):
             texts.append(f"tool at ({x:.4g}, {y:.4g}, {z:.4g}) m")
         values = resolved(self.parameters)
-        masses = [body.mass for body in self.joints[-1].bodies if body.name.startswith("payload")]
+        masses = [body.mass for body in self.joints[-1].bodies if body.is_payload]
         if masses:
             texts.append(f"carrying {sum(float(substitute(mass, values)) for mass in masses):.4g} kg")
         return texts

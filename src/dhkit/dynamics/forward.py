@@ -99,8 +99,8 @@ def require_inertia(description: Description) -> None:
     if np.all(joints >= 0):
         names = _named(description, np.unique(joints))
         raise DescriptionError(
-            f"{description.name}: the mass matrix is singular: {names} no inertia; give the links behind a body with "
-            "inertia, or the drive a rotor inertia"
+            f"{description.name}: the mass matrix is singular: {names} no inertia; give a link that the "
+            "joint moves a body with inertia, or the drive a rotor inertia"
         )
 
 

@@ -4,15 +4,19 @@ This file is executed by its path in a process of its own, and imports nothing o
 descriptor 3, answers lines of JSON on descriptor 4. What is answered is text that dhkit reads like any answer: a file
 which changes sympy, numpy or this program only changes its own answer.
 
-The first line has the file's functions and the names that it assigns. Requests are
+The first line is ``{"functions": [...], "names": {name: line}}``, or ``{"error": text, "line": number}`` where the file
+failed. Each request has an ``id``, which its answer repeats; blank lines are skipped. Requests and their answers are
 
-- ``{"value": name}``: what a name is;
-- ``{"call": name, "arguments": {...}, "as": kind}``: what a function returns, and its local names. Arguments are
-  names of symbols, lists of them, or objects of them, made as sympy symbols in arrays of numpy's ("numpy") or in
-  matrices ("sympy"), or as CasADi's ("casadi");
-- ``{"call": name, "samples": [{...}, ...], "local": name}``: what it returns, or one of its local names, at numbers.
+- ``{"value": name}``: the value of a name, ``{"tree": value, "definitions": {name: text}}``;
+- ``{"call": name, "arguments": {...}, "as": kind, "locals": [name, ...]}``: a function's result for symbols, and the
+  local names asked for, ``{"tree": value, "locals": {name: value}, "definitions": {...}}``. Arguments are names of
+  symbols, lists of them, or objects of them, made as sympy symbols in arrays of numpy's ("numpy") or in matrices
+  ("sympy"), or as CasADi's ("casadi");
+- ``{"call": name, "samples": [{...}, ...], "local": name}``: its result for numbers, or, where ``local`` is not empty,
+  the local variable of this name; ``{"values": [...]}``: numbers, null where they are not finite.
 
-Values are text, lists of them, or objects ``{"fields": {...}}``; ``{"error": ...}`` stands for what is not an answer.
+Symbolic values are text, lists of it, or objects ``{"fields": {...}}``; ``{"error": text}`` stands for a value that is
+not an answer. ``{"imported": ["dhkit"]}`` is a line of its own.
 
 Arguments: the folder of the packages that the file may import, empty where it may import all; the file.
 """
@@ -43,8 +47,11 @@ MAX_NODES = 20_000
 MAX_CHARACTERS = 1_000_000
 """Largest length of a value's text, in characters."""
 MAX_ENTRIES = 10_000
+MAX_BITS = 4_000
+"""Largest number of bits of a whole number, about 1,200 decimal digits."""
 DIGITS = 15
-"""Digits of a double: further ones come from arithmetic."""
+"""Digits to which doubles are written: a decimal number of 15 digits comes back from a double unchanged. It rounds by
+up to 5e-15, relatively, so that 0.1 + 0.2 is read as 0.3."""
 ELEMENTARY = "sin cos tan sinh cosh tanh sqrt exp log"
 INVERSES = {"arcsin": "asin", "arccos": "acos", "arctan": "atan", "arctan2": "atan2"}
 """numpy's names of sympy's functions."""
@@ -71,19 +78,19 @@ def main(packages: str, path: str) -> None:
         code = compile(source, name, "exec")
         lines = assigned_lines(source)
         symbolic.install()
-        if b"casadi" in source:
+        if b"casadi" in source:  # importing CasADi takes time
             number_symbols_from_one()
         namespace = Namespace(symbolic)
         namespace |= {"__name__": "__main__", "__file__": name}
         with symbolic.calculating():
             exec(code, namespace)  # noqa: S102 - this process is made for it
-    except BaseException as error:
+    except BaseException as error:  # SystemExit and KeyboardInterrupt of the file too
         write(error_fields(error, name))
         return
     program = ExecutedFile(namespace, name, symbolic)
     write({"functions": program.functions(), "names": program.names(lines)})
     for line in requests:
-        if not line.strip():
+        if not line.strip():  # empty lines stand between requests, for Octave
             continue
         request = json.loads(line)
         answer: dict[str, object] = {"id": request["id"]}
@@ -118,7 +125,7 @@ def error_fields(error: BaseException, file: str) -> dict[str, object]:
 
 
 def assigned_lines(source: bytes) -> dict[str, int]:
-    """Return the line of the last assignment of each name outside functions."""
+    """Return the line of the last assignment of each name outside functions and classes."""
     lines: dict[str, int] = {}
     waiting: list[ast.AST] = [ast.parse(source)]
     while waiting:
@@ -151,7 +158,7 @@ class Symbolic:
 
     @contextlib.contextmanager
     def calculating(self) -> Iterator[None]:
-        """Let arrays that are made meanwhile hold symbols."""
+        """Within this context numpy.zeros and its like return arrays of objects, which hold symbols."""
         before = self.is_on
         self.is_on = True
         try:
@@ -169,8 +176,8 @@ class Symbolic:
         names = {name: name for name in ELEMENTARY.split()} | INVERSES
         for name, own in names.items():
             self._add_method(name, getattr(self.sympy, own))
-            for of_math in {name, own} & set(dir(math)):
-                setattr(math, of_math, self._of_symbols(getattr(math, of_math), getattr(self.sympy, own)))
+            for math_name in {name, own} & set(dir(math)):  # math has asin, as sympy has, and not arcsin
+                setattr(math, math_name, self._of_symbols(getattr(math, math_name), getattr(self.sympy, own)))
         self._add_method("deg2rad", self.sympy.rad)
         self._add_method("rad2deg", self.sympy.deg)
         for name in ("zeros", "ones", "eye", "identity", "empty") if self.numpy is not None else ():
@@ -192,16 +199,18 @@ class Symbolic:
         def made(*arguments: Any, **keywords: Any) -> Any:
             array = make(*arguments, **keywords)
             has_type = "dtype" in keywords
-            if self.is_on and not has_type and array.dtype.kind == "f":
-                # Zeros and ones as whole numbers: a double 0.0 would make 0.0*m1 of an entry.
-                return array.astype(int).astype(object) if make.__name__ != "empty" else array.astype(object)
-            return array
+            if not self.is_on or has_type or array.dtype.kind != "f":
+                return array
+            if make.__name__ == "empty":
+                return array.astype(object)
+            # Zeros and ones as whole numbers: a double 0.0 would make 0.0*m1 of an entry.
+            return array.astype(int).astype(object)
 
         return made
 
 
 def number_symbols_from_one() -> None:
-    """Let ``SX.sym("q", 2)`` have the symbols q1 and q2: CasADi calls them q_0 and q_1, which reads as q1."""
+    """Let ``SX.sym("q", 2)`` have the symbols q1 and q2: CasADi calls them q_0 and q_1, and q_1 would be read as q1."""
     try:
         import casadi
     except ImportError:
@@ -210,6 +219,7 @@ def number_symbols_from_one() -> None:
 
     def sym(name: str, *size: Any) -> Any:
         """Return a symbol, a vector of numbered ones, or a matrix of those with two numbers."""
+        # sym(name), sym(name, m), sym(name, m, n), sym(name, (m, n)) or sym(name, sparsity)
         first = size[0] if size else 1
         stated = first if isinstance(first, tuple) else size
         shape = first.shape if hasattr(first, "shape") else stated
@@ -226,7 +236,11 @@ def number_symbols_from_one() -> None:
 
 
 class Namespace(dict[str, Any]):
-    """The names of a file; one that neither it nor Python defines is a symbol, or sympy's sine."""
+    """The names of a file; one that neither it nor Python defines is a symbol, or sympy's sine.
+
+    Python looks up a global name with ``__missing__`` where globals are of a subclass of dict, and among its builtins
+    after a KeyError.
+    """
 
     def __init__(self, symbolic: Symbolic) -> None:
         super().__init__()
@@ -283,9 +297,10 @@ class ExecutedFile:
                 continue
             needed = [one.name for one in parameters if one.default is one.empty]
             line = code.co_firstlineno if code.co_filename == self.file else 0
+            # Texts in the function that may be keys of a parameter: p["m1"]
             keys = [one for one in code.co_consts if isinstance(one, str) and one.isidentifier()]
-            names = {"parameters": needed, "locals": list(code.co_varnames), "keys": keys}
-            found.append({"name": name, "line": line, **names})
+            described = {"parameters": needed, "locals": list(code.co_varnames), "keys": keys}
+            found.append({"name": name, "line": line, **described})
         return found
 
     def _is_own(self, value: Any) -> bool:
@@ -311,9 +326,10 @@ class ExecutedFile:
             return {"values": [self._sampled(function, one, request["local"]) for one in request["samples"]]}
         with self.symbolic.calculating():
             arguments = [self._symbols(x, request["as"]) for x in request["arguments"].values()]
-            value, local = called(function, arguments)
+            value, local_values = called(function, arguments)
         writer = Writer()
-        trees = {name: writer.tree(one) for name, one in local.items() if name in request.get("locals", ())}
+        wanted = request.get("locals", ())
+        trees = {name: writer.tree(one) for name, one in local_values.items() if name in wanted}
         return {"tree": writer.tree(value), "locals": trees, "definitions": writer.definitions}
 
     def _symbols(self, names: Any, kind: str) -> Any:
@@ -331,14 +347,16 @@ class ExecutedFile:
         return Parameters(symbol) if isinstance(names, dict) else symbol(names)
 
     def _sampled(self, function: Callable[..., Any], arguments: Mapping[str, Any], local: str) -> object:
-        """Return the numbers that a function returns, or those of one of its local names; None where it fails."""
+        """Return the numbers that a function returns, or those of one of its local names; None where not finite."""
         np = self.symbolic.numpy
-        value, names = called(function, [self._numbers(x) for x in arguments.values()])
-        array = np.asarray(names[local] if local else value)
-        if array.dtype.kind not in "fiub":
-            entries = array.ravel().tolist() if array.dtype.kind == "O" else [None]
-            if not all(isinstance(x, numbers.Real) for x in entries):
-                raise TypeError(f"returned {type(value).__name__} of {array.dtype}; expected real numbers")
+        value, local_values = called(function, [self._numbers(x) for x in arguments.values()])
+        sampled = local_values[local] if local else value
+        array = np.asarray(sampled)
+        is_real = array.dtype.kind in "fiub"
+        if array.dtype.kind == "O":
+            is_real = all(isinstance(x, numbers.Real) for x in array.ravel().tolist())
+        if not is_real:
+            raise TypeError(f"returned {type(sampled).__name__} of {array.dtype}; expected real numbers")
         array = array.astype(float)
         return np.where(np.isfinite(array), array.astype(object), None).tolist()
 
@@ -359,12 +377,12 @@ class Values(dict[str, Any]):
 
 
 def callable_object(value: object) -> bool:
-    """Whether a value is a function or a class, and no expression: sympy's undefined functions are classes."""
+    """Whether a value is a function or a class, as ``sympy.Function("f")`` is; sympy's symbols are callable too."""
     return inspect.isroutine(value) or inspect.isclass(value)
 
 
 def called(function: Callable[..., Any], arguments: list[Any]) -> tuple[Any, dict[str, Any]]:
-    """Return what a function returns, and its local names when it does."""
+    """Return a function's result, and the values of its local variables when it returns."""
     code: CodeType | None = getattr(function, "__code__", None)
     local: dict[str, Any] = {}
 
@@ -384,7 +402,7 @@ def called(function: Callable[..., Any], arguments: list[Any]) -> tuple[Any, dic
 
 
 class Writer:
-    """Writes values as text, with definitions of what CasADi's expressions have in common."""
+    """Writes values as text, with definitions of the subexpressions that a CasADi scalar contains several times."""
 
     def __init__(self) -> None:
         self.definitions: dict[str, str] = {}
@@ -392,7 +410,7 @@ class Writer:
         self._entries = MAX_ENTRIES
 
     def tree(self, value: Any) -> object:
-        """Return a value as text, lists of text or fields; an error for what is not an answer."""
+        """Return a value as text, lists of text or fields; an error for a value that is not an answer."""
         try:
             return self._tree(value)
         except RecursionError:
@@ -402,17 +420,18 @@ class Writer:
 
     def _tree(self, value: Any) -> object:
         module = (type(value).__module__ or "").partition(".")[0]
-        if value is None or isinstance(value, bool | str | bytes):
-            raise TypeError(f"found {type(value).__name__}; expected formulas or numbers")
         if module == "casadi":
             return self._casadi(value)
         if hasattr(value, "tolist") and module != "sympy":  # numpy's arrays and numbers
             value = value.tolist()
+        if value is None or isinstance(value, bool | str | bytes):
+            raise TypeError(f"found {type(value).__name__}; expected formulas or numbers")
         if isinstance(value, list | tuple):
             return [self._tree(entry) for entry in value]
         if isinstance(value, dict | SimpleNamespace):
             fields = value if isinstance(value, dict) else vars(value)
             return {"fields": {name: self.tree(one) for name, one in fields.items() if isinstance(name, str)}}
+        # sympy's numbers are numbers.Real too.
         if isinstance(value, numbers.Real | Fraction) and not hasattr(value, "free_symbols"):
             return self._counted(number_text(value))
         if hasattr(value, "free_symbols"):
@@ -427,8 +446,9 @@ class Writer:
         return text
 
     def _sympy(self, value: Any) -> object:
-        if getattr(value, "is_Matrix", False) or hasattr(value, "as_explicit"):
-            explicit = value.doit().as_explicit() if hasattr(value, "as_explicit") else value
+        is_formula = hasattr(value, "as_explicit")  # of matrices: A*B of MatrixSymbols
+        if getattr(value, "is_Matrix", False) or is_formula:
+            explicit = value.doit().as_explicit() if is_formula else value
             rows = [[self._sympy(entry) for entry in row] for row in explicit.tolist()]
             return [row[0] for row in rows] if rows and len(rows[0]) == 1 else rows
         value = value.doit()  # Derivative(V, q1) is written out; that of q1(t) stays
@@ -460,17 +480,17 @@ class Writer:
         return rows_of(value.shape, [self._counted(self._casadi_text(entry)) for entry in dense.elements()])
 
     def _casadi_text(self, root: Any) -> str:
-        """Return a CasADi scalar as text; what it uses several times becomes a definition."""
+        """Return a CasADi scalar as text; a subexpression used several times becomes a definition."""
         import casadi
 
-        if casadi.n_nodes(casadi.SX(root)) > MAX_NODES:
+        if casadi.n_nodes(root) > MAX_NODES:
             raise ValueError(f"an expression of more than {MAX_NODES} nodes")
         texts: dict[int, str] = {}
         uses = used_counts(root)
         waiting = [root]
         while waiting:
             node = waiting[-1]
-            key = node.element_hash()
+            key = node.element_hash()  # address of the node, which expressions share
             inside = [node.dep(k) for k in range(node.n_dep())]
             missing = [one for one in inside if one.element_hash() not in texts]
             if missing and key not in texts:
@@ -489,7 +509,7 @@ class Writer:
 
 
 def used_counts(root: Any) -> dict[int, int]:
-    """Return how many other nodes use each node of a CasADi expression."""
+    """Return of how many operations each node of a CasADi expression is an operand; x*x counts twice."""
     counts: dict[int, int] = {}
     waiting = [root]
     seen = set[int]()
@@ -506,13 +526,14 @@ def used_counts(root: Any) -> dict[int, int]:
 
 
 def casadi_operation(node: Any, arguments: list[str]) -> str:
-    """Return an operation of CasADi's, with the text of its operands, in brackets."""
+    """Return an operation of CasADi's, with the text of its operands; negative numbers are in brackets."""
     import casadi
 
     if node.is_symbolic():
         return checked_name(str(node.name()))
     if node.is_constant():
-        return number_text(float(node))
+        text = number_text(float(node))
+        return f"({text})" if text.startswith("-") else text
     forms = {
         casadi.OP_ADD: "({}+{})",
         casadi.OP_SUB: "({}-{})",
@@ -563,10 +584,10 @@ def rows_of(shape: tuple[int, int], entries: list[str]) -> object:
 
 
 def number_text(value: Any) -> str:
-    """Return a number as text; doubles with as many digits as all doubles have."""
+    """Return a number as text; doubles are rounded to DIGITS."""
     if isinstance(value, int | Fraction):
-        if abs(value.numerator).bit_length() > 4_000:
-            raise ValueError("a number of thousands of digits")
+        if max(abs(value.numerator), value.denominator).bit_length() > MAX_BITS:
+            raise ValueError("a number of more than 1,200 digits")
         return str(value)
     number = float(value)
     if not math.isfinite(number):

@@ -2,10 +2,10 @@
 
 from dhkit.grading.catalogue import LIBRARY
 from dhkit.grading.entry_points import grade, grade_answers, robot_of
+from dhkit.grading.grade_report import Diagnosis, Entry, GradeReport, Verdict, Witness
 from dhkit.grading.marks import Mark, Marks, marks
 from dhkit.grading.options import GradeOptions
 from dhkit.grading.remarks import Note, NoteKind
-from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict, Witness
 from dhkit.grading.rubric import Credit, Rubric
 
 __all__ = [

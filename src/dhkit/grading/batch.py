@@ -16,8 +16,8 @@ from typing import TypeAlias
 
 from dhkit.errors import DhkitError
 from dhkit.grading.bounds import BOUNDS
+from dhkit.grading.grade_report import GradeReport
 from dhkit.grading.isolation import Worker, WorkerLimits, is_late, start_worker
-from dhkit.grading.report import GradeReport
 from dhkit.grading.reports.json import report_of
 from dhkit.grading.sheets import Sheet
 

@@ -1,4 +1,4 @@
-"""Bounds on what is handed in besides answers: folders, rubrics, reports of other processes."""
+"""Bounds on submissions other than answers: folders, rubrics, reports of other processes."""
 
 from __future__ import annotations
 

@@ -16,10 +16,10 @@ from dhkit.grading.answers.sheet import quantity_names, read_sheet, sheet_of
 from dhkit.grading.answers.sheet_values import NO_NAMES, AnswerSheet, Names
 from dhkit.grading.answers.sources import SHEET_SUFFIXES, executed_source, read_source
 from dhkit.grading.bounds import BOUNDS
+from dhkit.grading.grade_report import GradeReport
 from dhkit.grading.judging.truth import truth_of
 from dhkit.grading.mistakes.diagnosis import variants_of
 from dhkit.grading.options import GradeKeywords, GradeOptions
-from dhkit.grading.report import GradeReport
 from dhkit.grading.rubric import Rubric
 from dhkit.grading.sheet_judge import judge_sheet
 

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 from dhkit.display import html_block, html_table, repr_line, value_line
 from dhkit.grading.answers.sheet import QUANTITY
-from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict
+from dhkit.grading.grade_report import Diagnosis, Entry, GradeReport, Verdict
 from dhkit.grading.rubric import Credit, Rubric
 
 

@@ -32,6 +32,14 @@ from dhkit.grading.answers.sheet_matrices import SheetMatrices
 from dhkit.grading.answers.sheet_values import AnswerSheet, Requirements
 from dhkit.grading.answers.typeset import typeset, typeset_equations
 from dhkit.grading.answers.vocabulary import Vocabulary
+from dhkit.grading.grade_report import (
+    Diagnosis,
+    Entry,
+    GradeReport,
+    KinematicJudgement,
+    Verdict,
+    entry_name,
+)
 from dhkit.grading.judging.consistency import Consistency
 from dhkit.grading.judging.functions import judge_function, judge_sampled
 from dhkit.grading.judging.quantities import JudgedQuantity, judge_quantity
@@ -40,14 +48,6 @@ from dhkit.grading.judging.truth import Truth, truth_of
 from dhkit.grading.mistakes.entries import shown_in_own_angles
 from dhkit.grading.mistakes.explaining import explain as explain_mistakes
 from dhkit.grading.remarks import Note, NoteKind
-from dhkit.grading.report import (
-    Diagnosis,
-    Entry,
-    GradeReport,
-    KinematicJudgement,
-    Verdict,
-    entry_name,
-)
 from dhkit.symbolic.ring import RingError
 
 

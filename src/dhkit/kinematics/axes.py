@@ -103,14 +103,6 @@ class Axes:
         return point if self.on(j, point) else None
 
 
-def inverse_pose(T: Array) -> Array:
-    """Return the inverse of a rigid transform (R, p), T (4, 4), m, shape (4, 4): (R^T, -R^T p)."""
-    inverse = np.eye(4)
-    inverse[:3, :3] = T[:3, :3].T
-    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
-    return inverse
-
-
 def _scale(description: Description) -> float:
     reach = description.reach
     return reach if np.isfinite(reach) and reach > 0 else 1.0

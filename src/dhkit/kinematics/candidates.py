@@ -76,7 +76,7 @@ def collect(
 
 
 def are_poses(T: Array) -> NDArray[np.bool_]:
-    """Return whether matrices (..., 4, 4) are poses, shape (...): finite, orthonormal to 1e-6, last row 0 0 0 1."""
+    """Return whether matrices (..., 4, 4) are poses, shape (...): finite, orthonormal to 2e-6, last row 0 0 0 1."""
     with np.errstate(over="ignore", invalid="ignore"):
         R = T[..., :3, :3]
         defect = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2))
@@ -88,7 +88,7 @@ def are_poses(T: Array) -> NDArray[np.bool_]:
 
 
 def orthonormal(T: Array) -> Array:
-    """Return poses (..., 4, 4), m, with orthonormal rotations, from poses T whose rotations are orthonormal to 1e-6.
+    """Return poses (..., 4, 4), m, with orthonormal rotations, from poses T whose rotations are orthonormal to 2e-6.
 
     Each iteration R (3 - R^T R) / 2 squares the defect (Björck and Bowie 1971).
     """

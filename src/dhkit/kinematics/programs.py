@@ -1,4 +1,4 @@
-"""All programs of an arm's kinematics: its kernels, to compile them in advance, and C99 source without Python."""
+"""The straight-line programs of an arm's kinematics, as kernels to compile in advance, and as C99 source."""
 
 from __future__ import annotations
 
@@ -17,13 +17,17 @@ from dhkit.symbolic import Graph, SymbolicTable, export_c, jacobian, joint_symbo
 
 @takes_robot
 def kinematic_kernels(description: Description) -> list[Kernel]:
-    """Return the kernels of frames, Jacobians and inverse kinematics, in closed form where there is one."""
-    solver = solver_of(description)
-    kernels = [tool_kernel(description)[0], frames_kernel(description)[0]]
-    kernels += [jacobian_kernel(description, "world")[0], jacobian_kernel(description, "tool")[0]]
-    kernels += [jacobian_dot_kernel(description, "world")[0], jacobian_dot_kernel(description, "tool")[0]]
-    for size in (6, 3):
+    """Return the kernels of frames, Jacobians, their derivatives, and numeric and closed-form inverse kinematics."""
+    with_parameters = [
+        tool_kernel(description),
+        frames_kernel(description),
+        *(jacobian_kernel(description, frame) for frame in ("world", "tool")),
+        *(jacobian_dot_kernel(description, frame) for frame in ("world", "tool")),
+    ]
+    kernels = [kernel for kernel, _ in with_parameters]
+    for size in (6, 3):  # Newton's method for whole poses, and for positions
         kernels += [error_kernel(size), step_kernel(description.n, size)]
+    solver = solver_of(description)
     return kernels if solver is None else [*kernels, solver.kernel]
 
 
@@ -44,20 +48,27 @@ def export_kinematics(description: Description, folder: str | Path, name: str | 
     -------
     tuple[Path, Path]
         Source and header: self-contained C99; link with ``-lm``. Functions take and fill arrays of doubles, row by row,
-        SI and radians; the header says of what shape. ``free`` holds the angles of joint 1 where the wrist is on its
-        axis, and of the joint that is free at a wrist singularity; branches are in the order of ``Arm.ik``'s.
+        SI and radians; the header has their shapes.
+
+        - ``NAME_forward_kinematics``: q to T, the tool in the world;
+        - ``NAME_jacobian``: q to J, in world axes, the linear rows first;
+        - ``NAME_inverse_kinematics``: T and ``free`` to the branches, in the order of those of ``Arm.ik``, with its
+          fields. ``free`` are the values of the two joints that are free at singularities: joint 1 where the wrist
+          centre lies on its axis, and the joint that is free at a wrist singularity.
 
     Raises
     ------
     ValueError
-        ``name`` is not an identifier.
+        ``name`` is not an identifier of C.
+    OSError
+        The folder cannot be written to.
     """
     name = description.name if name is None else name
     graphs = [_forward(description, name), _jacobian(description, name)]
     found = classify(description)
     remark = f"{description.name}: {found.words}. Written by dhkit."
     if found.family is not None and found.fit is not None:
-        from dhkit.kinematics.closed_form.program import arm_program
+        from dhkit.kinematics.closed_form.program import arm_program  # CasADi, which takes time to import
 
         numbers = description.numbers
         prismatic = tuple(bool(slides) for slides in numbers.prismatic)

@@ -30,7 +30,7 @@ class IKStatus(IntEnum):
     out_of_reach = 2
     """Proved to have no solution, by a closed form or because the arm is too short."""
     not_a_pose = 3
-    """The matrix has NaN, or its rotation is not orthonormal to 1e-6."""
+    """The matrix has NaN, or its rotation is not orthonormal to 2e-6."""
     not_found = 4
     """No solution was found by iteration or by ssik, which does not prove that there is none."""
 

@@ -21,7 +21,7 @@ Progress: TypeAlias = Callable[[int, int], None]
 CHUNK = 65_536
 """Samples worked on at once: their Jacobians take about 20 MB."""
 PER_CELL = 20
-"""Samples for each cell of the box around them: fewer leave holes in what is reached."""
+"""Samples for each cell of the box around them: fewer leave holes in the reachable set."""
 _FINEST = 256
 """Cells along the longest edge at most."""
 _MOST_CELLS = 1 << 24

@@ -28,7 +28,7 @@ SCORE_SAMPLES = 100
 POSE_TOLERANCE = 1e-6
 """Largest error of a pose that a solution leads to: m, and entries of the rotation matrix."""
 MAX_OUTPUT_LENGTH = 2_000
-"""Characters that are shown of what the program prints: the last ones."""
+"""Number of characters of the program's output that are shown: the last ones."""
 MAX_SOLUTIONS = 16
 """Solutions that are shown of a pose."""
 CALL_LIMITS = Limits(seconds=1.0)

@@ -18,7 +18,7 @@ from tomlkit.exceptions import TOMLKitError
 
 from dhkit.description import Description, to_toml
 from dhkit.errors import AnswerError
-from dhkit.grading.report import Entry, GradeReport
+from dhkit.grading.grade_report import Entry, GradeReport
 from dhkit.grading.reports.json import report_of
 from dhkit.grading.reports.mathml import mathml
 from dhkit.grading.reports.notes import note_text

@@ -31,6 +31,7 @@ from dhkit.description import (
     write_robot,
 )
 from dhkit.description.assets import inside
+from dhkit.description.poses import inverse_pose
 from dhkit.display import counted, html_block, html_lines, html_table, repr_line
 from dhkit.errors import DescriptionError, ModelError
 from dhkit.model.cad_masses import LinkBody, StatedMasses
@@ -188,7 +189,8 @@ def import_cad(
 
     meshes = {}
     bodies = {}
-    to_frames = [_rigid_inverse(T) for T in assembly.frames]
+    # A vertex of the part of link i is v_i = T_world_i^-1 v_world in the link's frame.
+    to_frames = [inverse_pose(T_world_i) for T_world_i in assembly.frames]
     placed_meshes = dict(assembly.meshes)
     del assembly  # frees the memory of each mesh once it is moved
     for link, several in parts.items():
@@ -223,13 +225,6 @@ def _export_pose(description: Description, q: ArrayLike | None) -> tuple[Array, 
     joints = zip(description.joints, pose.tolist(), strict=True)
     values = ", ".join(f"{x:.4g}" if joint.is_revolute else f"{x:.4g} m" for joint, x in joints)
     return pose, f"pose of the export: {source}: q = {values}"
-
-
-def _rigid_inverse(T: Array) -> Array:
-    inverse = np.eye(4)
-    inverse[:3, :3] = T[:3, :3].T
-    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
-    return inverse
 
 
 def _in_metres(

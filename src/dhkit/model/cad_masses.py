@@ -19,7 +19,7 @@ from dhkit.model.triangle_mesh import TriangleMesh, common_bounds
 _INTEGRATION_ERROR = 1e-13
 """Coordinates and products below this share of a link's size and moments are set to 0: integrals are exact to 1e-15."""
 _MOMENT_TOLERANCE = 0.01
-"""Share by which reported moments may exceed what is possible: reports are rounded."""
+"""Share by which reported moments may exceed the possible ones: reports are rounded."""
 _USUAL_DENSITIES = (20.0, 25_000.0)
 """kg/m^3: foam, and platinum metals; a density outside is probably in another unit."""
 _COM_TOLERANCE = 0.1

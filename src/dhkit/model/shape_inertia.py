@@ -38,10 +38,10 @@ class MassProperties:
     """Shape (3, 3), kg m^2, about the centre of mass; products with the tensor's sign, xy = -integral of x y dm."""
 
     def moved(self, T: ArrayLike) -> MassProperties:
-        """Return the properties in the frame that a rigid transform T, shape (4, 4), m, maps their own frame to."""
+        """Return the properties in another frame; T, shape (4, 4), m, takes points of their own frame to it."""
         matrix = np.asarray(T, dtype=float)
         R = matrix[:3, :3]
-        tensor = R @ self.inertia @ R.T
+        tensor = R @ self.inertia @ R.T  # about the centre of mass, which moves with the body: no Steiner term
         return MassProperties(self.mass, R @ self.com + matrix[:3, 3], (tensor + tensor.T) / 2)
 
     def body(self, name: str = "") -> Body:
@@ -73,9 +73,11 @@ def shape_inertia(
 ) -> ShapeInertia:
     """Return mass, centre of mass and inertia of a homogeneous body of a mesh's shape.
 
-    Integrals over a closed mesh are exact: the body is a sum of signed tetrahedra between its triangles and its middle,
-    whose second moments are Tonon's (2004, "Explicit exact formulas for the 3-D tetrahedron inertia tensor", section
-    2): with corners 0, a, b, c and volume v, integral of x x^T = v / 20 (a a^T + b b^T + c c^T + s s^T), s = a + b + c.
+    Integrals over a closed mesh are exact up to rounding: the body is a sum of signed tetrahedra between its triangles
+    and its centre, whose second moments are Tonon's (2004, "Explicit exact formulas for the 3-D tetrahedron inertia
+    tensor", section 2): with corners 0, a, b, c and volume v, and s = a + b + c,
+
+        integral of x x^T = v / 20 (a a^T + b b^T + c c^T + s s^T).
 
     Parameters
     ----------
@@ -89,16 +91,16 @@ def shape_inertia(
     Raises
     ------
     ModelError
-        Neither or both of density and mass, one that is not positive, or a mesh that encloses no volume.
+        Neither or both of density and mass, one that is not positive, no mesh, or one that encloses no volume.
 
     Examples
     --------
     >>> import numpy as np
-    >>> box = TriangleMesh(
+    >>> tetrahedron = TriangleMesh(
     ...     np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),
     ...     np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]),
     ... )
-    >>> body = shape_inertia(box, density=6.0)
+    >>> body = shape_inertia(tetrahedron, density=6.0)
     >>> round(body.mass, 12), body.com.round(12).tolist()
     (1.0, [0.25, 0.25, 0.25])
     """
@@ -113,16 +115,21 @@ def shape_inertia(
             f"{name} is {value:g}; expected a positive number of {'kg/m^3' if name == 'density' else 'kg'}"
         )
     meshes = [mesh] if isinstance(mesh, TriangleMesh) else list(mesh)
+    if not meshes:
+        raise ModelError("no meshes; expected at least one")
     closed_meshes, methods, repairs = zip(*map(_closed, meshes), strict=True)
-    whole, turning_notes = outwards(joined_meshes(closed_meshes))
-    method = next(method for method in reversed(InertiaMethod) if method in methods)
-    notes = tuple(dict.fromkeys(chain(*repairs, turning_notes)))
-    volume, com, covariance = _moments(whole)
+
+    # Outer walls are oriented outwards and inner walls inwards, so that cavities count negatively.
+    whole, orientation_notes = outwards(joined_meshes(closed_meshes))
+    roughest = next(method for method in reversed(InertiaMethod) if method in methods)
+    notes = tuple(dict.fromkeys(chain(*repairs, orientation_notes)))
+    volume, com, second_moment = _moments(whole)
     if volume <= MIN_VOLUME * whole.size**3:
         raise ModelError(f"the mesh encloses no volume ({volume:.3g} m^3); expected a solid")
     rho = value if name == "density" else value / volume
-    inertia = rho * (np.trace(covariance) * np.eye(3) - covariance)
-    return ShapeInertia(rho * volume, com, inertia, volume, method, notes)
+    # I = rho (tr(S) 1 - S), with S the integral of r r^T about the centre
+    inertia = rho * (np.trace(second_moment) * np.eye(3) - second_moment)
+    return ShapeInertia(rho * volume, com, inertia, volume, roughest, notes)
 
 
 def _closed(mesh: TriangleMesh) -> tuple[TriangleMesh, InertiaMethod, tuple[str, ...]]:
@@ -131,12 +138,13 @@ def _closed(mesh: TriangleMesh) -> tuple[TriangleMesh, InertiaMethod, tuple[str,
         raise ModelError("vertices that are not finite; expected numbers")
     surface = repaired(mesh)
     if not surface.is_closed:
-        note = "open: judged by its convex hull, which is no lighter than the link"
+        note = "open: judged by its convex hull, whose volume is not smaller than the link's"
         return convex_hull(mesh), InertiaMethod.HULL, (note,)
     volume = signed_volume(surface.mesh)
     if abs(volume) <= MIN_VOLUME * mesh.size**3:
         raise ModelError(f"the mesh encloses no volume ({volume:.3g} m^3); expected a solid")
-    return surface.mesh, InertiaMethod.FILLED if surface.is_filled else InertiaMethod.CLOSED, surface.notes
+    method = InertiaMethod.FILLED if surface.is_filled else InertiaMethod.CLOSED
+    return surface.mesh, method, surface.notes
 
 
 def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
@@ -155,12 +163,13 @@ def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
         raise ModelError("the mesh encloses no volume: its vertices lie in a plane or on a line") from None
     faces = np.asarray(hull.simplices, dtype=np.intp)
     a, b, c = np.moveaxis(mesh.vertices[faces], 1, 0)
-    inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    outward_normals = hull.equations[:, :3]
+    inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), outward_normals) < 0
     return TriangleMesh(mesh.vertices, np.where(inwards[:, None], faces[:, ::-1], faces)).merged()
 
 
 def _moments(mesh: TriangleMesh) -> tuple[float, Array, Array]:
-    """Return volume, centre and the integral of r r^T about the centre, of a closed mesh.
+    """Return volume, m^3, centre, (3,), m, and integral of r r^T about it, (3, 3), m^5, of a closed mesh.
 
     Coordinates are relative to the mesh's middle and to its size: about a distant origin, the differences of large
     moments would keep few digits, and a mesh of nanometres would underflow.
@@ -186,5 +195,5 @@ def _moments(mesh: TriangleMesh) -> tuple[float, Array, Array]:
     s = a + b + c
     remainder = v @ s / (4 * volume)  # the rounding error of the centre
     second = np.sum([(x * v[:, None]).T @ x for x in (a, b, c, s)], axis=0) / 20
-    covariance = (second + second.T) / 2 - volume * np.outer(remainder, remainder)
-    return volume * size**3, middle + size * (centre + remainder), covariance * size**5
+    second_moment = (second + second.T) / 2 - volume * np.outer(remainder, remainder)
+    return volume * size**3, middle + size * (centre + remainder), second_moment * size**5

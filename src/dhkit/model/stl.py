@@ -43,7 +43,7 @@ def ascii_corners(content: bytes) -> Array:
     Raises
     ------
     ModelError
-        A facet without three vertices, or a coordinate that is not a number.
+        Another number of vertices than three a facet in the whole file, or a coordinate that is not a number.
     """
     content = _NAME_LINE.sub(b"", content)
     vertices = _VERTEX.findall(content)
@@ -71,8 +71,10 @@ def coordinates(rows: Sequence[tuple[bytes, bytes, bytes]]) -> Array:
         A text that is not a number.
     """
     for text in chain.from_iterable(rows):
-        if len(text) > BOUNDS.coordinate_characters or b"_" in text:
+        if len(text) > BOUNDS.coordinate_characters:
             raise ValueError(f"found {text[:20].decode('ascii', 'replace')!r}, {len(text)} characters long")
+        if b"_" in text:  # NumPy would read 1_000 as Python does
+            raise ValueError(f"found {text[:20].decode('ascii', 'replace')!r}")
     return np.array(rows, dtype=f"S{BOUNDS.coordinate_characters}").astype(np.float64).reshape(-1, 3)
 
 
@@ -92,7 +94,8 @@ def binary_stl(title: str, corners: Array) -> bytes:
 def ascii_stl(title: str, corners: Array) -> str:
     """Return triangles, corners of shape (m, 3, 3), as an ASCII STL file in their unit, with nine digits."""
     rows = [f"solid {title}"]
-    for (a, b, c), (u, v, w) in zip(corners.tolist(), unit_normals(corners).tolist(), strict=True):
+    normals = np.round(unit_normals(corners), _NORMAL_DECIMALS) + 0.0
+    for (a, b, c), (u, v, w) in zip(corners.tolist(), normals.tolist(), strict=True):
         rows.append(f"facet normal {u:.6g} {v:.6g} {w:.6g}\n outer loop")
         rows += [f"  vertex {x:.9g} {y:.9g} {z:.9g}" for x, y, z in (a, b, c)]
         rows.append(" endloop\nendfacet")

@@ -137,7 +137,7 @@ class UrdfJoint:
 
     @property
     def is_prismatic(self) -> bool:
-        """Whether the joint slides along its axis."""
+        """Whether the joint translates along its axis."""
         return self.kind is JointKind.PRISMATIC
 
     @property

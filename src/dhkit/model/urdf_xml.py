@@ -31,7 +31,8 @@ def parse_urdf(path: Path) -> Element:
     Raises
     ------
     ModelError
-        The file cannot be read or is no such XML; the message does not name the file.
+        The file cannot be read, or its XML has a document type or is too deep or too large. The message does not
+        name the file.
     """
     try:
         mode = path.stat().st_mode

@@ -161,7 +161,7 @@ class PlanReport:
 
     @property
     def comparisons(self) -> list[tuple[str, str, str]]:
-        """Names of the classical motions, what they take or cost, and how much more, as texts."""
+        """Names of the classical motions, their durations or costs, and by how much these are larger, as texts."""
         rows = []
         for motion in self.classical:
             if self.is_least_time:

@@ -21,8 +21,8 @@ from dhkit.planning.criteria import Constraint, Objective, ObjectiveLike, prepar
 from dhkit.planning.many import ManyProgress, SimilarMotions, solve_many
 from dhkit.planning.plan_report import BranchReport, classical_motions, report_of
 from dhkit.planning.program import (
-    MAX_SMALL_JOINTS,
     MIN_LEG_INTERVALS,
+    SMALL_ARM_JOINTS,
     Curve,
     Mesh,
     MotionProgram,
@@ -125,11 +125,11 @@ class Planner:
         self.objective = Objective.of(objective)
         self.limits = checked_limits(description, limits)
         self.constraints = checked_constraints(constraints)
-        usual = SMALL_ARM_SIZE // description.n if description.n <= MAX_SMALL_JOINTS else DEFAULT_INTERVALS
+        usual = SMALL_ARM_SIZE // description.n if description.n <= SMALL_ARM_JOINTS else DEFAULT_INTERVALS
         # Smooth objectives need half as many intervals: their accelerations are parabolas. Meshes of arms of few joints
         # are fine enough for half of them to find least energy, whose torques jump.
         self._requested_intervals = intervals
-        has_jumps = self.objective.has_time or (not self.objective.is_smooth and description.n > MAX_SMALL_JOINTS)
+        has_jumps = self.objective.has_time or (not self.objective.is_smooth and description.n > SMALL_ARM_JOINTS)
         self.intervals = intervals or (usual if has_jumps else usual // 2)
         self.friction = smoothed(Friction.chosen(friction))
         self._programs: dict[tuple[object, ...], MotionProgram] = {}

@@ -29,7 +29,8 @@ _KNOT_ERROR = 1e-12
 _NEWTON_STEPS = 8
 """Largest number of Newton's steps to a knot."""
 _DAMPING = 1e-13
-"""Damping of Newton's steps."""
+"""Damping lambda of Newton's steps, A^T (A A^T + lambda 1)^-1 error, with A the Jacobian over the reach: far below
+_SINGULAR squared, it changes a step only beside a singularity, which is refused."""
 _FIRST_STEP = 1 / 16
 """First and largest step of s along the path."""
 _MIN_STEP = 1e-9
@@ -61,8 +62,8 @@ def joint_path(
 
     Newton's method follows the path from its beginning in steps short enough to stay on one branch. At knots q,
     q' = J^-1 v and q'' = J^-1 (v' - J' q') are exact, with quintic polynomials between them; knots are added where the
-    tool leaves its path. A redundant arm moves with the least norm of joint rates, q' = J^+ v. Arms whose orientation
-    is determined by the position (planar2r, say) follow the positions alone.
+    tool leaves its path. A redundant arm moves with the least norm of joint rates, q' = J^+ v. Arms with no further
+    freedom of orientation once the position is given (planar2r, for example) follow the positions alone.
 
     Parameters
     ----------
@@ -138,8 +139,10 @@ class _Follower:
     def derivatives(self, s: Array, q: Array) -> tuple[Array, Array]:
         """Return q' and q'' on the path, shape (N, n) each, by the least norm of q' for a redundant arm.
 
-        With J^+ from the singular values that the arm has: q' = J^+ v = J^T w, so that
-        q'' = J^+ (v' - J' q') + (1 - J^+ J) J'^T w.
+        J^+ is the pseudoinverse of J, taken from its ``rank`` largest singular values; v is the pose's derivative.
+        With w = (J J^T)^+ v the least-norm solution is q' = J^+ v = J^T w, and its derivative
+
+            q'' = J^+ (v' - J' q') + (1 - J^+ J) J'^T w.
         """
         # Rows of the pose are scaled by 1 / reach for lengths, columns by the joints' units.
         newton = self.newton
@@ -296,7 +299,10 @@ def _wind_near(q: Array, near: Array, description: Description) -> list[Array]:
 
 
 def _aims_position(description: Description) -> bool:
-    """Return whether the tool's position determines its orientation."""
+    """Return whether the arm has as many freedoms in position as in pose, so that a path's positions suffice.
+
+    The orientation then follows from the position, but for a choice of branch.
+    """
     return freedoms(description, "translational") == freedoms(description, "whole")
 
 

@@ -113,7 +113,7 @@ class FileKind:
         return library_robot(own.name) if _in_library(own.name, own.digest) else own
 
     def labelled(self, description: Description, text: str) -> str:
-        """Return a table behind its label: comments with kind, robot, and digest of robot and lines."""
+        """Return a table after its label: comments with kind, robot, and digest of robot and lines."""
         robot = f"# robot: {description.name} {description.digest}"
         return f"# {self.title}\n{robot}\n{_CONTENT}{_digest_of_lines([robot, *text.splitlines()])}\n{text}"
 

@@ -135,7 +135,7 @@ def select_columns(
     """Return times (N,) and one to three arrays (N, n): values, rates and accelerations as far as they are there.
 
     Columns are t or time, then for joint i ``q1``, ``qd1`` or ``dq1``, ``qdd1`` or ``ddq1``; or the joints' names,
-    with ``_velocity`` or ``_vel`` and ``_acceleration`` or ``_acc`` behind. Capitals count as small letters; columns
+    with ``_velocity`` or ``_vel`` and ``_acceleration`` or ``_acc`` appended. Capitals count as small letters; columns
     of other names are left out. ``columns`` gives, for our names, those of the file: see :func:`check_columns`.
 
     Raises

@@ -120,7 +120,7 @@ def torque_peaks(
 
     measure(np.arange(count), _FIRST_SAMPLES)
 
-    # First with an error of half of what is left to the limit, which decides most cells, then with the tolerance.
+    # First with an error of half the distance to the limit, which decides most cells, then with the tolerance.
     for is_last in (False, True):
         wanted = np.full_like(seen, _TOLERANCE) if is_last else np.maximum((1 - seen) / 2, _TOLERANCE)
         # Samples N of a cell of width w with which the error is the wanted one: (w / (N - 1))^4 / 4! D.

@@ -153,7 +153,7 @@ class VerificationReport:
         return "\n".join(lines)
 
     def latex(self) -> str:
-        """Return a table for a paper's appendix: booktabs, with a caption that says what was measured."""
+        """Return a table for a paper's appendix: booktabs, with a caption that names the measurements."""
         rows = []
         for agreement in self.agreements:
             figures = f"${_power(agreement.error)}$ & ${_power(agreement.tolerance)}$"

@@ -145,7 +145,7 @@ class View(Exportable):
         self._publish(Slot.MOTION, protocol.encode_pose(q, node_transforms(self._description, q)))
 
     def replace(self, description: Robot, q: ArrayLike | None = None) -> None:
-        """Show another arm instead of this one; what was drawn for the one before is taken away.
+        """Show another arm instead of this one; drawings made for the arm before are removed.
 
         Parameters
         ----------

@@ -13,10 +13,10 @@ from dhkit.description import from_dh, library_robot, pose, with_base, with_tool
 from dhkit.errors import AnswerError
 from dhkit.expressions import read
 from dhkit.grading.catalogue import LIBRARY
+from dhkit.grading.grade_report import Verdict
 from dhkit.grading.judging.inverse import CLOSES, POSE_NAMES, Closure, judge_inverse
 from dhkit.grading.judging.numeric import doubles
 from dhkit.grading.remarks import Note, NoteKind
-from dhkit.grading.report import Verdict
 
 CORRECT, WRONG = Verdict.CORRECT, Verdict.WRONG
 

@@ -9,6 +9,7 @@ import pytest
 from dhkit.description import Convention, library_robot, link_transforms
 from dhkit.expressions import read
 from dhkit.grading.answers.sheet import sheet_of
+from dhkit.grading.grade_report import Verdict
 from dhkit.grading.isolation import WorkerLimits, result_of
 from dhkit.grading.judging import changed_formulas
 from dhkit.grading.judging.consistency import Consistency
@@ -29,7 +30,6 @@ from dhkit.grading.judging.sampling import differ, element_value, samples
 from dhkit.grading.judging.table_arms import TableArm, link_in_doubles
 from dhkit.grading.judging.table_rows import Answer, TableRows, other_convention
 from dhkit.grading.judging.truth import truth_of
-from dhkit.grading.report import Verdict
 from dhkit.grading.sheet_judge import judge_sheet
 from dhkit.symbolic import exact_arm
 

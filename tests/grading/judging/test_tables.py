@@ -12,9 +12,9 @@ from dhkit.errors import AnswerError
 from dhkit.expressions import read
 from dhkit.grading.answers.sheet_values import Requirements
 from dhkit.grading.catalogue import LIBRARY
+from dhkit.grading.grade_report import Verdict
 from dhkit.grading.judging.tables import judge_table
 from dhkit.grading.remarks import Note, NoteKind
-from dhkit.grading.report import Verdict
 
 CORRECT, WRONG, UNDECIDED = Verdict.CORRECT, Verdict.WRONG, Verdict.UNDECIDED
 ALL_STANDARD = [name for name in robots() if library_robot(name).convention is Convention.STANDARD]

@@ -8,6 +8,7 @@ from dhkit.description import library_robot
 from dhkit.expressions import read
 from dhkit.grading.answers.sheet import sheet_of
 from dhkit.grading.catalogue import LIBRARY
+from dhkit.grading.grade_report import Diagnosis, Entry, GradeReport, Verdict
 from dhkit.grading.judging.quotients import RingReader
 from dhkit.grading.judging.truth import right_value, truth_of
 from dhkit.grading.marks import marks
@@ -20,7 +21,6 @@ from dhkit.grading.mistakes.slips import slip_in
 from dhkit.grading.mistakes.sums_of_angles import derivatives_of_cosines
 from dhkit.grading.mistakes.variants import Change
 from dhkit.grading.mistakes.wording import merge
-from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict
 from dhkit.grading.reports.html import html_report
 from dhkit.grading.reports.json import report_of
 from dhkit.grading.reports.sentences import diagnosis_lines, plain, points
@@ -47,8 +47,8 @@ def test_torques_change_by_the_sum_of_their_parts():
     lag = truth().lagrangian
     rates = [lag.arm.ring.acceleration(i) for i in range(2)]
     for variant in islice(chain([lagrangian_sum(truth())], energy_variants(truth())), 1, 12):
-        parts = variant.make("M") @ rates + variant.make("h") + variant.make("g")
-        assert all(difference == 0 for difference in parts - variant.make("tau"))
+        parts = variant.adds("M") @ rates + variant.adds("h") + variant.adds("g")
+        assert all(difference == 0 for difference in parts - variant.adds("tau"))
 
 
 def test_the_change_of_all_energy_is_all_of_the_equation():

@@ -3,8 +3,8 @@
 import pytest
 from hypothesis import given, strategies as st
 
+from dhkit.grading.grade_report import GradeReport
 from dhkit.grading.remarks import Note, NoteKind
-from dhkit.grading.report import GradeReport
 from dhkit.grading.reports import report_of
 from dhkit.grading.reports.notes import SENTENCES, note_text
 

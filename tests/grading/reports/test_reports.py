@@ -12,8 +12,8 @@ from hypothesis import given, strategies as st
 from rich.console import Console
 
 from dhkit.errors import AnswerError
+from dhkit.grading.grade_report import GradeReport
 from dhkit.grading.marks import marks
-from dhkit.grading.report import GradeReport
 from dhkit.grading.reports import (
     gradescope,
     html_class,

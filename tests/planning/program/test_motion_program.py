@@ -30,7 +30,7 @@ def test_arms_of_few_joints_are_started_more_than_once(prepared):
     for guess in starts.guesses:
         knots = guess()
         np.testing.assert_allclose(knots.q[[0, -1]], task.points, atol=1e-12)
-        assert program.again(knots, None) is knots
+        assert program.next_guess(knots, None) is knots
 
 
 def test_margins_narrow_the_bounds_of_their_intervals(prepared):

@@ -91,10 +91,20 @@ def test_exported_code_refuses_what_is_no_pose(language, tmp_path):
     solve = exported(derivation, language, tmp_path)
     T = world_to_tool(derivation.description, np.full((1, 6), 0.3))[0]
     assert np.isfinite(solve(T)).any()
-    for entry, value in (((0, 3), np.nan), ((1, 3), np.inf), ((2, 2), np.nan), ((0, 0), 2.0), ((1, 2), T[1, 2] + 1e-4)):
+    for entry, value in (
+        ((0, 3), np.nan),
+        ((1, 3), np.inf),
+        ((2, 2), np.nan),
+        ((0, 0), 2.0),
+        ((1, 2), T[1, 2] + 1e-4),
+        ((3, 0), 0.1),
+        ((3, 3), 2.0),
+    ):
         other = T.copy()
         other[entry] = value
         assert np.isnan(solve(other)).all(), entry
+    reflected = T @ np.diag([1.0, 1.0, -1.0, 1.0])
+    assert np.isnan(solve(reflected)).all()
 
 
 @pytest.mark.parametrize("language", ["c", "python"])

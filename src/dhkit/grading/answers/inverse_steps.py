@@ -130,9 +130,9 @@ class _Reading:
         self.defined: set[str] = set()
         self.has_solutions = False
         self.signed: dict[str, dict[str, Meaning]] = {}
-        """Names that are defined with two signs, and what they stand for with each."""
+        """Names that are defined with two signs, and their expression with each sign."""
         self.sides: list[tuple[Tree, dict[str, Tree]]] = []
-        """Functions of the joint that an equation gives, cos(q2) = D, and what they are equal to with each sign."""
+        """Functions of the joint that an equation gives, cos(q2) = D, and their value with each sign."""
 
     def step(self, step: InverseStep, text: str) -> GivenStep:
         equations = list[tuple[Tree, Tree]]()
@@ -168,7 +168,7 @@ class _Reading:
         return _without_squared_roots(read_answer(_with_sign(text, sign), self.vocabulary))
 
     def _take_sign(self, sign: str) -> None:
-        """Let names with two signs stand for what they are with one of them."""
+        """Let names with two signs stand for their expression with one of them."""
         for name, meanings in self.signed.items():
             self.vocabulary.redefine(name, meanings[sign])
 
@@ -177,7 +177,7 @@ class _Reading:
         return meaning_of(_with_sign(text, sign), self.vocabulary)
 
     def _keep_function(self, left: str, right: str) -> None:
-        """Keep what a function of the joint is equal to: cos(q2) = D makes atan2(sqrt(1 - c2^2), c2) one of D."""
+        """Keep the value of a function of the joint: cos(q2) = D makes atan2(sqrt(1 - c2^2), c2) one of D."""
         own = f"q{self.joint}"
         for one, other in ((left, right), (right, left)):
             function = self._read(one)

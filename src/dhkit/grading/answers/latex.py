@@ -159,7 +159,7 @@ class _LatexReader:
         return in_brackets(inner, at) if inner else []
 
     def _argument(self, at: int) -> list[Token]:
-        """Read what a macro applies to: a group in braces, or one thing."""
+        """Read the argument of a macro: a group in braces, or one symbol."""
         self.depth += 1
         if self.depth > BOUNDS.nesting:
             fail(self.text, at, f"nested more than {BOUNDS.nesting} deep")
@@ -193,7 +193,7 @@ class _LatexReader:
         return [Token("name", name if bare else name + self._subscript(), at)]
 
     def _letters(self, letters: str, at: int) -> list[Token]:
-        """Read letters: a known name, a function's, or one name each, the last with what stands below it."""
+        """Read letters: a known name, a function's, or one name each, the last with its subscript."""
         if len(letters) > BOUNDS.letters:
             fail(self.text, at, f"{len(letters)} letters in a row")
         digits = re.compile(r"\d+", re.ASCII).match(self.text, self.at)
@@ -316,7 +316,7 @@ class _LatexReader:
         return []
 
     def _function_argument(self) -> list[Token]:
-        """Read what a function applies to, with a power in front of it: up to a name, or a closing bracket."""
+        """Read the argument of a function, with a power in front of it: up to a name, or a closing bracket."""
         tokens: list[Token] = []
         while item := self._one_item():
             tokens += item
@@ -365,7 +365,7 @@ class _LatexReader:
 
 
 def _without_d(above: list[Token], order: int) -> list[Token] | None:
-    """Return what a derivative's numerator differentiates: nothing of d alone, None where it has no d."""
+    """Return the expression that a derivative's numerator differentiates: empty for d alone, None where it has no d."""
     texts = [token.text for token in above]
     power = [] if order == 1 else ["^", "(", "2", ")"]
     if texts[: 1 + len(power)] == ["d", *power]:

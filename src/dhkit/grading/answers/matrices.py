@@ -156,7 +156,7 @@ def _with_column_brackets(tokens: list[Token], text: str) -> list[Token]:
 
 
 def _unwrap(tokens: list[Token], text: str) -> list[Token]:
-    """Return Matrix(...), np.array(...) and the like as what is in their brackets; transpose(...) with a prime."""
+    """Return Matrix(...), np.array(...) and the like as the text in their brackets; transpose(...) with a prime."""
     result: list[Token] = []
     k = 0
     while k < len(tokens):

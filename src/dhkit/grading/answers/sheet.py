@@ -118,7 +118,7 @@ def source_sheet(
 
 
 def read_text(path: Path, expected: str) -> str:
-    """Return a file's text; ``expected`` names in messages what the file should be.
+    """Return a file's text; ``expected`` is the kind of file, for messages.
 
     Raises
     ------

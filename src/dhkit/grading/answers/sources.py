@@ -20,7 +20,7 @@ _Reader: TypeAlias = Callable[[str, str, LineName, Description, Names], AnswerSh
 
 
 def read_source(path: Path, description: Description, names: Names = NO_NAMES) -> AnswerSheet:
-    """Return the answers that a file assigns: ``M = ...``, ``M11 = ...``, ``M(1,2) = ...``, and what they are made of.
+    """Return the answers that a file assigns: ``M = ...``, ``M11 = ...``, ``M(1,2) = ...``, and their definitions.
 
     Parameters
     ----------

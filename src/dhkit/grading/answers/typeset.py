@@ -78,7 +78,7 @@ class _Writer(Algebra[_Text]):
         self,
         write_name: Callable[[str], str],
         write_call: Callable[[str, Sequence[str]], str],
-        write_product: Callable[[Sequence[tuple[bool, str]]], str],
+        write_product: Callable[[Sequence[tuple[bool, _Text]]], str],
         write_power: Callable[[str, str], str],
     ) -> None:
         super().__init__()
@@ -102,7 +102,7 @@ class _Writer(Algebra[_Text]):
         return _Text(self._write_power(base.inside(_ATOM), exponent.inside(_ATOM)), _POWER)
 
     def product(self, factors: Sequence[tuple[bool, _Text]]) -> _Text:
-        return _Text(self._write_product([(is_factor, one.inside(_PRODUCT)) for is_factor, one in factors]), _PRODUCT)
+        return _Text(self._write_product(factors), _PRODUCT)
 
     def sum(self, terms: Sequence[tuple[bool, _Text]]) -> _Text:
         signed = "".join(f" + {one.text}" if added else f" - {one.inside(_PRODUCT)}" for added, one in terms)
@@ -113,15 +113,15 @@ def _plain_call(function: str, arguments: Sequence[str]) -> str:
     return f"{function}({', '.join(arguments)})"
 
 
-def _plain_product(factors: Sequence[tuple[bool, str]]) -> str:
+def _plain_product(factors: Sequence[tuple[bool, _Text]]) -> str:
     text = "" if factors[0][0] else "1"
     for multiplied, factor in factors:
-        is_product = re.search(r"[*/]", re.sub(r"\([^()]*\)", "", factor)) is not None
-        divisor = f"({factor})" if is_product else factor
         if not multiplied:
-            text += f"/{divisor}"
+            text += f"/{factor.inside(_POWER)}"  # brackets around a product: a/(b*c)
+        elif text:
+            text += f"*{factor.inside(_PRODUCT)}"
         else:
-            text += f"*{factor}" if text else factor
+            text = factor.inside(_PRODUCT)
     return text
 
 
@@ -138,11 +138,12 @@ def _latex_call(function: str, arguments: Sequence[str]) -> str:
     return f"{_LATEX_FUNCTIONS.get(function, name)}({', '.join(arguments)})"
 
 
-def _latex_product(factors: Sequence[tuple[bool, str]]) -> str:
+def _latex_product(factors: Sequence[tuple[bool, _Text]]) -> str:
     """Write a product from left to right: a factor after a division stands beside the fraction, a/b*c."""
     text = ""
     above: list[str] = []
-    for multiplied, factor in factors:
+    for multiplied, part in factors:
+        factor = part.inside(_PRODUCT)
         if multiplied:
             above.append(factor)
         else:

@@ -98,7 +98,7 @@ class Vocabulary:
         self.gravity = _gravity(description)
         self._meanings: dict[str, Meaning | None] = {}
         self.aliases: set[str] = set()
-        """Names in ``own`` that are others for what the task has."""
+        """Names in ``own`` that are other names for the task's variables and parameters."""
         self.taken_for: dict[str, str] = {}
         """Names that were not exactly known ones, and the names that they were taken for."""
         self.refused: dict[str, str] = {}
@@ -148,7 +148,7 @@ class Vocabulary:
         self._meanings.clear()
 
     def is_alias(self, name: str) -> bool:
-        """Whether a name is another one for what the task has: a student may define it as something else."""
+        """Whether it is another name of the task's variable or parameter, which a student may define otherwise."""
         return plain_name(name) in self.aliases
 
     def redefine(self, name: str, meaning: Meaning) -> None:

@@ -13,13 +13,13 @@ from dhkit.errors import AnswerError
 from dhkit.expressions import CONSTANTS
 from dhkit.expressions.syntax import Number, Sum, Tree
 from dhkit.expressions.trees import names_of, parts_of
+from dhkit.grading.grade_report import Verdict, Witness
 from dhkit.grading.judging import sampling
 from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.enclosures import LostDigitsError, TooLargeError, enclosed
 from dhkit.grading.judging.numeric import doubles, state_arrays
 from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient, RingReader
 from dhkit.grading.judging.rounding import Residuals, rounding_share
-from dhkit.grading.report import Verdict, Witness
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.equations import latex_text, plain_text
 from dhkit.symbolic.exact.compact import shortened
@@ -85,12 +85,12 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Finding:
-    """Verdict on one entry, with what was computed for it.
+    """Verdict on one entry, with the values computed for it.
 
     Attributes
     ----------
     verdict, statement, witness
-        As in :class:`dhkit.grading.report.Entry`.
+        As in :class:`dhkit.grading.grade_report.Entry`.
     answer
         The answer in the ring; None if it is outside.
     difference

@@ -15,12 +15,12 @@ from dhkit.errors import AnswerError
 from dhkit.grading.answers.given import Given
 from dhkit.grading.answers.sampled import SampledAnswer
 from dhkit.grading.answers.sheet import shape_of
+from dhkit.grading.grade_report import Verdict, Witness
 from dhkit.grading.isolation import WorkerLimits, result_of
 from dhkit.grading.judging.findings import Finding
 from dhkit.grading.judging.quantities import JudgedQuantity, parameters_in, place_of
 from dhkit.grading.judging.sampling import samples
 from dhkit.grading.judging.truth import Truth
-from dhkit.grading.report import Verdict, Witness
 from dhkit.symbolic.ring import Elements
 
 _SAMPLES = 1_000

@@ -19,13 +19,13 @@ from dhkit.expressions.syntax import Tree
 from dhkit.expressions.trees import names_of, parts_of
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.catalogue import hint_of, sentence_of
+from dhkit.grading.grade_report import Diagnosis, Entry, KinematicJudgement, Verdict, Witness, entry_name
 from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.inverse_branch import Branch, joint_order
 from dhkit.grading.judging.inverse_edits import with_signs_changed
-from dhkit.grading.judging.inverse_mistakes import Explanation, Search
+from dhkit.grading.judging.inverse_mistakes import Explanation, MistakeSearch
 from dhkit.grading.judging.inverse_poses import CLOSES, Poses
 from dhkit.grading.remarks import Note, NoteKind
-from dhkit.grading.report import Diagnosis, Entry, KinematicJudgement, Verdict, Witness, entry_name
 from dhkit.symbolic import table_lengths
 
 
@@ -143,7 +143,7 @@ def judge_inverse(
 def _judge(
     description: Description, branches: Sequence[Sequence[Tree]], poses: Poses, explain: bool
 ) -> InverseJudgement:
-    search = Search(description)
+    search = MistakeSearch(description)
     answers = [Branch(poses, tuple(branch)) for branch in branches]
 
     duplicates: list[tuple[int, int]] = []

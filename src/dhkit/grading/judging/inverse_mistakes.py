@@ -72,7 +72,7 @@ class Explanation:
     is_near: bool = False
 
 
-class Search:
+class MistakeSearch:
     """Search for mistakes in the branches of one answer.
 
     Parameters

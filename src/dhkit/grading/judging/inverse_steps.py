@@ -20,13 +20,13 @@ from dhkit.expressions.syntax import Name, Tree
 from dhkit.expressions.trees import names_of
 from dhkit.grading.answers.inverse_steps import GivenStep
 from dhkit.grading.catalogue import hint_of, sentence_of
+from dhkit.grading.grade_report import NO_STEP, Diagnosis, Entry, KinematicJudgement, Verdict, entry_name
 from dhkit.grading.judging.changed_formulas import renamed, with_term
 from dhkit.grading.judging.inverse_poses import Poses
 from dhkit.grading.judging.step_context import Part, StepContext
 from dhkit.grading.judging.step_equations import Equations
 from dhkit.grading.judging.step_solutions import Solutions
 from dhkit.grading.remarks import Note, NoteKind
-from dhkit.grading.report import NO_STEP, Diagnosis, Entry, KinematicJudgement, Verdict, entry_name
 
 
 def _steps_in_table_angles(description: Description, steps: Sequence[GivenStep]) -> list[GivenStep] | None:

@@ -10,6 +10,7 @@ from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Name, Product, Sum, Tree
 from dhkit.grading.answers.given import LEFT_EMPTY, Given
 from dhkit.grading.answers.sheet_values import Requirements
+from dhkit.grading.grade_report import Verdict
 from dhkit.grading.judging.coordinates import Coordinates
 from dhkit.grading.judging.findings import Comparison, Finding, compare, exact_difference, names_in
 from dhkit.grading.judging.letters import WrittenNumbers
@@ -17,7 +18,6 @@ from dhkit.grading.judging.numeric import doubles, general_state
 from dhkit.grading.judging.quotients import OutsideTheRingError, Quotient
 from dhkit.grading.judging.rounding import Residuals
 from dhkit.grading.judging.truth import Truth
-from dhkit.grading.report import Verdict
 from dhkit.symbolic.ring import Element, Elements, RingError, element_array
 
 Index: TypeAlias = tuple[int, ...]

@@ -12,10 +12,10 @@ from dhkit.description import Array, Description
 from dhkit.errors import DescriptionError
 from dhkit.expressions.syntax import Name, Number, Tree
 from dhkit.expressions.trees import names_of
+from dhkit.grading.grade_report import Verdict, Witness
 from dhkit.grading.judging.inverse_edits import Lengths
 from dhkit.grading.judging.inverse_mistakes import lengths_of
 from dhkit.grading.judging.inverse_poses import Mask, Poses
-from dhkit.grading.report import Verdict, Witness
 from dhkit.symbolic import InverseDerivation, inverse_derivation, table_lengths
 from dhkit.symbolic.inverse.chain import ExactChain
 from dhkit.symbolic.inverse.steps import DerivationStep as DerivedStep

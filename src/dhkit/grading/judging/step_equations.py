@@ -17,6 +17,7 @@ from dhkit.expressions.syntax import Call, Number, Power, Product, Sum, Tree
 from dhkit.expressions.trees import names_of, parts_of
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.answers.inverse_steps import GivenStep
+from dhkit.grading.grade_report import Verdict, Witness
 from dhkit.grading.judging.changed_formulas import minus, square_of, with_calls_changed, with_term
 from dhkit.grading.judging.inverse_edits import Edit, Lengths, edits_of_parts
 from dhkit.grading.judging.inverse_poses import Poses
@@ -24,7 +25,6 @@ from dhkit.grading.judging.numeric import EditedDoubles, doubles
 from dhkit.grading.judging.quotients import OutsideTheRingError, RingReader
 from dhkit.grading.judging.step_context import Part, StepContext
 from dhkit.grading.judging.step_roots import Residual, other_root
-from dhkit.grading.report import Verdict, Witness
 from dhkit.symbolic import table_lengths
 from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.inverse.chain import POSE, ExactChain

@@ -15,7 +15,7 @@ from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.judging.changed_formulas import with_calls_changed, with_quadrant
 from dhkit.grading.judging.inverse_branch import Branch
 from dhkit.grading.judging.inverse_edits import with_signs_changed
-from dhkit.grading.judging.inverse_mistakes import Search
+from dhkit.grading.judging.inverse_mistakes import MistakeSearch
 from dhkit.grading.judging.inverse_poses import CLOSES, MATCHES, Mask, Poses
 from dhkit.grading.judging.numeric import doubles
 from dhkit.grading.judging.step_context import StepContext
@@ -82,7 +82,7 @@ class SolutionMistakes:
     def _single_mistake(self, branch: Branch) -> str:
         """Return the mistake whose correction makes the formula right; empty if there is none."""
         lengths = self.context.lengths([branch.trees[self.joint]])
-        search = Search(self.context.description, lengths)
+        search = MistakeSearch(self.context.description, lengths)
         explanation = next(search.explanations(branch), None)
         if explanation is None or explanation.joint != self.joint:
             return ""

@@ -22,6 +22,7 @@ from dhkit.expressions.syntax import Name, Number, Product, Tree
 from dhkit.expressions.trees import names_of
 from dhkit.grading.answers.given import POSE_NAMES
 from dhkit.grading.answers.inverse_steps import GivenStep
+from dhkit.grading.grade_report import Verdict, Witness
 from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.changed_formulas import with_term
 from dhkit.grading.judging.inverse_branch import MISSED_SHARE, Branch
@@ -29,7 +30,6 @@ from dhkit.grading.judging.inverse_poses import KNOWN, MATCHES, Mask
 from dhkit.grading.judging.numeric import doubles
 from dhkit.grading.judging.step_context import Part, StepContext
 from dhkit.grading.judging.step_mistakes import SolutionMistakes
-from dhkit.grading.report import Verdict, Witness
 
 
 @dataclass(frozen=True, eq=False)

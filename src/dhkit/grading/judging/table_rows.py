@@ -17,6 +17,7 @@ from dhkit.expressions.budget import budgeted
 from dhkit.expressions.parser import value_of
 from dhkit.expressions.syntax import Tree
 from dhkit.expressions.trees import names_of
+from dhkit.grading.grade_report import Verdict
 from dhkit.grading.judging.bounds import BOUNDS
 from dhkit.grading.judging.numeric import doubles
 from dhkit.grading.judging.quotients import multiple_angle, sum_of_angles
@@ -30,7 +31,6 @@ from dhkit.grading.judging.table_arms import (
     parameter_values,
     row_numbers,
 )
-from dhkit.grading.report import Verdict
 from dhkit.symbolic import Element, Elements, ExactArm, RingError, exact_arm
 from dhkit.symbolic.exact.naming import Naming
 from dhkit.symbolic.ring import Direction, Ring

@@ -19,12 +19,12 @@ from dhkit.expressions import PI, ZERO, Expression, substitute
 from dhkit.expressions.syntax import Tree
 from dhkit.grading.answers.sheet_values import Requirements
 from dhkit.grading.catalogue import hint_of, sentence_of
+from dhkit.grading.grade_report import Diagnosis, Entry, KinematicJudgement, Verdict, entry_name
 from dhkit.grading.judging.frame_changes import FrameChange
 from dhkit.grading.judging.same_arm import Overlay, overlaid
 from dhkit.grading.judging.table_arms import TableArm
 from dhkit.grading.judging.table_rows import COLUMNS, Answer, JudgedRow, TableRows, other_convention
 from dhkit.grading.remarks import Note, NoteKind
-from dhkit.grading.report import Diagnosis, Entry, KinematicJudgement, Verdict, entry_name
 
 _OPEN_TASK = Requirements()
 """Requirements that leaves frames and zero pose open."""

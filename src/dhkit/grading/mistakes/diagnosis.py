@@ -20,7 +20,7 @@ from dhkit.grading.mistakes.energy_variants import energy_variants, table_varian
 from dhkit.grading.mistakes.equation_variants import equation_variants, lagrangian_sum
 from dhkit.grading.mistakes.parameter_variants import parameter_variants
 from dhkit.grading.mistakes.sums_of_angles import derivatives_of_cosines, sums_of_angles
-from dhkit.grading.mistakes.variants import Make, Variant
+from dhkit.grading.mistakes.variants import Addition, Variant
 from dhkit.symbolic.mistakes import MISTAKES, MadeAt
 from dhkit.symbolic.ring import Element, Elements, element_array
 from dhkit.symbolic.textbook import derive
@@ -203,8 +203,8 @@ class _Changed:
     keys: Mapping[Index, _Key]
 
 
-def _kinematic_change(truth: Truth, made: MadeAt) -> Make:
-    """Return the function of what a mistake adds to A1 ... An, T and J; it derives them once, when first called."""
+def _kinematic_change(truth: Truth, made: MadeAt) -> Addition:
+    """Return the function that gives a mistake's change of A1 ... An, T and J, derived when first called."""
     wrong = cache(lambda: derive_kinematics(truth.description, {made}))
     return lambda quantity: kinematic_quantity(wrong(), quantity) - kinematic_quantity(truth.kinematics, quantity)
 
@@ -238,7 +238,7 @@ class _Pairs:
         return self._summed(differences, wanted) or self._derived(wanted)
 
     def _summed(self, differences: Differences, wanted: Mapping[Index, _Key]) -> tuple[Variant, Variant] | None:
-        """Return a pair whose second mistake explains what the first leaves of the differences."""
+        """Return a pair whose second mistake explains the differences that the first leaves."""
         for first in self.tables.textbook(self.quantity):
             change = self.tables.change(first, self.quantity)
             rest: dict[Index, Element] = {}

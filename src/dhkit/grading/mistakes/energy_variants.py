@@ -12,7 +12,7 @@ from dhkit.errors import DhkitError
 from dhkit.expressions import ZERO
 from dhkit.grading.judging.truth import Truth
 from dhkit.grading.mistakes.bounds import BOUNDS
-from dhkit.grading.mistakes.variants import Change, Variant, make_lazily
+from dhkit.grading.mistakes.variants import Change, Variant, added_lazily
 from dhkit.symbolic.mistakes import LINK_MISTAKES, MISTAKES, ROTOR_MISTAKES, MadeAt
 from dhkit.symbolic.ring import Element, element_array, translated
 from dhkit.symbolic.textbook import BodyMotion, TextbookDerivation, derive
@@ -105,19 +105,19 @@ def _textbook(textbook: TextbookDerivation) -> Iterator[Variant]:
 
     # At all links, or at one.
     for name in names:
-        yield Variant(MadeAt(name), make_lazily(_derived, textbook, MadeAt(name)), rarity=rarity(name))
+        yield Variant(MadeAt(name), added_lazily(_derived, textbook, MadeAt(name)), rarity=rarity(name))
         for i in range(1, n + 1):
             if n == 1 or not _is_possible(textbook, name, i):
                 continue
             made = MadeAt(name, i)
-            yield Variant(made, make_lazily(_derived, textbook, made), f"link {i}", rarity(name))
+            yield Variant(made, added_lazily(_derived, textbook, made), f"link {i}", rarity(name))
 
     # At some links.
     for name in _INERTIA_MISTAKES:
         possible = [i for i in range(1, n + 1) if _is_possible(textbook, name, i)]
         for links in _subsets(possible):
-            make = make_lazily(_derived, textbook, *(MadeAt(name, i) for i in links))
-            yield Variant(MadeAt(name), make, _listed(links), 1)
+            adds = added_lazily(_derived, textbook, *(MadeAt(name, i) for i in links))
+            yield Variant(MadeAt(name), adds, _listed(links), 1)
 
     # At one of several bodies of a link.
     for name in names:
@@ -126,7 +126,7 @@ def _textbook(textbook: TextbookDerivation) -> Iterator[Variant]:
         for part in several:
             if _is_possible(textbook, name, part.link):
                 made = part.mistake(name)
-                yield Variant(made, make_lazily(_derived, textbook, made), part.place, 1 + rarity(name))
+                yield Variant(made, added_lazily(_derived, textbook, made), part.place, 1 + rarity(name))
 
 
 def _is_possible(textbook: TextbookDerivation, name: str, link: int) -> bool:
@@ -165,8 +165,8 @@ def _payloads(textbook: TextbookDerivation) -> Iterator[Variant]:
         left_out = Change(-part.motion.K, -part.motion.V)
         yield Variant(part.mistake("payload_forgotten"), left_out.of, part.place)
         yield Variant(part.mistake("payload_not_moved"), Change(-part.motion.K, ring.zero).of, part.place, 1)
-        make = make_lazily(_of_description, textbook, _with_com_of_first(arm.description, part))
-        yield Variant(part.mistake("payload_at_com"), make, part.place)
+        adds = added_lazily(_of_description, textbook, _with_com_of_first(arm.description, part))
+        yield Variant(part.mistake("payload_at_com"), adds, part.place)
 
 
 def _with_com_of_first(description: Description, part: _Part) -> Description:
@@ -193,8 +193,8 @@ def _shapes(textbook: TextbookDerivation) -> Iterator[Variant]:
     for part in parts:
         for a, b in _EXCHANGED_AXES:
             place = f"{part.place}, I{'xyz'[a] * 2} and I{'xyz'[b] * 2}"
-            make = make_lazily(_exchanged_moments, textbook, part, a, b)
-            yield Variant(part.mistake("inertia_moments_exchanged"), make, place, 1)
+            adds = added_lazily(_exchanged_moments, textbook, part, a, b)
+            yield Variant(part.mistake("inertia_moments_exchanged"), adds, place, 1)
 
 
 def _scaled_inertia(
@@ -202,16 +202,16 @@ def _scaled_inertia(
 ) -> Iterator[Variant]:
     """Yield inertias of bodies about their centres of mass times a factor: of all bodies, of some, or of one."""
     if len(parts) > 1:
-        yield Variant(MadeAt(identity), make_lazily(_more_inertia, textbook, parts, factor - 1), rarity=1)
+        yield Variant(MadeAt(identity), added_lazily(_more_inertia, textbook, parts, factor - 1), rarity=1)
     by_link = {part.link: part for part in parts}
     has_one_each = len(by_link) == len(parts)
     if has_one_each:
         for links in _subsets(list(by_link)):
-            make = make_lazily(_more_inertia, textbook, [by_link[i] for i in links], factor - 1)
-            yield Variant(MadeAt(identity), make, _listed(links), 1)
+            adds = added_lazily(_more_inertia, textbook, [by_link[i] for i in links], factor - 1)
+            yield Variant(MadeAt(identity), adds, _listed(links), 1)
     for part in parts:
         place = part.place if textbook.arm.n > 1 or part.name is not None else ""
-        yield Variant(part.mistake(identity), make_lazily(_more_inertia, textbook, [part], factor - 1), place, 1)
+        yield Variant(part.mistake(identity), added_lazily(_more_inertia, textbook, [part], factor - 1), place, 1)
 
 
 def _is_rod(part: _Part) -> bool:
@@ -261,14 +261,14 @@ def _drives(textbook: TextbookDerivation) -> Iterator[Variant]:
     for i, j in combinations(range(arm.n), 2):
         if arm.rotor[i] or arm.rotor[j]:
             place = f"joints {i + 1} and {j + 1}"
-            yield Variant(MadeAt("drives_exchanged"), make_lazily(_exchanged_drives, textbook, i, j), place, 1)
+            yield Variant(MadeAt("drives_exchanged"), added_lazily(_exchanged_drives, textbook, i, j), place, 1)
     driven = [i for i in range(arm.n) if arm.rotor[i] and _inverse(arm.gear[i]) is not None]
     if driven:
-        yield Variant(MadeAt("gear_inverted"), make_lazily(_inverted_gears, textbook, driven), rarity=1)
+        yield Variant(MadeAt("gear_inverted"), added_lazily(_inverted_gears, textbook, driven), rarity=1)
     if arm.n > 1:
         for i in driven:
             made = MadeAt("gear_inverted", i + 1)
-            yield Variant(made, make_lazily(_inverted_gears, textbook, [i]), f"joint {i + 1}", 1)
+            yield Variant(made, added_lazily(_inverted_gears, textbook, [i]), f"joint {i + 1}", 1)
 
 
 def _exchanged_drives(textbook: TextbookDerivation, i: int, j: int) -> Change:
@@ -315,12 +315,12 @@ def _slides(textbook: TextbookDerivation) -> Iterator[Variant]:
             continue
         for i in range(k, ring.n):
             place = f"link {i + 1}, q{k + 1}" if ring.n > 1 else ""
-            make = make_lazily(_without_slide, textbook, textbook.links[i].bodies, k)
-            yield Variant(MadeAt("slide_forgotten", i + 1), make, place, 1)
+            adds = added_lazily(_without_slide, textbook, textbook.links[i].bodies, k)
+            yield Variant(MadeAt("slide_forgotten", i + 1), adds, place, 1)
         for part in _parts(textbook):
             if part.name is not None and part.link > k:
-                make = make_lazily(_without_slide, textbook, [part.motion], k)
-                yield Variant(part.mistake("slide_forgotten"), make, f"{part.place}, q{k + 1}", 2)
+                adds = added_lazily(_without_slide, textbook, [part.motion], k)
+                yield Variant(part.mistake("slide_forgotten"), adds, f"{part.place}, q{k + 1}", 2)
 
 
 def _without_slide(textbook: TextbookDerivation, motions: Iterable[BodyMotion], k: int) -> Change:
@@ -353,23 +353,23 @@ def table_variants(truth: Truth) -> Iterator[Variant]:
     # The other convention.
     is_standard = description.convention is Convention.STANDARD
     other = replace(description, convention=Convention.MODIFIED if is_standard else Convention.STANDARD)
-    yield Variant(MadeAt("convention_in_dynamics"), make_lazily(_of_description, textbook, other), rarity=1)
+    yield Variant(MadeAt("convention_in_dynamics"), added_lazily(_of_description, textbook, other), rarity=1)
 
     # Twists with the opposite sign: all of them, or one.
     twisted = [i for i, joint in enumerate(description.joints) if not (joint.alpha - -joint.alpha).is_zero]
     if len(twisted) > 1:
         wrong = _with_twists_reversed(description, twisted)
-        yield Variant(MadeAt("twist_sign_in_dynamics"), make_lazily(_of_description, textbook, wrong), "", 1)
+        yield Variant(MadeAt("twist_sign_in_dynamics"), added_lazily(_of_description, textbook, wrong), "", 1)
     for i in twisted:
         wrong = _with_twists_reversed(description, [i])
         made = MadeAt("twist_sign_in_dynamics", i + 1)
-        yield Variant(made, make_lazily(_of_description, textbook, wrong), f"row {i + 1}", 1)
+        yield Variant(made, added_lazily(_of_description, textbook, wrong), f"row {i + 1}", 1)
 
     # Lengths in millimetres, if some are numbers.
     if any(map(_has_length_in_numbers, description.joints)):
         wrong = replace(description, joints=tuple(map(_in_millimetres, description.joints)))
         made = MadeAt("millimetres_for_metres")
-        yield Variant(made, make_lazily(_of_description, textbook, wrong), rarity=1)
+        yield Variant(made, added_lazily(_of_description, textbook, wrong), rarity=1)
 
     # The offset of a joint variable forgotten.
     for i, joint in enumerate(description.joints):
@@ -379,8 +379,8 @@ def table_variants(truth: Truth) -> Iterator[Variant]:
             continue
         without = replace(joint, theta=ZERO) if is_revolute else replace(joint, d=ZERO)
         joints = (*description.joints[:i], without, *description.joints[i + 1 :])
-        make = make_lazily(_of_description, textbook, replace(description, joints=joints))
-        yield Variant(MadeAt("offset_in_dynamics", i + 1), make, f"q{i + 1}", 1)
+        adds = added_lazily(_of_description, textbook, replace(description, joints=joints))
+        yield Variant(MadeAt("offset_in_dynamics", i + 1), adds, f"q{i + 1}", 1)
 
 
 def _has_length_in_numbers(joint: Joint) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 from dhkit.grading.catalogue import FACTORS, capitalize, hint_of
+from dhkit.grading.grade_report import Diagnosis, entry_name
 from dhkit.grading.judging.coordinates import ANGLE
 from dhkit.grading.judging.findings import Finding, readable
 from dhkit.grading.judging.quantities import Index, JudgedQuantity, place_of
@@ -15,7 +16,6 @@ from dhkit.grading.judging.truth import Truth
 from dhkit.grading.mistakes.bounds import BOUNDS
 from dhkit.grading.mistakes.slips import Slip, kind_of_terms, slip_in
 from dhkit.grading.mistakes.wording import diagnosis_of_slip
-from dhkit.grading.report import Diagnosis, entry_name
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.exact.compact import shortened_alike

@@ -13,7 +13,7 @@ from dhkit.grading.judging.coordinates import Coordinates
 from dhkit.grading.judging.quotients import multiple_angle, sum_of_angles
 from dhkit.grading.judging.truth import DYNAMICS, Truth, right_value, translated_array
 from dhkit.grading.mistakes.sums_of_angles import sums_of_angles
-from dhkit.grading.mistakes.variants import Make, Variant, changed_only, nothing
+from dhkit.grading.mistakes.variants import Addition, Variant, changed_only, nothing
 from dhkit.symbolic import Lagrangian
 from dhkit.symbolic.mistakes import MISTAKES, STEP_FACTORS, VELOCITY_FACTORS, MadeAt
 from dhkit.symbolic.ring import Element, Elements, element_array
@@ -38,7 +38,7 @@ def lagrangian_sum(truth: Truth) -> Variant:
     """Return the mistake L = K + V with the torques from it, which is likelier than a sign of gravity."""
     lag = truth.lagrangian
 
-    def make(quantity: str) -> Elements:
+    def adds(quantity: str) -> Elements:
         # K + V instead of K - V: L gets 2 V, and tau, with g = dV/dq, gets -2 g.
         if quantity == "L":
             return element_array(2 * lag.V)
@@ -46,7 +46,7 @@ def lagrangian_sum(truth: Truth) -> Variant:
             return -2 * lag.g
         return nothing(lag, quantity)
 
-    return Variant(MadeAt("lagrangian_sum"), make)
+    return Variant(MadeAt("lagrangian_sum"), adds)
 
 
 def _signs(truth: Truth) -> Iterator[Variant]:
@@ -93,7 +93,7 @@ def _without_chain_rule(lag: Lagrangian, momenta: Elements) -> Elements:
     return element_array(without_rates) - _mass_rate(lag, momenta)
 
 
-def _velocity_change(truth: Truth, momenta: Elements, name: str) -> Make:
+def _velocity_change(truth: Truth, momenta: Elements, name: str) -> Addition:
     """Return the change of h by a mistake in a step of Euler and Lagrange's equation."""
     lag = truth.lagrangian
     wrong = partial(velocity_torques, lag.arm.ring, lag.K, momenta, frozenset({MadeAt(name)}))
@@ -152,7 +152,7 @@ def _heights(truth: Truth) -> Iterator[Variant]:
             yield Variant(MadeAt("height_sin_cos", i + 1), change, f"q{i + 1}")
 
 
-def _height_change(lag: Lagrangian, shifted: Make, quantity: str) -> Elements:
+def _height_change(lag: Lagrangian, shifted: Addition, quantity: str) -> Elements:
     """Return the change of a quantity if an angle is shifted in the potential energy alone."""
     match quantity:
         case "V" | "g":
@@ -180,21 +180,21 @@ def _matrices(truth: Truth) -> Iterator[Variant]:
         yield Variant(MadeAt("equations_exchanged"), _equations_exchanged(lag, i, j), place, 2)
 
 
-def _motor_torques(truth: Truth) -> Make:
+def _motor_torques(truth: Truth) -> Addition:
     """Return the change if torques are the motors' although the angles are absolute."""
     lag = truth.lagrangian
 
-    def make(quantity: str) -> Elements:
+    def adds(quantity: str) -> Elements:
         value = right_value(lag, quantity)
         return truth.coordinates.S.T @ value - value if value.ndim == 1 else value * 0
 
-    return make
+    return adds
 
 
-def _equations_exchanged(lag: Lagrangian, i: int, j: int) -> Make:
+def _equations_exchanged(lag: Lagrangian, i: int, j: int) -> Addition:
     """Return the change if the equations of joints i and j, from 0, are exchanged."""
 
-    def make(quantity: str) -> Elements:
+    def adds(quantity: str) -> Elements:
         value = right_value(lag, quantity)
         if not value.ndim:
             return nothing(lag, quantity)
@@ -203,10 +203,10 @@ def _equations_exchanged(lag: Lagrangian, i: int, j: int) -> Make:
         order[j] = i
         return value[order] - value
 
-    return make
+    return adds
 
 
-def _rates_exchanged(lag: Lagrangian, i: int, j: int) -> Make:
+def _rates_exchanged(lag: Lagrangian, i: int, j: int) -> Addition:
     """Return the change if the squares of two rates are exchanged in h."""
     ring = lag.arm.ring
     rate_i = ring.place("rate", i)
@@ -282,7 +282,7 @@ def _zero_poses(truth: Truth) -> Iterator[Variant]:
             yield Variant(MadeAt(identity, i + 1), _shifted(lag, i, sign), f"joint {i + 1}", 1)
 
 
-def _shifted(lag: Lagrangian, i: int, sign: int) -> Make:
+def _shifted(lag: Lagrangian, i: int, sign: int) -> Addition:
     """Return the change if an angle q is shifted by a quarter turn.
 
     With the sign e: cos(q + e pi/2) = -e sin(q), sin(q + e pi/2) = e cos(q).

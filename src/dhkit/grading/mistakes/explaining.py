@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 from dhkit.grading.catalogue import hint_of
+from dhkit.grading.grade_report import Diagnosis, entry_name
 from dhkit.grading.judging.findings import Comparison, equal, readable
 from dhkit.grading.judging.numeric import doubles, general_state
 from dhkit.grading.judging.quantities import Index, JudgedQuantity
@@ -24,7 +25,6 @@ from dhkit.grading.mistakes.diagnosis import Differences
 from dhkit.grading.mistakes.plain_causes import tables_of
 from dhkit.grading.mistakes.variants import Variant
 from dhkit.grading.mistakes.wording import diagnosis_of, diagnosis_of_slip, merge
-from dhkit.grading.report import Diagnosis, entry_name
 from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.ring import Element
 

@@ -11,7 +11,7 @@ from dhkit.expressions import Expression
 from dhkit.grading.catalogue import PARAMETER_FACTORS, UNITS
 from dhkit.grading.judging.truth import Truth, right_value, translated_array
 from dhkit.grading.mistakes.bounds import BOUNDS
-from dhkit.grading.mistakes.variants import Make, Variant
+from dhkit.grading.mistakes.variants import Addition, Variant
 from dhkit.symbolic.mistakes import MadeAt
 from dhkit.symbolic.ring import Element, Elements
 
@@ -140,7 +140,7 @@ def _letters(name: str) -> str:
     return name.rstrip("0123456789")
 
 
-def _replaced(truth: Truth, values: Mapping[str, Element]) -> Make:
+def _replaced(truth: Truth, values: Mapping[str, Element]) -> Addition:
     """Return the change if parameters are replaced; zero for quantities with constants that are made of them."""
     ring = truth.lagrangian.arm.ring
     places = {ring.place("constant", name): value for name, value in values.items()}
@@ -155,7 +155,7 @@ def _replaced(truth: Truth, values: Mapping[str, Element]) -> Make:
     def depends(element: Element) -> bool:
         return any(any(monomial[k] for k in dependent) for monomial in element.terms)
 
-    def make(quantity: str) -> Elements:
+    def adds(quantity: str) -> Elements:
         whole = right_value(truth.lagrangian, quantity)
         if quantity == "tau" and truth.friction:
             whole = whole + truth.viscous
@@ -163,4 +163,4 @@ def _replaced(truth: Truth, values: Mapping[str, Element]) -> Make:
             return whole * 0
         return translated_array(whole, places) - whole
 
-    return make
+    return adds

@@ -12,6 +12,7 @@ from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Name, Number, Product, Tree
 from dhkit.expressions.trees import names_of
 from dhkit.grading.catalogue import UNITS
+from dhkit.grading.grade_report import Diagnosis, Verdict
 from dhkit.grading.judging.changed_formulas import renamed
 from dhkit.grading.judging.findings import Comparison, equal
 from dhkit.grading.judging.quantities import JudgedQuantity
@@ -22,7 +23,6 @@ from dhkit.grading.mistakes.diagnosis import Variants, variants_of
 from dhkit.grading.mistakes.entries import mirrored, slip_of, slip_of_C
 from dhkit.grading.mistakes.parameter_variants import lengths_of
 from dhkit.grading.mistakes.wording import diagnosis_of_slip, diagnosis_of_whole
-from dhkit.grading.report import Diagnosis, Verdict
 from dhkit.symbolic.ring import Elements
 
 _DEGREE_FACTORS = (Fraction(1, 180), Fraction(180))

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from dhkit.grading.judging.truth import Truth, kinematic_quantity, translated_array
-from dhkit.grading.mistakes.variants import Make, Variant
+from dhkit.grading.mistakes.variants import Addition, Variant
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.exact.compact import parallel_runs, shortened
 from dhkit.symbolic.mistakes import MadeAt
@@ -37,7 +37,7 @@ def _right(c: Element, s: Element, x: Element, y: Element) -> tuple[Element, Ele
     return c * x - s * y, s * x + c * y
 
 
-def sums_of_angles(arm: ExactArm, right: Make, is_kinematic: bool = False) -> Iterator[Variant]:
+def sums_of_angles(arm: ExactArm, right: Addition, is_kinematic: bool = False) -> Iterator[Variant]:
     """Yield mistakes by wrong formulas for sines and cosines of sums, wherever such a sum occurs.
 
     Parameters
@@ -101,7 +101,7 @@ def _without_minus(element: Element, joint: int) -> Element:
 
 def _with_formula(
     arm: ExactArm,
-    right: Make,
+    right: Addition,
     formula: _Formula,
     written: Callable[[ExactArm, Elements], Elements],
     quantity: str,

@@ -1,4 +1,7 @@
-"""Mistakes on one robot, each with its change of every quantity, which is computed when asked for."""
+"""Mistakes on one robot: what each adds to M, h, g, tau, K, V and L, computed on request.
+
+h = C qd are the velocity torques, h_i = sum_k (dp_i/dq_k) qd_k - dK/dq_i with the momenta p_i = dK/dqd_i.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from functools import cache
 
 import numpy as np
 
+from dhkit.cached_property import cached_property
 from dhkit.grading.judging.coordinates import Coordinates
 from dhkit.grading.judging.truth import right_value
 from dhkit.symbolic import Lagrangian
@@ -15,34 +19,41 @@ from dhkit.symbolic.mistakes import MadeAt
 from dhkit.symbolic.ring import Element, Elements, element_array
 from dhkit.symbolic.textbook import velocity_torques
 
-Make = Callable[[str], Elements]
-"""Function that returns what a mistake adds to a quantity, in the robot's joint variables and the quantity's shape."""
+Addition = Callable[[str], Elements]
+"""Function that returns a mistake's change of a quantity, in the robot's joint variables and the quantity's shape."""
 
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """Change of the energies by a mistake; the changes of all equations follow, which are linear in the energies."""
+    """Change of the energies by a mistake.
+
+    Every quantity is linear in K and V, so that its change is the quantity computed from the changes of K and V.
+    """
 
     K: Element
+    """Change of the kinetic energy."""
     V: Element
+    """Change of the potential energy."""
+
+    @cached_property
+    def momenta(self) -> Elements:
+        """The changes of p_i = dK/dqd_i."""
+        return element_array([self.K.by_rate(i) for i in range(self.K.ring.n)])
 
     def of(self, quantity: str) -> Elements:
         """Return the change of M, h, g, tau, K, V or L."""
         ring = self.K.ring
         n = ring.n
-
-        # p_i = dK/dqd_i
-        momenta = element_array([self.K.by_rate(i) for i in range(n)])
         match quantity:
             case "M":
                 # M_ij = dp_i/dqd_j
                 M = np.empty((n, n), dtype=object)
-                for i, momentum in enumerate(momenta):
+                for i, momentum in enumerate(self.momenta):
                     for j in range(n):
                         M[i, j] = momentum.by_rate(j)
                 return M
             case "h":
-                return velocity_torques(ring, self.K, momenta)
+                return velocity_torques(ring, self.K, self.momenta)
             case "g":
                 # g_i = dV/dq_i
                 return element_array([self.V.by_position(i) for i in range(n)])
@@ -54,13 +65,15 @@ class Change:
                 return element_array(self.K)
             case "V":
                 return element_array(self.V)
-        return element_array(self.K - self.V)
+            case "L":
+                return element_array(self.K - self.V)
+        raise ValueError(f"no quantity {quantity!r}; expected M, h, g, tau, K, V or L")
 
 
-def make_lazily(change: Callable[..., Change], *arguments: object) -> Make:
-    """Return what a change of the energies adds to a quantity; the change is computed once, when first asked for."""
-    cached = cache(lambda: change(*arguments))
-    return lambda quantity: cached().of(quantity)
+def added_lazily(derive_change: Callable[..., Change], *arguments: object) -> Addition:
+    """Return the additions of a change of the energies, which is derived when the first of them is asked for."""
+    change = cache(lambda: derive_change(*arguments))
+    return lambda quantity: change().of(quantity)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,23 +84,23 @@ class Variant:
     ----------
     made
         Identifier of the mistake, and the link where it is made.
-    make
+    adds
         Function that returns what the mistake adds to a quantity, in the robot's own joint variables.
     place
         Link, joint or parameters in words; empty if the mistake is made throughout.
     rarity
-        Rank of the mistake among those that explain an answer, of which the one with the lowest rank is named: 0 for
+        Rank among mistakes that explain equally many quantities, of which the one with the lowest is named: 0 for
         mistakes in a textbook's derivation, 1 for mistakes in formulas, 2 for those that are merely possible.
     is_kinematic
         Whether the mistake is made in transforms and the Jacobian, not in the dynamics.
     """
 
     made: MadeAt
-    make: Make
+    adds: Addition
     place: str = ""
     rarity: int = 0
     is_kinematic: bool = False
-    _changes: dict[tuple[str, Coordinates], Elements] = field(default_factory=dict, repr=False)
+    _changes: dict[tuple[str, Coordinates], Elements] = field(default_factory=dict, repr=False)  # a cache
 
     @property
     def identity(self) -> str:
@@ -100,14 +113,17 @@ class Variant:
         return f"{self.identity} ({self.place})" if self.place else self.identity
 
     def adds_to(self, quantity: str, coordinates: Coordinates) -> Elements:
-        """Return what the mistake adds to a quantity in the student's coordinates; C is represented by C qd."""
+        """Return the mistake's change of a quantity in the student's coordinates y, q = B y.
+
+        h, g and tau become B^T (.), and M becomes B^T M B. C is not unique; its mistakes are compared in h = C qd.
+        """
         key = (quantity, coordinates)
         if key not in self._changes:
-            self._changes[key] = element_array(coordinates.in_y(quantity, self.make(quantity)))
+            self._changes[key] = element_array(coordinates.in_y(quantity, self.adds(quantity)))
         return self._changes[key]
 
 
-# Arrays of elements
+# Building blocks of variants
 
 
 def nothing(lag: Lagrangian, quantity: str) -> Elements:
@@ -115,10 +131,11 @@ def nothing(lag: Lagrangian, quantity: str) -> Elements:
     return right_value(lag, quantity) * 0
 
 
-def changed_only(lag: Lagrangian, changed: str, change: Callable[[], Elements]) -> Make:
-    """Return the function of a mistake that changes one vector of torques, and tau, which contains it."""
+def changed_only(lag: Lagrangian, changed: str, change: Callable[[], Elements]) -> Addition:
+    """Return a mistake's addition to ``changed`` (h, g or tau), and to tau, which contains it; zeros for the others."""
+    cached_change = cache(change)
 
-    def make(quantity: str) -> Elements:
-        return change() if quantity in (changed, "tau") else nothing(lag, quantity)
+    def adds(quantity: str) -> Elements:
+        return cached_change() if quantity in (changed, "tau") else nothing(lag, quantity)
 
-    return make
+    return adds

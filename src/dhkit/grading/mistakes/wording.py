@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from dhkit.grading.catalogue import LIBRARY, hint_of, sentence_of
+from dhkit.grading.grade_report import Diagnosis, entry_name
 from dhkit.grading.judging.quantities import Index, JudgedQuantity
 from dhkit.grading.mistakes.slips import Slip
 from dhkit.grading.mistakes.variants import Variant
-from dhkit.grading.report import Diagnosis, entry_name
 
 _MAX_ALTERNATIVES = 3
 """Largest number of mistakes with the same answers that one sentence names."""

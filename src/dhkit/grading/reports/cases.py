@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from dhkit.grading.grade_report import GradeReport, Verdict
 from dhkit.grading.marks import Mark, Marks
-from dhkit.grading.report import GradeReport, Verdict
 from dhkit.grading.reports.sentences import diagnosis_lines, entry_lines
 
 

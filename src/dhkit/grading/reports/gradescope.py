@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from dhkit.grading.grade_report import GradeReport
 from dhkit.grading.marks import Marks
-from dhkit.grading.report import GradeReport
 from dhkit.grading.reports.cases import Case, cases
 from dhkit.grading.reports.sentences import (
     diagnosis_lines,

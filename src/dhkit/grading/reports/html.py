@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from html import escape
 
 from dhkit.grading.bounds import BOUNDS
+from dhkit.grading.grade_report import Entry, GradeReport, Verdict, worst_verdict
 from dhkit.grading.marks import Mark, Marks
-from dhkit.grading.report import Entry, GradeReport, Verdict, worst_verdict
 from dhkit.grading.reports import sentences
 from dhkit.grading.reports.mathml import mathml
 from dhkit.grading.reports.sentences import plain, points, points_of
@@ -106,7 +106,7 @@ def _sections(report: GradeReport, marks: Marks) -> Iterator[str]:
 
 
 def _conditions(report: GradeReport) -> str:
-    """Return the conclusion without its verdict: at which parameter values it holds, what it lacks to pass."""
+    """Return the conclusion without its verdict: the parameter values at which it holds, why it does not pass."""
     return _text(report.conclusion.removeprefix(report.verdict.value).removeprefix(", "))
 
 

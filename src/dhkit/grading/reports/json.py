@@ -11,8 +11,8 @@ from pydantic import ValidationError
 from dhkit.description.files import read_bounded
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading.bounds import BOUNDS
+from dhkit.grading.grade_report import GradeReport
 from dhkit.grading.marks import Marks
-from dhkit.grading.report import GradeReport
 from dhkit.grading.rubric import Feedback
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+from dhkit.grading.grade_report import GradeReport, Verdict
 from dhkit.grading.marks import Marks
-from dhkit.grading.report import GradeReport, Verdict
 from dhkit.grading.reports.cases import Case, cases
 from dhkit.grading.reports.sentences import plain, points, summary
 

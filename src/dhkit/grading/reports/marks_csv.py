@@ -7,8 +7,8 @@ import io
 import re
 from collections.abc import Sequence
 
+from dhkit.grading.grade_report import GradeReport
 from dhkit.grading.marks import Marks
-from dhkit.grading.report import GradeReport
 from dhkit.grading.reports.sentences import plain, points
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
@@ -17,7 +17,7 @@ _NUMBER = re.compile(r"[+-]?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?")
 _AFTER_POINTS = ("verdict", "judged at", "missing", "left out", "mistakes", "error")
 """Columns after the points of the quantities."""
 _ORIGIN = ("sheet", "robot", "digest", "version")
-"""Last columns: fields of a report that say what was judged, and by what."""
+"""Last columns: fields of a report that name the file judged and the program that judged it."""
 
 
 def cell(text: str) -> str:

@@ -12,8 +12,8 @@ from dataclasses import replace
 
 from dhkit import display
 from dhkit.grading.bounds import BOUNDS
+from dhkit.grading.grade_report import Diagnosis, Entry, GradeReport, Verdict, Witness
 from dhkit.grading.marks import Mark, Marks
-from dhkit.grading.report import Diagnosis, Entry, GradeReport, Verdict, Witness
 from dhkit.grading.reports.notes import note_text
 from dhkit.grading.rubric import Feedback
 
@@ -96,7 +96,7 @@ def reading_lines(report: GradeReport) -> Iterator[str]:
 
 
 def remark_lines(report: GradeReport) -> Iterator[str]:
-    """Yield what a reader needs besides verdicts: unfinished and missing entries, statements left out, notes."""
+    """Yield the sentences besides verdicts: unfinished and missing entries, statements left out, notes."""
     yield from (f"{plain(entry.name)}: {plain(entry.statement)}" for entry in report.unfinished)
     if report.missing:
         yield f"missing: {plain(report.missing_text, 1000)}"

@@ -9,8 +9,8 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from dhkit.grading.grade_report import GradeReport, Verdict, worst_verdict
 from dhkit.grading.marks import Marks
-from dhkit.grading.report import GradeReport, Verdict, worst_verdict
 from dhkit.grading.reports import sentences
 from dhkit.grading.reports.sentences import plain, points_of
 

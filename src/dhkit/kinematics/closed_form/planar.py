@@ -1,7 +1,7 @@
 """Arms that move in parallel planes.
 
-Two or three parallel revolute joints with or without a slide along them (planar 2R and 3R, SCARA), and one revolute
-joint with a slide across its axis (R-P and P-R).
+Two or three parallel revolute joints with or without a prismatic joint along them (planar 2R and 3R, SCARA), and one
+revolute joint with a prismatic joint across its axis (R-P and P-R).
 
 Coordinates: v along the revolute axes, x and u across, with the origin on the first of them. Directions in the plane
 are pairs (cosine, sine) of their angle from x. Parameters of the formulas, all with the joints at zero:
@@ -58,7 +58,7 @@ _CHAINS = ("RR", "RRR", "RRPR", "RRRP", "PRRR", "RPRR", "RRP", "RPR", "PRR")
 
 
 def chain_fit(axes: Axes) -> Fit | None:
-    """Recognize two or three parallel revolute joints with at most one slide along them."""
+    """Recognize two or three parallel revolute joints with at most one prismatic joint along them."""
     if axes.kinds not in _CHAINS or not all(axes.parallel(1, i) for i in range(2, axes.n + 1)):
         return None
     revolute = [i for i in range(1, axes.n + 1) if not axes.prismatic[i - 1]]
@@ -80,7 +80,7 @@ def chain_fit(axes: Axes) -> Fit | None:
     # The tool's axis that lies best in the plane tells the sum of the angles.
     seen = R @ axes.T_world_tool[:3, :3]
     column = int(np.argmax(np.linalg.norm(seen[:2], axis=0)))
-    slides = ", a slide along them" if "P" in axes.kinds else ""
+    slides = " and a prismatic joint along them" if "P" in axes.kinds else ""
     return Fit(
         geometry=f"{len(revolute)} parallel revolute axes{slides}",
         parameters={

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dhkit.description import Array
-from dhkit.kinematics.axes import Axes, inverse_pose
+from dhkit.description.poses import inverse_pose
+from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.closed_form.arm_plane import ArmPlane, Vector, as_pair
 from dhkit.kinematics.closed_form.family import Parameter, PoseSymbols
 from dhkit.kinematics.closed_form.formulas import (

@@ -142,7 +142,7 @@ def _best_timing(task: Task, intervals: int, work: Work, progress: ProgressCall 
         search = MotionSearch(task, program, work, progress)
         starts = program.starts(task, None)
         if start is not None:
-            starts = Starts([lambda: program.again(start, start), *starts.guesses])
+            starts = Starts([lambda: program.next_guess(start, start), *starts.guesses])
         found = search(starts=starts)
         return found, cast("Profile", search.found)
 

@@ -157,7 +157,7 @@ class TimingProgram(PathProgram[Profile]):
         shape = 4 * self.s * (1 - self.s)
         return Profile(self.s, GUESS_SPEED_SHARE * self.states.largest(self.task.limits, shape) * shape)
 
-    def again(self, guess: Profile, found: Profile) -> Profile:
+    def next_guess(self, guess: Profile, found: Profile) -> Profile:
         """Return the last solution on the grid, which may have become finer."""
         return Profile(self.s, np.interp(self.s, found.s, found.b))
 
@@ -338,7 +338,7 @@ class SmoothTimingProgram(PathProgram[SmoothProfile]):
         c = checker.slow_down(checker.states(self.trajectory(task, profile)))
         return SmoothProfile.quintic(self.s, c * float(least)) if np.isfinite(c) else profile
 
-    def again(self, guess: SmoothProfile, found: SmoothProfile) -> SmoothProfile:
+    def next_guess(self, guess: SmoothProfile, found: SmoothProfile) -> SmoothProfile:
         """Return the last solution on the grid, which may have become finer."""
         times = np.interp(self.s, found.s, found.times)
         sd = np.interp(self.s, found.s, found.sd)

@@ -3,7 +3,7 @@
 from dhkit.planning.program.blocks import Block, BlockProgram, Indices, LocalFunction, RowKind, Rows, Scaling
 from dhkit.planning.program.mesh import MIN_LEG_INTERVALS, Curve, Knots, Mesh, corrected, knots_along
 from dhkit.planning.program.motion_program import (
-    MAX_SMALL_JOINTS,
+    SMALL_ARM_JOINTS,
     MotionProgram,
     curves_for,
     leg_durations,
@@ -26,8 +26,8 @@ from dhkit.planning.program.work import MAX_ITERATIONS, SearchLimitError, Work
 
 __all__ = [
     "MAX_ITERATIONS",
-    "MAX_SMALL_JOINTS",
     "MIN_LEG_INTERVALS",
+    "SMALL_ARM_JOINTS",
     "Arguments",
     "Block",
     "BlockProgram",

@@ -188,7 +188,7 @@ class OptimizationProgram(ABC, Generic[Iterate]):
         """Return the interval of the mesh that each piece of a solution's trajectory lies in, shape (pieces,)."""
 
     @abstractmethod
-    def again(self, guess: Iterate, found: Iterate) -> Iterate:
+    def next_guess(self, guess: Iterate, found: Iterate) -> Iterate:
         """Return the guess for another solution with tightened limits, after one from ``guess``."""
 
     @abstractmethod

@@ -414,7 +414,7 @@ class Problem:
             blocks.append(self._resting_places)
         return BlockProgram(self.variables.count, self._parameter_indices.count, tuple(blocks))
 
-    def apart(self, rows: Sequence[PlaneRow]) -> tuple[BlockProgram, Array]:
+    def with_planes(self, rows: Sequence[PlaneRow]) -> tuple[BlockProgram, Array]:
         """Return the program with points of links kept on their sides of planes, and its additional parameters."""
         at = self.variables
         begin = self.program.parameters

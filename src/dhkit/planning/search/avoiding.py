@@ -325,7 +325,7 @@ class AvoidingSearch:
             kept = planes.required + planes.inflation
             rows = self.separation.rows(planes.gaps, planes.active, kept, {0, *mesh.ends})
             try:
-                solved = search.solution(guess, margins, self.program.apart(rows))
+                solved = search.solution(guess, margins, self.program.with_planes(rows))
                 found = search.checked(solved, turn)
             except PlanningError:
                 if best is not None:

@@ -216,7 +216,7 @@ class MotionSearch(Generic[Iterate]):
                 if self.program is before and (again := self._solved_again(guess, margins)) is not None:
                     found = again
                     continue
-                guess = self.program.again(guess, found)
+                guess = self.program.next_guess(guess, found)
                 found = self.solution(guess, margins)
             raise self.stays_exceeded(checked.certificate, self._rounds)
         finally:

@@ -1,6 +1,7 @@
 """Vectors of three floats, exact fractions or CasADi expressions.
 
-They are plain tuples, not CasADi matrices, so that a product with an exact 0 or 1 never becomes an expression.
+They are plain tuples, not CasADi matrices, so that entries 0 and 1 stay Python's numbers. CasADi drops products with 0
+and 1 as well; comparing Python's numbers here takes a hundredth of the time.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ Scalar: TypeAlias = Any
 Vector3: TypeAlias = tuple[Scalar, Scalar, Scalar]
 
 _NUMBER = (float, int)
-"""Types of the numbers that products and sums look at; exact fractions are multiplied and added as they are."""
+"""Types of numbers that are compared with 0 and 1; a Fraction is multiplied and added as it is."""
 ZERO_VECTOR: Vector3 = (0.0, 0.0, 0.0)
 
 
@@ -41,23 +42,23 @@ def cross(a: Vector3, b: Vector3) -> Vector3:
 
 
 def about_z(c: Scalar, s: Scalar, a: Vector3) -> Vector3:
-    """Return Rz a, for the angle's cosine and sine."""
+    """Return Rz(angle) a, with c = cos(angle) and s = sin(angle)."""
     return (*_rotate(c, s, a[0], a[1]), a[2])
 
 
 def about_z_back(c: Scalar, s: Scalar, a: Vector3) -> Vector3:
-    """Return Rz^T a."""
-    y, x = _rotate(c, s, a[1], a[0])
+    """Return Rz(angle)^T a."""
+    y, x = _rotate(c, s, a[1], a[0])  # with x and y exchanged, a rotation by the opposite angle
     return x, y, a[2]
 
 
 def about_x(c: Scalar, s: Scalar, a: Vector3) -> Vector3:
-    """Return Rx a."""
+    """Return Rx(angle) a."""
     return (a[0], *_rotate(c, s, a[1], a[2]))
 
 
 def about_x_back(c: Scalar, s: Scalar, a: Vector3) -> Vector3:
-    """Return Rx^T a."""
+    """Return Rx(angle)^T a."""
     z, y = _rotate(c, s, a[2], a[1])
     return a[0], y, z
 
@@ -67,11 +68,8 @@ def _rotate(c: Scalar, s: Scalar, x: Scalar, y: Scalar) -> tuple[Scalar, Scalar]
     return _difference(_product(c, x), _product(s, y)), _sum(_product(s, x), _product(c, y))
 
 
-# CasADi drops products with 0 and 1 as well; asking it takes a hundred times as long as these comparisons.
-
-
 def _product(a: Scalar, b: Scalar) -> Scalar:
-    """Return a b, where 0 and 1 are left out."""
+    """Return a b without products with 1; 0 where a factor is the number 0, whatever the other is."""
     for x, y in ((a, b), (b, a)):
         if isinstance(x, _NUMBER):
             if x == 0:
@@ -100,5 +98,5 @@ def _difference(a: Scalar, b: Scalar) -> Scalar:
 
 
 def is_zero(x: Scalar) -> bool:
-    """Return whether a scalar is the number 0, not a symbol."""
-    return isinstance(x, float) and x == 0.0
+    """Return whether a scalar is the number 0, float or int, not a symbol."""
+    return isinstance(x, _NUMBER) and x == 0

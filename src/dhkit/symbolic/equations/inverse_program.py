@@ -30,6 +30,9 @@ _LOCAL = frozenset(["T", "q", "b", "k", "status", "wrap", "root", "branches", "f
 class InverseProgram:
     """Statements that compute one branch, for signs root1, root2 ... of the roots.
 
+    The code around them counts k from 0 to 2^roots - 1; bit r of k is the sign of root r + 1. ``Guard`` leaves the
+    round where the branch does not exist, and each ``Digit`` appends one binary digit to b, the number of the branch.
+
     Attributes
     ----------
     robot, name
@@ -48,8 +51,10 @@ class InverseProgram:
         Expressions of the joint values.
     turning
         For each joint, whether its value is an angle.
-    words
-        Sentences about the derivation.
+    geometry
+        The arrangement of the axes, in words.
+    notes
+        Further sentences about the derivation.
     """
 
     robot: str
@@ -62,7 +67,8 @@ class InverseProgram:
     statements: tuple[Statement, ...]
     joints: tuple[str, ...]
     turning: tuple[bool, ...]
-    words: tuple[str, ...]
+    geometry: str
+    notes: tuple[str, ...]
 
     @property
     def has_roots(self) -> bool:
@@ -188,7 +194,8 @@ class _Statements:
             statements=tuple(statements),
             joints=tuple(self._joint(i) for i in range(derivation.n)),
             turning=tuple(kind == "R" for kind in derivation.description.kinds),
-            words=(derivation.geometry, *derivation.notes),
+            geometry=derivation.geometry,
+            notes=derivation.notes,
         )
 
     def _elements(self) -> list[Element]:

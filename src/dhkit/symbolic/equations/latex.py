@@ -17,8 +17,8 @@ from dhkit.symbolic.equations.quantities import Quantity, check_length, elements
 from dhkit.symbolic.equations.writing import Printer, readable_decimal
 from dhkit.symbolic.ring import Element, Generator, Ring
 from dhkit.symbolic.ring.notation import (
-    Angle,
     Notation,
+    SineOrCosine,
     angles_of,
     entry_names,
     generators_of,
@@ -283,7 +283,7 @@ def _terms(marked: str) -> list[str]:
     return terms
 
 
-def _where(angles: Sequence[Angle]) -> str:
+def _where(angles: Sequence[SineOrCosine]) -> str:
     """Return the angles of the sines and cosines."""
     definitions: list[str] = []
     if any(len(angle.joints) == 1 for angle in angles):

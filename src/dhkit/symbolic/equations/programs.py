@@ -117,21 +117,23 @@ class FunctionSet:
         return "Equations of motion" if moving else "Kinematics"
 
 
-def program(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity], language: Syntax) -> FunctionSet:
+def function_set(
+    source: Lagrangian | SymbolicKinematics, quantities: Sequence[Quantity], language: Syntax
+) -> FunctionSet:
     """Return quantities as functions in a language."""
     # The parameters that occur, in the order of the robot file.
     constants = constants_of(generators_of(elements_of(quantities)))
-    order = {name: k for k, name in enumerate([*lag.description.parameters, *lag.arm.parameters])}
+    order = {name: k for k, name in enumerate([*source.description.parameters, *source.arm.parameters])}
     names = sorted(symbols_of(constants), key=lambda name: (order.get(name, len(order)), name))
     identifiers = _identifiers(names)
-    values = dict(lag.description.numbers.values) | lag.arm.parameters
+    values = dict(source.description.numbers.values) | source.arm.parameters
     parameters = [Parameter(identifiers[x], harmless(x), float(values.get(x, math.nan))) for x in names]
 
     code = _Code(language, identifiers)
     return FunctionSet(
-        robot=harmless(lag.description.name),
-        identifier=identifier(lag.description.name),
-        n=lag.n,
+        robot=harmless(source.description.name),
+        identifier=identifier(source.description.name),
+        n=source.n,
         parameters=tuple(parameters),
         functions=tuple(code.function(quantity) for quantity in quantities),
         notes=tuple(f"{harmless(name)} is {own}" for name, own in identifiers.items() if name != own),

@@ -1,4 +1,7 @@
-"""Equations as sympy objects in symbols q1, qd1, m2; not simplified, because that would take minutes."""
+"""Equations as sympy objects in symbols q1, qd1, m2 without assumptions.
+
+They are not simplified, because that would take minutes.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +17,15 @@ from dhkit.symbolic.equations.writing import Printer
 from dhkit.symbolic.ring import Element, Generator
 from dhkit.symbolic.ring.notation import Notation, notation
 
-FUNCTIONS = {"abs": "Abs"}
+_SYMPY_NAMES = {"abs": "Abs"}
 """Functions that have another name in sympy."""
 
 
 class SympyWriter:
-    """Builds sympy expressions."""
+    """Builds sympy expressions; see :class:`dhkit.symbolic.equations.writing.Writer` for the meaning of its methods.
+
+    ``names`` gives constants that would have a variable's name another one.
+    """
 
     def __init__(self, names: Notation) -> None:
         import sympy
@@ -31,8 +37,9 @@ class SympyWriter:
         return self._sympy.Symbol(self._names(name))
 
     def variable(self, generator: Generator) -> Any:  # noqa: D102
-        if not generator.joints:
+        if not generator.joints:  # a rate, an acceleration, or the position of a prismatic joint
             return self._sympy.Symbol(generator.text)
+        # The sine or cosine of a sum of joint angles.
         angle = self._sympy.Add(*(self._sympy.Symbol(f"q{joint + 1}") for joint in generator.joints))
         return self._sympy.sin(angle) if generator.kind == "sine" else self._sympy.cos(angle)
 
@@ -40,13 +47,13 @@ class SympyWriter:
         return self._sympy.pi
 
     def call(self, function: str, arguments: Sequence[Any]) -> Any:  # noqa: D102
-        return getattr(self._sympy, FUNCTIONS.get(function, function))(*arguments)
+        return getattr(self._sympy, _SYMPY_NAMES.get(function, function))(*arguments)
 
     def power(self, base: Any, exponent: int) -> Any:  # noqa: D102
         return base**exponent
 
     def brackets(self, inner: Any) -> Any:  # noqa: D102
-        return inner
+        return inner  # an expression tree needs none
 
     def product(self, coefficient: Fraction, numerator: Sequence[Any], denominator: Sequence[Any]) -> Any:  # noqa: D102
         number = self._sympy.Rational(coefficient.numerator, coefficient.denominator)
@@ -72,11 +79,12 @@ def sympy_object(element: Element) -> Any:
 
 
 def equations_sympy(quantities: Sequence[Quantity]) -> dict[str, object]:
-    """Return matrices (``sympy.Matrix``; vectors are columns) and expressions by name."""
+    """Return matrices (``sympy.Matrix``; vectors are columns), and expressions of K, V and L, by name."""
     import sympy
 
     found = {}
     for quantity in quantities:
+        # vectorize also takes an array without axes, that of a scalar.
         entries = np.vectorize(sympy_object, otypes=[object])(quantity.elements)
         found[quantity.name] = sympy.Matrix(entries.tolist()) if quantity.elements.ndim else entries.item()
     return found

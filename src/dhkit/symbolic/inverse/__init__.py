@@ -1,4 +1,7 @@
-"""Inverse kinematics derived step by step, exactly: what is looked at, the equation, its solutions, and their proof."""
+"""Inverse kinematics derived step by step, exactly.
+
+Each step has the point or direction that is considered, its equation, the solutions and their proof.
+"""
 
 from dhkit.symbolic.inverse.derivation import InverseDerivation, inverse_derivation
 

@@ -142,7 +142,7 @@ class InverseDerivation:
         kinds = self.description.kinds
         if self.family.name != "parallel_chain":
             return self.family.geometry
-        slide = ", a slide along them" if "P" in kinds else ""
+        slide = " and a prismatic joint along them" if "P" in kinds else ""
         return f"{kinds.count('R')} parallel revolute axes{slide}"
 
     @cached_property

@@ -11,7 +11,7 @@ _INSTEAD = "use arm.ik_numeric, or arm.ik with the package ssik (pip install 'dh
 
 
 def why_not(chain: ExactChain) -> str:
-    """Return one sentence that says what is missing for a closed form, and what to use instead."""
+    """Return one sentence on the condition of a closed form that is not met, and on the alternatives."""
     n = chain.n
     kinds = chain.description.kinds
     count = f"{n}R" if set(kinds) == {"R"} else kinds

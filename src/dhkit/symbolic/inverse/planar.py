@@ -94,7 +94,7 @@ def parallel_chain(bench: Workbench) -> None:
         # Axis c instead of the tool: (x, y) <- (x, y) - Rz(phi) R p, with p the vector from axis c to the tool
         c = revolute[2]
         who = f"axis {c}"
-        taken_off = ": what lies behind it is turned by phi, and taken off."
+        taken_off = ": the part after it is turned by phi, and taken off."
         second = _between(chain, b, c)
         _chain_rotation(bench, revolute, before, first @ second, end)
         cosine, sine = chain.named(("cphi", "sphi"))

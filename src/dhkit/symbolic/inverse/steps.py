@@ -178,7 +178,7 @@ class Workbench:
         self._set_meanings(INNER, _entries(in_joints))
 
         what = "base and tool" if self.undoes_tool else "base"
-        after = f" and behind joint {chain.n}" if self.undoes_tool else ""
+        after = f" and after joint {chain.n}" if self.undoes_tool else ""
         definitions = [Definition(chain.names[name], entry) for name, entry in zip(INNER, _entries(given), strict=True)]
         self.steps.append(
             DerivationStep(

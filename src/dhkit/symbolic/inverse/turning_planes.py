@@ -240,7 +240,7 @@ def _reach_axis_4(
     bench.add(
         DerivationStep(
             "Axis 4 in the arm's plane",
-            "What lies behind axis 4 is turned by phi: without it, axis 4 is at (x, y) from axis 2.",
+            "The links after axis 4 are turned by phi: without them, axis 4 is at (x, y) from axis 2.",
             definitions,
         )
     )

@@ -1,4 +1,4 @@
-"""Bounds on exact work: the ring's products, and what is derived with them."""
+"""Bounds on exact work: the ring's products, and the derivations that use them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The constants that a ring needs for a robot file's expressions."""
+"""The constants that a ring needs for a robot file's expressions: generators that do not depend on the state."""
 
 from __future__ import annotations
 
@@ -19,20 +19,22 @@ from dhkit.symbolic.ring.ring import Constant
 class Constants:
     """Finds the constants of expressions and of cosines and sines of angles.
 
-    Numbers stay rational. Cosines of multiples of 15 degrees are written with square roots; the cosine and the sine of
-    any other angle are two constants whose squares add up to 1.
+    Numbers stay rational. Cosines of multiples of 15 degrees are written with square roots. For other angles, the
+    cosine and the sine of the largest common unit u of the multiples m u that occur are two constants whose squares add
+    up to 1; those of m u, m whole, are polynomials in them.
 
     Attributes
     ----------
     found
         The constants by text; each follows those that it depends on.
     notes
-        One sentence for each number that becomes a constant because it has no exact form.
+        One sentence for each number or function of parameters that becomes a constant because it has no exact form.
     """
 
     found: dict[str, Constant] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     _units: dict[Monomial, Fraction] = field(default_factory=dict)
+    """The common unit of the multiples of each monomial in angles (pi, or a parameter); see :func:`_common_angles`."""
 
     @classmethod
     def of(cls, expressions: Iterable[Expression], angles: Iterable[Expression]) -> Constants:
@@ -49,18 +51,19 @@ class Constants:
         return constants
 
     def _scan(self, expression: Expression) -> None:
-        """Add the constants of an expression, with the reciprocals of what it divides by."""
+        """Add the constants of an expression, with the reciprocals of its divisors."""
         for monomial, _ in expression.terms:
             for atom, exponent in monomial:
                 self._scan_atom(atom)
                 if exponent < 0:
+                    # A group is a sum in parentheses.
                     denominator = atom.arguments[0] if atom.name == "group" else Expression.of_atom(atom)
                     self._add(Constant(reciprocal_text(atom), 1 / denominator, reciprocal_of=denominator))
 
     def _scan_atom(self, atom: Atom) -> None:
         """Add the constants of a name, a sum in parentheses or a function of an expression."""
         inside = atom.arguments[0] if atom.arguments else None
-        if inside is None:
+        if inside is None:  # a name
             self._add(Constant(atom.text, Expression.of_atom(atom) if atom.name == "pi" else None))
         elif atom.name == "group":
             self._scan(inside)
@@ -69,12 +72,12 @@ class Constants:
         elif atom.name == "sqrt":
             self._scan(inside)
             self._add(Constant(atom.text, Expression.of_atom(atom), square=inside))
-        else:
-            self.notes.append(f"{atom.text} is a symbol of its own")
+        elif atom.text not in self.found:
+            self.notes.append(f"{atom.text} is a symbol of its own: identities with it are not seen")
             self._add(Constant(atom.text, Expression.of_atom(atom)))
 
     def _scan_angle(self, angle: Expression) -> None:
-        """Add the constants that cosine and sine of an angle are polynomials in, term by term of the angle."""
+        """Add the constants of which the cosine and the sine of an angle are polynomials, term by term of the angle."""
         for monomial, coefficient in angle.terms:
             if is_exact(monomial, coefficient):
                 # A multiple of 15 degrees: only square roots.
@@ -82,14 +85,16 @@ class Constants:
                 self._scan(sin(PI * coefficient))
                 continue
 
-            # cos(m u) and sin(m u), m whole, are polynomials in cos(u) and sin(u); too large an m gets its own symbols.
+            # cos(m u) and sin(m u), m whole, are polynomials in cos(u) and sin(u). Too large an m gets symbols of its
+            # own, which are then unrelated to cos(u).
             unit = self._units[monomial]
-            if abs(coefficient) / unit > BOUNDS.angle_multiple:
+            m = abs(coefficient) / unit
+            if m > BOUNDS.angle_multiple:
                 unit = abs(coefficient)
             unit_angle = Expression(((monomial, unit),))
             cosine = Expression.of_atom(Atom("cos", (unit_angle,)))
             sine = Expression.of_atom(Atom("sin", (unit_angle,)))
-            if cosine.text in self.found:
+            if cosine.text in self.found:  # by another angle
                 continue
 
             # sin^2 u = 1 - cos^2 u
@@ -103,7 +108,7 @@ class Constants:
 
 
 def value_of(constant: Constant, values: Mapping[str, Expression]) -> float:
-    """Return the value of a constant for given parameters; NaN for the reciprocal of 0."""
+    """Return the value of a constant for given parameters; NaN where it has none: 1/0, a root of a negative number."""
     try:
         return float(substitute(constant.meaning or Expression.symbol(constant.text), values))
     except ExpressionError:
@@ -111,9 +116,9 @@ def value_of(constant: Constant, values: Mapping[str, Expression]) -> float:
 
 
 def _common_angles(expressions: Iterable[Expression], angles: Iterable[Expression]) -> dict[Monomial, Fraction]:
-    """Return, for each monomial in angles, the largest factor of which all factors that occur are whole multiples.
+    """Return, for each monomial in angles, the largest rational u of which all its coefficients are whole multiples.
 
-    For pi/7 and 3*pi/14 that is 1/14, at the monomial pi.
+    For pi/7 and 3*pi/14, u is 1/14 at the monomial pi.
     """
     multiples: dict[Monomial, set[Fraction]] = {}
 

@@ -1,4 +1,8 @@
-"""Names of a ring's generators in equations; no two generators have the same name."""
+"""Names of a ring's generators in equations; no two generators have the same name.
+
+A ring's generators are joint variables, their rates and accelerations, sines and cosines of joint angles, and
+constants: parameters of the robot file, and functions of parameters.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +17,7 @@ from dhkit.symbolic.ring import Element, Generator, Ring, angle_name
 
 @dataclass(frozen=True)
 class Notation:
-    """Names of constants in equations: their own, unless the name has another meaning there.
+    """Names of constants in equations: their own, unless a variable, a sine or an entry has that name.
 
     Attributes
     ----------
@@ -21,7 +25,7 @@ class Notation:
         Printed name of each symbol of the constants.
     """
 
-    names: dict[str, str]
+    names: Mapping[str, str]
 
     def __call__(self, name: str) -> str:
         """Return the printed name of a constant."""
@@ -33,11 +37,13 @@ class Notation:
 
 
 @dataclass(frozen=True)
-class Angle:
+class SineOrCosine:
     """A sine or cosine that occurs in equations, of the sum of some joints' variables."""
 
     name: str
+    """Its name in equations, such as s23."""
     function: str
+    """``sin`` or ``cos``."""
     joints: tuple[int, ...]
 
     @property
@@ -55,7 +61,7 @@ def notation(ring: Ring) -> Notation:
 
 
 def variables(ring: Ring) -> set[str]:
-    """Return the names of joint variables, rates and accelerations, and of sines and cosines of their sums."""
+    """Return the names of joint variables, rates, accelerations, sines and cosines of sums of neighbouring ones."""
     names = {g.text for g in ring.generators if g.kind != "constant"}
     for i in range(ring.n):
         names |= {f"q{i + 1}", f"qd{i + 1}", f"qdd{i + 1}"}
@@ -69,9 +75,9 @@ def variables(ring: Ring) -> set[str]:
 
 
 def entry_names(n: int) -> set[str]:
-    """Return the names of the entries of all quantities of n joints: M12, g1, K."""
+    """Return the names of the entries of all printed quantities of n joints (see ``quantities.py``): M12, g1, K."""
     names = {"K", "V"}
-    names |= {f"A{i + 1}" for i in range(n)}
+    names |= {f"A{i + 1}" for i in range(n)}  # link transforms, as wholes
     shapes = {"h": (n,), "g": (n,), "tau": (n,), "M": (n, n), "C": (n, n), "T": (4, 4), "J": (6, n)}
     for quantity, shape in shapes.items():
         names |= {entry_name(quantity, place) for place in np.ndindex(shape)}
@@ -84,7 +90,7 @@ def entry_name(quantity: str, place: tuple[int, ...]) -> str:
 
 
 def renamings(elements: Iterable[Element]) -> list[str]:
-    """Return one sentence for each constant of elements whose printed name differs from that in the file."""
+    """Return one sentence for each constant of elements whose printed name differs from that in the robot file."""
     notes: dict[str, None] = {}
     for element in elements:
         used = symbols_of(constants_of(generators_of([element])))
@@ -102,7 +108,7 @@ def distinct(names: Iterable[str], taken: Collection[str]) -> dict[str, str]:
     used = {*taken, *names}
     printed_names = {}
     for name in names:
-        printed = name
+        printed = name  # its own name is free, unless it is taken; the names of others are not
         while printed in taken or (printed != name and printed in used):
             printed += "_"
         used.add(printed)
@@ -111,7 +117,7 @@ def distinct(names: Iterable[str], taken: Collection[str]) -> dict[str, str]:
 
 
 def symbols_of(generators: Iterable[Generator]) -> set[str]:
-    """Return the names of the parameters that constants depend on."""
+    """Return the names of the parameters in constants: a parameter's own, and those in a function of parameters."""
     found: set[str] = set()
     for g in generators:
         found |= {g.text} if g.meaning is None else g.meaning.symbols
@@ -119,7 +125,7 @@ def symbols_of(generators: Iterable[Generator]) -> set[str]:
 
 
 def generators_of(elements: Iterable[Element]) -> list[Generator]:
-    """Return the generators that occur in elements, which may be of several rings of one arm."""
+    """Return the generators that occur in elements, which may be of several rings of one arm: equal ones once."""
     found: dict[Generator, None] = {}
     for element in elements:
         found |= dict.fromkeys(element.ring.generators[k] for k in sorted(element.used_generators))
@@ -131,8 +137,8 @@ def constants_of(generators: Iterable[Generator]) -> list[Generator]:
     return [g for g in generators if g.kind == "constant"]
 
 
-def angles_of(generators: Iterable[Generator]) -> list[Angle]:
-    """Return the sines and cosines among generators, joint by joint, cosines first."""
-    # Entries written in other sums of angles have other generators of the same names.
-    found = {Angle(g.text, "sin" if g.kind == "sine" else "cos", g.joints) for g in generators if g.joints}
+def angles_of(generators: Iterable[Generator]) -> list[SineOrCosine]:
+    """Return the sines and cosines among generators: of single joints, then of sums; the cosine before the sine."""
+    # A set, since generators of different rings may have the same name. Only sines and cosines have joints.
+    found = {SineOrCosine(g.text, "sin" if g.kind == "sine" else "cos", g.joints) for g in generators if g.joints}
     return sorted(found, key=lambda angle: (len(angle.joints) > 1, angle.joints, angle.function))

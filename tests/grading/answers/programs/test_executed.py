@@ -19,7 +19,7 @@ from dhkit.execution import Isolation, Kind, find_isolation
 from dhkit.execution.bounds import BOUNDS
 from dhkit.grading import grade
 from dhkit.grading.answers.sheet import read_task
-from dhkit.grading.report import Verdict
+from dhkit.grading.grade_report import Verdict
 
 ROBOT = "planar2r"
 M = (

@@ -1049,3 +1049,17 @@ def test_equations_are_read_back(tmp_path, robot):
     lines = [f"{name} = {s.formulas[-1]};" for s in reversed(found) for name in s.targets]
     report = report_of(tmp_path / "b.m", "\n".join(lines), description)
     assert report, str(report)
+
+
+def test_a_name_of_a_command_of_matlab_may_be_assigned(tmp_path):
+    path = tmp_path / "answer.m"
+    formula = "m1*g*l1*sin(q1)/2 + m2*g*(l1*sin(q1) + l2*sin(q1 + q2)/2)"
+    assert passing(report_of(path, f"load = 3;\nV = {formula} + load - 3\n"), "V")
+    path.write_text(f"load data\nV = {formula}\n")
+    with pytest.raises(AnswerError, match="may change any name"):
+        grade(path, ROBOT)
+
+
+def test_a_third_derivative_is_not_an_acceleration(tmp_path):
+    report = report_of(tmp_path / "answer.m", "h1 = diff(qdot1, t, 2)\n")
+    assert "unreadable: h1" in str(report)

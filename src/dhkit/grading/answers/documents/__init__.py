@@ -1,1 +1,1 @@
-"""Answers out of LaTeX: rows of displays, statements that go on over rows, and what a document states of quantities."""
+"""Answers out of LaTeX: rows of displays, statements that go on over rows, and statements of quantities."""

@@ -73,7 +73,7 @@ _DOUBTFUL = re.compile(
     r"|one|two|three|four|five|six|seven|eight|nine|ten|third|quarter|wrong|incorrect|false|modulo|mod|pi|theta",
     re.IGNORECASE,
 )
-"""Words that may change what a formula in front of them states."""
+"""Words that may change the meaning of a formula in front of them."""
 
 _PROSE = re.compile(r"(?:[A-Za-z~\s.,:;()'`?!]|\\[ ,]|(?<=[A-Za-z])-(?=[A-Za-z]))*", re.ASCII)
 

@@ -235,7 +235,7 @@ class _ExecutedProgram:
         return {}
 
     def applied(self, function: Function, arguments: dict[str, Value]) -> tuple[Value, Scope]:
-        """Return what a function returns when it is called with symbols, and its local names.
+        """Return a function's result when it is called with symbols, and its local names.
 
         Raises
         ------
@@ -307,7 +307,7 @@ class _ExecutedProgram:
         return replace(value, names=tuple(names))
 
     def returned_names(self, function: Function) -> list[str]:
-        """Return the names in what a function returns, which are not known of an executed one."""
+        """Return the names in a function's result, which are not known of an executed one."""
         return []
 
     def assigned_anywhere(self) -> Iterator[tuple[str, str]]:
@@ -517,7 +517,7 @@ def _are_same(values: Array, others: Array) -> bool:
     return bool(np.allclose(values, others, rtol=_SAME_VALUES, atol=_SAME_VALUES, equal_nan=True))
 
 
-# What a process says, which is not trusted
+# Messages of the process, which are not trusted
 
 
 def _fields(value: object) -> list[tuple[str, Any]]:

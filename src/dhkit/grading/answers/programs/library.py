@@ -1,4 +1,4 @@
-"""Functions of numpy, sympy, casadi and MATLAB that are read: what they make of their arguments."""
+"""Functions of numpy, sympy, casadi and MATLAB that are read: their results for given arguments."""
 
 from __future__ import annotations
 

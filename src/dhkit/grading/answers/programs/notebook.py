@@ -153,7 +153,7 @@ def _timed_or_captured(lines: list[str], first: int, magic: str, arguments: list
         case "capture", [name] if name.isidentifier():
             return [*before, f"{name} = object()", *rest]
         case "timeit", _:
-            # Its names are local to it, and it is executed many times: what it changes is that of a loop.
+            # Its names are local to it, and it is executed many times: its changes are those of a loop.
             return [
                 *before,
                 "for _ in range(7):",
@@ -164,7 +164,7 @@ def _timed_or_captured(lines: list[str], first: int, magic: str, arguments: list
 
 
 def _executed(line: str, where: str) -> str:
-    """Return what a line of a cell executes; ``pass`` for one that only a notebook understands."""
+    """Return the Python statement in a line of a cell; ``pass`` for a line that only a notebook understands."""
     stripped = line.strip()
     indentation = line[: len(line) - len(line.lstrip())]
     if not stripped.startswith("%"):

@@ -35,7 +35,7 @@ _WRITTEN_BY_DHKIT = {
     "kinetic_energy": "K",
     "potential_energy": "V",
 }
-"""Functions of `dhkit equations --format python`, and what they return."""
+"""Functions of `dhkit equations --format python`, and the quantities that they return."""
 _ENERGIES = ("K", "V", "L")
 
 
@@ -50,13 +50,13 @@ class ReadProgram(Protocol):
         """Return a function's arguments as themselves."""
 
     def returned_names(self, function: Function) -> list[str]:
-        """Return the names in what a function returns."""
+        """Return the names in a function's result."""
 
     def applied(self, function: Function, arguments: dict[str, Value]) -> tuple[Value, Scope]:
-        """Return what a function returns, and its local names."""
+        """Return a function's result, and its local names."""
 
     def assigned_anywhere(self) -> Iterable[tuple[str, str]]:
-        """Yield what the program assigns: names, keys and fields, those in what is not read too, with their lines."""
+        """Yield the targets of assignments, with their lines: names, keys, fields, those in unread statements too."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class _Candidate:
 
 
 def called_name(function: Function) -> str:
-    """Return what a function is called: dhkit's own names of functions stand for the quantities."""
+    """Return a function's name; dhkit's own names of functions stand for the quantities."""
     return _WRITTEN_BY_DHKIT.get(function.name, function.name)
 
 
@@ -145,7 +145,7 @@ class _ProgramAnswers:
             if not any(re.search(rf"\b{re.escape(name)}\b", text) for text in self.record.left_out):
                 self.record.left_out.append(f"{line}: {name} (assigned where the program is not read)")
 
-    # What the program gives
+    # The program's answers
 
     def _given_by(self, scope: Scope, name: str, called: str, function: str = "") -> Iterator[_Candidate]:
         """Yield the quantity, or the entries, that a name gives that is called so."""
@@ -263,7 +263,7 @@ class _ProgramAnswers:
     # Functions
 
     def _given_by_functions(self, known: set[str]) -> list[_Candidate]:
-        """Return what functions give: by what they return, and, of quantities that nothing gives, by local names."""
+        """Return the functions' answers: their results, and local names for the quantities that no result gives."""
         self._function_scopes = []
         returned: list[_Candidate] = []
         local: list[_Candidate] = []
@@ -322,7 +322,7 @@ class _ProgramAnswers:
         return local
 
     def _against_main(self, one: _Candidate) -> _Candidate:
-        """Refuse what a function gives where the program binds the same name to something that is not read."""
+        """Refuse a function's answer where the program binds the same name to something that is not read."""
         main = self.program.main
         for name in (
             one.name,
@@ -341,7 +341,7 @@ class _ProgramAnswers:
         return one
 
     def _is_call_at_numbers(self, value: Unread, function: str) -> bool:
-        """Whether what is not read calls a function at names that stand for numbers."""
+        """Whether an unread statement calls a function at names that stand for numbers."""
         main = self.program.main
         others = value.names - {function}
         if function not in value.names or not others <= main.names.keys():
@@ -350,7 +350,7 @@ class _ProgramAnswers:
         return bool(scalars) and all(one and all(x.number is not None for x in one) for one in scalars)
 
     def _is_changed_on_return(self, function: Function, scope: Scope, value: Value, one: _Candidate) -> bool:
-        """Whether what a function returns is made of a local name and of no other quantity: -G, G*sign."""
+        """Whether a function's result contains a local name and no other quantity: -G, G*sign."""
         names = set(self.program.returned_names(function))
         uses = frozenset[str]().union(*(x.uses for x in self._all_scalars(value)))
         keys = {key.partition("[")[0] for key in self._all_uses(uses)}
@@ -373,7 +373,7 @@ class _ProgramAnswers:
 
     @staticmethod
     def _all_scalars(value: Value) -> list[Scalar]:
-        """Return the scalars of what a function returns."""
+        """Return the scalars of a function's result."""
         values = value.values if isinstance(value, Several) else (value,)
         return list(chain.from_iterable(map(_scalars, values)))
 
@@ -390,7 +390,7 @@ class _ProgramAnswers:
         return found
 
     def _returned_names(self, function: Function, value: Value) -> list[tuple[str, str, Value]]:
-        """Return each local name that a function returns, what it is called, and its value."""
+        """Return each local name that a function returns, its name as an answer, and its value."""
         own = called_name(function)
         match value:
             case Several(values, names):
@@ -434,7 +434,7 @@ class _ProgramAnswers:
     # Names that stand for one thing
 
     def _without_calls(self, candidates: Sequence[_Candidate]) -> list[_Candidate]:
-        """Leave out what the program makes by calling a function of its own that gives the same quantity."""
+        """Leave out the answers made by calling a function of the program that gives the same quantity."""
         by_functions = {one.target.quantity: one.function for one in candidates if one.function}
         kept = []
         for one in candidates:
@@ -485,7 +485,7 @@ class _ProgramAnswers:
         return self._entries_answer(entries) if entries else None
 
     def _text_of(self, one: _Candidate) -> str | Refusal:
-        """Return the text of an answer; what it is made of is defined beside the answers."""
+        """Return the text of an answer; the names in it are defined beside the answers."""
         value = one.value
         if isinstance(value, Unread):
             return Refusal(value.reason)

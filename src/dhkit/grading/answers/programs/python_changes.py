@@ -50,7 +50,7 @@ _NEW = (frozenset(FUNCTION_NAMES) - {"max", "min"}) | word_set(
     Float S integrate solve_ivp odeint time perf_counter random seed format ValueError Exception
     """
 )
-"""Functions that only calculate, and whose result shares no entry with what they are given."""
+"""Functions that only calculate, and whose result shares no entry with their arguments."""
 
 _QUIET = (
     _NEW
@@ -247,7 +247,7 @@ class Changes:
         return frozenset(effects.reached() - kept) | frozenset(outer)
 
     def mentioned(self, names: Iterable[str], scope: Scope) -> set[str]:
-        """Return names, with those in the bodies of functions and in what is not read that they stand for."""
+        """Return names, with those in the functions' bodies and in the unread statements that they stand for."""
         found: set[str] = set()
         waiting = [ascii_name(name) for name in names]
         while waiting:
@@ -272,7 +272,7 @@ class Changes:
 
 
 def _names_of(value: Value) -> Iterator[str]:
-    """Yield the names in a function, or in what is not read."""
+    """Yield the names in a function, or in an unread statement."""
     match value:
         case Function():
             nodes = [value.definition] if isinstance(value.definition, ast.expr) else value.definition
@@ -302,7 +302,7 @@ def without_functions(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def value_of(name: str, scope: Scope) -> Value | None:
-    """Return what a name is bound to; None where the program does not bind it."""
+    """Return the value that a name is bound to; None where the program does not bind it."""
     owner = scope.owner(name)
     bound = owner.names.get(name) if owner is not None else None
     return bound.value if bound is not None else None

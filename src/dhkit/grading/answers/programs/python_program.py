@@ -68,7 +68,7 @@ _EXPORTED_LETTERS = frozenset("EINOQSe")
 """Names of one letter that these modules export."""
 
 _ASSUMPTIONS = word_set("cls real positive nonnegative nonzero integer commutative finite seq")
-"""Keywords of symbols that change nothing of what is judged."""
+"""Keywords of symbols that change no verdict."""
 _KNOWN_KEYWORDS = word_set(
     "deep ratio trig force inverse rational method measure power_base power_exp mul log syms dtype"
 )
@@ -212,7 +212,7 @@ class PythonProgram:
         self._note(self.changes.of(pieces, scope, scope.local), scope, line)
 
     def _note(self, effects: Effects, scope: Scope, line: str) -> None:
-        """Note what a statement may change, and which names may be the same matrix after it."""
+        """Note the names whose values a statement may change, and those that may be the same matrix after it."""
         for name, others in effects.shared.items():
             if scope.is_mutable(name) or not isinstance(value_of(name, scope), Scalar | Function | Module | Library):
                 scope.add_alias(name, others)
@@ -220,7 +220,7 @@ class PythonProgram:
             scope.change(name, f"{name[:40]} may be changed in {line}")
 
     def _leave(self, statement: ast.stmt, scope: Scope, line: str) -> None:
-        """Note what a statement that is not read may change."""
+        """Note the names whose values an unread statement may change."""
         if isinstance(statement, ast.ClassDef):
             self._leave_class(statement, scope, line)
             return
@@ -232,7 +232,7 @@ class PythonProgram:
         self._note(self.changes.of([statement], scope, scope.local), scope, line)
 
     def _leave_class(self, statement: ast.ClassDef, scope: Scope, line: str) -> None:
-        """Read a class of fields alone as a structure; of another one note what it may change."""
+        """Read a class of fields alone as a structure; of another one note the names whose values it may change."""
         name = ascii_name(statement.name)
         if _is_plain_class(statement) and (fields := self._fields(statement, scope)) is not None:
             scope.bind(name, Structure(fields), line)
@@ -253,7 +253,7 @@ class PythonProgram:
         self._note(self.changes.of([statement], scope, scope.local), scope, line)
 
     def _fields(self, statement: ast.ClassDef, scope: Scope) -> dict[str, Value] | None:
-        """Return what the body of a class assigns, as the fields of its objects; None where it has more."""
+        """Return the assignments in a class's body, as its objects' fields; None where it has other statements."""
         fields: dict[str, Value] = {}
         for inner in statement.body:
             match inner:
@@ -394,7 +394,7 @@ class PythonProgram:
         scope.bind(name, value, line)
 
     def _import_everything(self, module: str, line: str) -> None:
-        """Note which names ``from module import *`` may replace; the names of the module mean what they say."""
+        """Note which names ``from module import *`` may replace; the module's own names are its functions."""
         if module not in _MODULES or module == "sympy.abc":
             raise AnswerError(
                 f"{self.file}: {line}: found 'from {module[:40]} import *', which may change any name; expected "
@@ -463,7 +463,7 @@ class PythonProgram:
         )
 
     def arguments_as_given(self, function: Function) -> dict[str, Value]:
-        """Return a function's arguments as themselves; those whose default changes what is computed are not read."""
+        """Return a function's arguments as themselves; those whose default changes the result are not read."""
         robot = self.record.robot
         values: dict[str, Value] = {}
         for name in function.parameters:
@@ -485,7 +485,7 @@ class PythonProgram:
         return values
 
     def apply(self, function: Function, arguments: dict[str, Value]) -> Value:
-        """Return what a function of the program returns for some arguments.
+        """Return the result of a function of the program for some arguments.
 
         Raises
         ------
@@ -498,7 +498,7 @@ class PythonProgram:
         return value
 
     def applied(self, function: Function, arguments: dict[str, Value]) -> tuple[Value, Scope]:
-        """Return what a function returns, and its local names."""
+        """Return a function's result, and its local names."""
         if function.problem:
             raise UnreadError(function.problem)
         if self.depth >= BOUNDS.call_depth:
@@ -535,7 +535,7 @@ class PythonProgram:
 
     @staticmethod
     def returned_names(function: Function) -> list[str]:
-        """Return the names in what a function returns."""
+        """Return the names in a function's result."""
         body = function.definition
         last = body if isinstance(body, ast.expr) else body[-1]
         return list(dict.fromkeys(map(ascii_name, names_in(last)))) if isinstance(last, ast.expr | ast.Return) else []

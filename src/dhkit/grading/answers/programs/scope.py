@@ -1,4 +1,4 @@
-"""Names of a program while it is read: each is bound once, and what is made of a name knows that it is.
+"""Names of a program while it is read: each is bound once, and a value made of a name keeps that name.
 
 An answer is judged only if every name that it is made of was bound once, to a value that is read, and was not changed
 by anything else in the program, before or after.
@@ -103,7 +103,7 @@ class Record:
         return Given(name, is_argument=True, number=self.calls)
 
     def note_left_out(self, text: str) -> None:
-        """Note what is not read as an answer, once."""
+        """Note an answer that is not read, once."""
         if text not in self.left_out:
             self.left_out.append(text)
 
@@ -392,7 +392,7 @@ class Scope:
         return bound is not None and _can_change(bound.value)
 
     def stands_for(self, name: str, value: Value) -> bool:
-        """Whether a value is what a name stands for: returned is M, and not M.inv()."""
+        """Whether a value is that of a name: M is returned, and not M.inv()."""
         bound = self.names[name]
         return self._is_same(bound.reference, value) or self._is_same(bound.value, value)
 
@@ -422,7 +422,7 @@ class Scope:
     # Reading
 
     def value(self, name: str) -> Value:
-        """Return what a name stands for.
+        """Return the value that a name stands for.
 
         Raises
         ------

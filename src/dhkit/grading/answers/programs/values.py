@@ -397,9 +397,10 @@ def product(left: Matrix, right: Matrix, power: str = "^") -> Matrix | Scalar:
     rows = [[_dot(row, column, power) for column in columns] for row in a]
     if left.is_flat and right.is_flat:
         return rows[0][0]
+    multiplies_entries = left.multiplies_entries or right.multiplies_entries
     if left.is_flat or right.is_flat:
-        return vector_of(list(chain.from_iterable(rows)), multiplies_entries=left.multiplies_entries)
-    return matrix_of(rows, multiplies_entries=left.multiplies_entries or right.multiplies_entries)
+        return vector_of(list(chain.from_iterable(rows)), multiplies_entries=multiplies_entries)
+    return matrix_of(rows, multiplies_entries=multiplies_entries)
 
 
 def _dot(row: Sequence[Scalar], column: Sequence[Scalar], power: str) -> Scalar:

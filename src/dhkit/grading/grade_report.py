@@ -253,7 +253,7 @@ class GradeReport:
 
     Examples
     --------
-    >>> from dhkit.grading.report import Entry, GradeReport, Verdict
+    >>> from dhkit.grading.grade_report import Entry, GradeReport, Verdict
     >>> report = GradeReport("planar2r", entries=(Entry("V", (), Verdict.CORRECT),))
     >>> report.verdict.value, bool(report)
     ('correct', True)
@@ -311,7 +311,7 @@ class GradeReport:
 
     @property
     def unfinished(self) -> tuple[Entry, ...]:
-        """Entries on the sheet that are not wrong, but do not give what was asked for; their statements say why."""
+        """Entries on the sheet that are not wrong, but do not answer the question; their statements say why."""
         return tuple(entry for entry in self._incomplete if entry.answer)
 
     @property
