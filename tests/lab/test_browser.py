@@ -108,16 +108,20 @@ def test_arrow_keys_move_by_one_ten_and_a_tenth_of_a_degree(visit):
         assert page.evaluate(f"{labelled('elbow, value')}.value") == f"{q[2] / DEGREE:.2f}"
 
 
+def unit(name):
+    return f"[...document.querySelectorAll('#card .units button')].find((button) => button.textContent === '{name}')"
+
+
 def test_units_change_what_is_shown_and_not_the_arm(visit):
     lab, page = visit("stanford")
     before = lab.desk.q.copy()
     slide = next(i for i, joint in enumerate(lab.desk.arm.description.joints) if not joint.is_revolute)
     field = f"document.querySelectorAll('.joint .number')[{slide}]"
-    page.choose("document.querySelectorAll('#panel-joints .units select')[1]", "mm")
+    page.click(unit("mm"))
     assert page.evaluate(f"{field}.value") == f"{1000 * before[slide]:.1f}"
-    page.choose("document.querySelectorAll('#panel-joints .units select')[1]", "in")
+    page.click(unit("in"))
     assert page.evaluate(f"{field}.value") == f"{before[slide] / 0.0254:.3f}"
-    page.choose("document.querySelectorAll('#panel-joints .units select')[0]", "rad")
+    page.click(unit("rad"))
     assert page.evaluate("document.querySelector('.joint .number').value") == f"{before[0]:.4f}"
     assert np.array_equal(lab.desk.q, before)
     page.click(field)
@@ -277,7 +281,7 @@ def test_a_pose_is_typed_and_what_is_out_of_reach_is_said(kept_page):
     set_joints(lab, page, [0.2, 0.3, -0.3, 0.4, 0.7, 0.2])
     panel(page, "tool")
     before = page.evaluate("[...document.querySelectorAll('.pose .number')].map(i => i.value)")
-    write(page, "z [m]", f"{float(before[2]) - 0.05:.5f}")
+    write(page, "z of the tool", f"{float(before[2]) - 0.05:.5f}")
     wait_for(lambda: lab._tool.T is not None)
     expected = pose(
         [float(before[0]), float(before[1]), float(f"{float(before[2]) - 0.05:.5f}")],
@@ -286,7 +290,7 @@ def test_a_pose_is_typed_and_what_is_out_of_reach_is_said(kept_page):
     assert np.abs(lab._tool.T - expected).max() < 1e-9
     wait_for(lambda: at_target(lab) < FOLLOWS)
     q = lab.desk.q.copy()
-    write(page, "x [m]", "3")
+    write(page, "x of the tool", "3")
     page.until("/out of reach by/.test(document.querySelector('#panel-tool .note').textContent)")
     assert np.array_equal(lab.desk.q, q)
     page.click(button("Remove the target"))

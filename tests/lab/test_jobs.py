@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dhkit import Arm
-from dhkit.lab.contacts import Contacts, touching_links
+from dhkit.lab.contacts import Contacts, nearest
 from dhkit.lab.jobs import Jobs
 from waiting import wait_for
 
@@ -61,7 +61,9 @@ def test_contacts_are_known_once_they_are_prepared():
     contacts = Contacts()
     folded = np.radians([0.0, 0.0, 270.0, 0.0, 0.0, 0.0])
     contacts.prepare(arm, ready.set)
-    assert contacts.links(arm, folded) == []
+    assert contacts.nearest(arm, folded) is None
     assert ready.wait(30.0)
-    assert contacts.links(arm, folded) == touching_links(arm, folded[None])[0]
+    found = contacts.nearest(arm, folded)
+    assert found == nearest(arm, folded)
+    assert len(found["links"]) == 2 and found["distance"] is not None
     contacts.close()

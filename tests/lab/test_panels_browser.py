@@ -189,18 +189,20 @@ def test_a_target_out_of_reach_stays_in_the_fields_until_it_is_in_reach(kept_pag
     panel(page, "tool")
     page.click(button("Move the tool by a target"))
     page.until("dhkit.lab.state.target?.reached")
-    page.click(labelled("x [m]"))
+    page.click(labelled("x of the tool"))
     page.write("0.5")
     page.until("dhkit.lab.state.target && !dhkit.lab.state.target.reached")
-    assert page.evaluate(f"[{labelled('x [m]')}.value, {labelled('x [m]')}.getAttribute('aria-invalid')]") == [
+    assert page.evaluate(
+        f"[{labelled('x of the tool')}.value, {labelled('x of the tool')}.getAttribute('aria-invalid')]"
+    ) == [
         "0.50000",
         "true",
     ]
-    page.click(labelled("y [m]"))
+    page.click(labelled("y of the tool"))
     page.write("0.3")
     page.until("dhkit.lab.state.target.reached")
     assert np.abs(lab.desk.arm.fk(lab.desk.q)[:2, 3] - [0.5, 0.3]).max() < 1e-6
-    page.until(f"{labelled('x [m]')}.getAttribute('aria-invalid') === 'false'")
+    page.until(f"{labelled('x of the tool')}.getAttribute('aria-invalid') === 'false'")
 
 
 def test_what_is_said_of_a_target_is_not_said_of_another_state(open_page):

@@ -24,6 +24,7 @@ from dhkit.lab.task_panel import TaskPanel
 from dhkit.lab.tool_panel import ToolPanel
 from dhkit.lab.transforms_panel import TransformsPanel
 from dhkit.lab.workspace_panel import WorkspacePanel
+from dhkit.planning.obstacles import LinkBody, shape_distances
 from dhkit.viewer.protocol import Samples
 from dhkit.viewer.session import Slot
 from viewer.messages import decode_animation, decode_ghosts, decode_pose, decode_samples, decode_state
@@ -326,22 +327,21 @@ def test_links_that_touch_are_told_once_the_arm_has_settled(open_lab):
     states_of_arm = np.random.default_rng(1).uniform(numbers.lower, numbers.upper, (60, arm.n))
     lab.answer("joints.set", {"q": states_of_arm[0].tolist()})
     wait_for(lambda: lab.desk._contacts._arm is arm)
-    apart = arm.distance(states_of_arm, self_collision=True).itself
-    assert (apart < 0).any() and (apart > 0).any()
-    for q, gap in zip(states_of_arm, apart, strict=True):
+    gaps = []
+    for q in states_of_arm:
         lab.answer("joints.set", {"q": q.tolist()})
-        links = states(lab)["joints"]["touching"]
-        assert bool(links) == (gap < 0)
-        if links:
-            assert links == links_of(arm.distance(q, self_collision=True).pair)
-    touching = states_of_arm[np.argmin(apart)]
+        nearest = states(lab)["joints"]["nearest"]
+        first, second = (LinkBody(link) for link in nearest["links"])
+        # The same shapes, measured by the function that certificates use.
+        assert nearest["distance"] == pytest.approx(
+            shape_distances(arm.description, q[None], (first, second))[0], abs=1e-9
+        )
+        gaps.append(nearest["distance"])
+    assert min(gaps) < 0 < max(gaps)
+    touching = states_of_arm[int(np.argmin(gaps))]
     lab.answer("motion.plan", {"kind": "quintic", "goal": {"q": touching.tolist()}})
-    wait_for(lambda: states(lab)["motion"]["touching"])
-    assert states(lab)["motion"]["touching"][-1] == links_of(arm.distance(touching, self_collision=True).pair)
-
-
-def links_of(pair):
-    return [0 if name == "the base" else int(name.split()[1]) for name in pair]
+    wait_for(lambda: states(lab)["motion"]["contacts"])
+    assert states(lab)["motion"]["contacts"][-1]["distance"] == pytest.approx(min(gaps), abs=1e-9)
 
 
 @pytest.mark.slow

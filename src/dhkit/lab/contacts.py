@@ -1,8 +1,9 @@
-"""Contacts: links of an arm that touch each other, as capsules."""
+"""Contacts: the two links of an arm that are nearest to each other or touch, as pages show them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypedDict
 
 import numpy as np
 
@@ -10,16 +11,28 @@ from dhkit.arm import Arm
 from dhkit.description import Array
 from dhkit.errors import DhkitError
 from dhkit.lab.jobs import Job, Jobs
+from dhkit.planning.obstacles import may_touch, nearest_links
 
 PREPARATION_DELAY = 0.5
 """Time without another arm before an arm is prepared, s: an arm that a person edits changes again soon."""
 
 
-class Contacts:
-    """The result of :func:`touching_links` for one arm, once it is fast to compute.
+class NearestState(TypedDict):
+    """The two links of an arm that are nearest to each other, as pages show them."""
 
-    The first computation for an arm takes 0.2 to 1.5 s, since capsules are fitted and coal is imported. Nobody waits
-    for it: until it is done, no links are reported to touch.
+    links: list[int]
+    """Their numbers, 0 for the base."""
+    distance: float | None
+    """Distance of their shapes, m, negative in a penetration; None if only their capsules are known to overlap."""
+    points: list[list[float]] | None
+    """The nearest points, shape (2, 3), m, world; None without a distance."""
+
+
+class Contacts:
+    """The result of :func:`nearest` for one arm, once it is fast to compute.
+
+    The first computation for an arm takes 0.2 to 1.5 s, since hulls and capsules are fitted and coal is imported.
+    Nobody waits for it: until it is done, nothing is known of the links.
     """
 
     def __init__(self) -> None:
@@ -32,7 +45,7 @@ class Contacts:
 
         def work(job: Job) -> None:
             job.wait(PREPARATION_DELAY)
-            touching_links(arm, np.zeros((1, arm.n)))
+            nearest(arm, np.zeros(arm.n))
 
         def take(_: None) -> None:
             self._arm = arm
@@ -40,32 +53,42 @@ class Contacts:
 
         self._jobs.start("contacts", work, take)
 
-    def links(self, arm: Arm, q: Array) -> list[int]:
-        """Return the two links that penetrate each other most at joint values, shape (n,), rad and m; 0 is the base.
-
-        The list is empty where no links touch, and for an arm that is not prepared.
-        """
-        return touching_links(arm, q[None])[0] if self._arm is arm else []
+    def nearest(self, arm: Arm, q: Array) -> NearestState | None:
+        """Return :func:`nearest`; None for an arm that is not prepared."""
+        return nearest(arm, q) if self._arm is arm else None
 
     def close(self) -> None:
         """End the preparation."""
         self._jobs.close()
 
 
-def touching_links(arm: Arm, q: Array) -> list[list[int]]:
-    """Return the two links that penetrate each other most, for each of the joint values, shape (N, n), rad and m.
+def nearest(arm: Arm, q: Array) -> NearestState | None:
+    """Return the two links of an arm that are nearest to each other at joint values, shape (n,), rad and m.
 
-    Links are numbered from 1, the base is 0. The list of a state is empty where no links touch, and where the arm has
-    no shapes that could.
+    Where coal is not installed they are two links whose capsules overlap, and which may touch. None where no two links
+    are checked, or nothing is known of them.
     """
     try:
-        free = arm.distance(q, self_collision=True).itself >= 0
-        pairs = [None if f else arm.distance(x, self_collision=True).pair for f, x in zip(free, q, strict=True)]
+        found = nearest_links(arm.description, q)
     except DhkitError:
-        return [[] for _ in q]
-    return [[] if pair is None else [_link_number(name) for name in pair] for pair in pairs]
+        return _by_capsules(arm, q)
+    if found is None:
+        return None
+    links = [found.first.link, found.second.link]
+    return NearestState(links=links, distance=found.distance, points=found.points.tolist())
 
 
-def _link_number(name: str) -> int:
-    """Return the number of a link that distances name "the base" or "link 3"."""
-    return 0 if name == "the base" else int(name.removeprefix("link "))
+def _by_capsules(arm: Arm, q: Array) -> NearestState | None:
+    try:
+        bodies = may_touch(arm.description, q)
+    except DhkitError:  # a mesh that cannot be read
+        return None
+    if bodies is None:
+        return None
+    return NearestState(links=[body.link for body in bodies], distance=None, points=None)
+
+
+def contacts_along(arm: Arm, q: Array) -> list[NearestState | None]:
+    """Return :func:`nearest` where links touch or may touch, None elsewhere, for joint values (N, n), rad and m."""
+    found = (nearest(arm, state) for state in q)
+    return [one if one is not None and (one["distance"] is None or one["distance"] < 0) else None for one in found]

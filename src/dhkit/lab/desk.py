@@ -121,8 +121,8 @@ class Desk:
         arm, q = self.arm, self.q  # another thread may replace them meanwhile
         numbers = arm.description.numbers
         outside = np.flatnonzero((q < numbers.lower) | (q > numbers.upper)).tolist()
-        touching = self._contacts.links(arm, q)
-        self.view.panel("joints", {"q": q.tolist(), "within": not outside, "outside": outside, "touching": touching})
+        nearest = self._contacts.nearest(arm, q)
+        self.view.panel("joints", {"q": q.tolist(), "within": not outside, "outside": outside, "nearest": nearest})
         self.view.panel("tool", self.tool_state(arm, q))
 
     def tool_state(self, arm: Arm, q: Array) -> dict[str, object]:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from dhkit.arm import Arm
 from dhkit.description import Array
 from dhkit.errors import DescriptionError, DhkitError
-from dhkit.lab.contacts import touching_links
+from dhkit.lab.contacts import NearestState, contacts_along
 from dhkit.lab.desk import Desk, file_content, has_bodies
 from dhkit.lab.jobs import Job, Jobs
 from dhkit.lab.requests import MAX_JOINT_VALUE, Fields, JsonObject, Panel, answers
@@ -251,7 +251,7 @@ class MotionPanel(Panel):
             "qd": qd.tolist(),
             "tau": None if tau is None else tau.tolist(),
             "limits": limits_state(arm.description),
-            "touching": None,
+            "contacts": None,
             "excess": excess,
         }
         checked_q = motion.q(np.linspace(0.0, motion.duration, CONTACT_SAMPLES))
@@ -268,12 +268,12 @@ class MotionPanel(Panel):
             self.desk.view.play(motion)
         self._report_change()
 
-        def publish_contacts(links: list[list[int]]) -> None:
-            if any(links) and self.motion is motion:
-                self.desk.view.panel("motion", state | {"touching": links})
+        def publish_contacts(contacts: list[NearestState | None]) -> None:
+            if any(contacts) and self.motion is motion:
+                self.desk.view.panel("motion", state | {"contacts": contacts})
 
         # Contacts are published after the motion, since computing them takes a second the first time.
-        self._contacts.start("contacts", lambda job: touching_links(arm, checked_q), publish_contacts)
+        self._contacts.start("contacts", lambda job: contacts_along(arm, checked_q), publish_contacts)
 
     def _report_change(self) -> None:
         for call in self.on_change:

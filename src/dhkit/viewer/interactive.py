@@ -159,7 +159,7 @@ def _motion_state(description: Description, name: str, motion: Motion) -> dict[s
         "tau": None if tau is None else _rounded(tau),
         "reference": None if reference_q is None else _rounded(interpolate(times, reference_q, grid)),
         "limits": limits_state(description),
-        "touching": None,
+        "contacts": None,
         "excess": excess,
         "step": float(grid[1]) if len(grid) == _MAX_SAMPLES else None,
     }

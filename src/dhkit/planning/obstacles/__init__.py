@@ -2,6 +2,7 @@
 
 from dhkit.planning.obstacles.capsules import LinkBody, LinkCapsule, link_capsules, link_name, world_axes
 from dhkit.planning.obstacles.clearance import Distances, distance, not_checked, pair_distances, smallest_distances
+from dhkit.planning.obstacles.contact import NearestLinks, may_touch, nearest_links
 from dhkit.planning.obstacles.pairs import CheckedPairs, LinkPairs, Pair, checked_pairs, link_pairs, standing
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
 from dhkit.planning.obstacles.separation import Gaps, PlaneRow, Separation
@@ -15,6 +16,7 @@ __all__ = [
     "LinkBody",
     "LinkCapsule",
     "LinkPairs",
+    "NearestLinks",
     "Obstacle",
     "Pair",
     "PlaneRow",
@@ -26,6 +28,8 @@ __all__ = [
     "link_capsules",
     "link_name",
     "link_pairs",
+    "may_touch",
+    "nearest_links",
     "not_checked",
     "pair_distances",
     "shape_distances",

@@ -370,6 +370,50 @@ def shape_distances(
     return least
 
 
+def nearest_of_bodies(
+    description: Description, frames: Array, bodies: tuple[LinkBody, LinkBody], enough: float = np.inf
+) -> tuple[float, Array] | None:
+    """Return the signed distance between the shapes of two bodies, m, and the points where they are nearest.
+
+    Parameters
+    ----------
+    frames
+        DH frames of the base and the links in the world, shape (n + 1, 4, 4), m.
+    bodies
+        The two bodies.
+    enough
+        Distance, m, above which nothing is searched.
+
+    Returns
+    -------
+    tuple or None
+        Distance, and points of the first and the second, shape (2, 3), m, world. None if all shapes are farther from
+        each other than ``enough``, or one body has none.
+
+    Raises
+    ------
+    ModelError
+        coal is not installed, or a mesh cannot be read.
+    """
+    solids = _solids(description, mesh_versions(description))
+    coal = coal_module()
+    request = distance_request()
+    result = coal.DistanceResult()
+    nearest: tuple[float, Array] | None = None
+    for first, second in product(*(solids.get(body, ()) for body in bodies)):
+        T1 = frames[bodies[0].link] @ first.T_link_solid
+        T2 = frames[bodies[1].link] @ second.T_link_solid
+        least = enough if nearest is None else nearest[0]
+        if _separation(first, T1[None], second, T2[None])[0] >= least:
+            continue
+        pose1 = _transform(coal, T1)
+        pose2 = _transform(coal, T2)
+        gap = signed_distance(coal, first.shape, pose1, second.shape, pose2, request, result)
+        if gap < least:
+            nearest = gap, np.stack([result.getNearestPoint1(), result.getNearestPoint2()])
+    return nearest
+
+
 def _transform(coal: CoalModule, T: Array) -> Any:
     """Return a pose (4, 4) as coal's."""
     return coal.Transform3s(np.ascontiguousarray(T[:3, :3]), np.ascontiguousarray(T[:3, 3]))

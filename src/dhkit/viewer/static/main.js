@@ -13,7 +13,7 @@ const STEP = 1 / 30; // s that an arrow key moves an animation
 
 class Page {
   constructor() {
-    this.stage = new Stage(element("pane"), element("labels"), element("names"), insets);
+    this.stage = new Stage(element("pane"), element("labels"), element("names"), element("marks"), insets);
     this.readout = new Readout(element("readout"));
     this.player = new Player(element("player"), { show: (time) => this.showTime(time) });
     this.motion = null; // what is on show: {q, positions, quaternions}, for an animation with times and more
@@ -160,6 +160,7 @@ class Page {
   showState({ q, positions, quaternions }) {
     this.stage.place(positions, quaternions);
     this.readout.show(q, [...positions.slice(-3)]);
+    this.lab?.card.show(q, positions, quaternions);
   }
 
   showFrames(visible) {
@@ -232,8 +233,9 @@ function keepsKey({ target, key }) {
 // What panels cover, px; on a phone the read-out opens over the arm.
 function insets() {
   const right = 12, top = 60, bottom = element("player").hidden ? 14 : 66;
-  const readout = element("readout"), beside = readout.open && !readout.hidden && innerWidth > 560;
-  return { left: beside ? readout.getBoundingClientRect().right : 12, top, right, bottom };
+  const readout = element("card") ?? element("readout"), beside = readout.open && !readout.hidden && innerWidth > 767;
+  const { left } = element("stage").getBoundingClientRect();
+  return { left: beside ? readout.getBoundingClientRect().right - left : 12, top, right, bottom };
 }
 
 function mix(values, width, k, share) {

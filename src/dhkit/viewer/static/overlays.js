@@ -234,7 +234,7 @@ function showOnce(copies, each) {
 }
 
 // A node without its triad, in one material, without shadow.
-function bareCopy(node, material, THREE) {
+export function bareCopy(node, material, THREE) {
   const copy = new THREE.Group();
   for (const part of node.children) if (part.name !== "frame") copy.add(part.clone());
   copy.traverse((object) => {

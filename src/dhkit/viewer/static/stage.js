@@ -4,6 +4,7 @@ import { corners, inView, localBox } from "./boxes.js";
 import { AXES } from "./colors.js";
 import { Labels } from "./labels.js";
 import { placements } from "./messages.js";
+import { Outlines } from "./outlines.js";
 import { Overlays } from "./overlays.js";
 import { Quality, drawnInSoftware } from "./quality.js";
 import { smoothNormals } from "./smooth.js";
@@ -22,7 +23,7 @@ const TRIAD = 0.13; // length of a triad, share of the arm's size: dhkit/viewer/
 
 export class Stage {
   // insets(): how many px at the left, top, right and bottom are covered by panels.
-  constructor(pane, labels, names, insets) {
+  constructor(pane, labels, names, marks, insets) {
     this.pane = pane;
     this.insets = insets;
     // Without a graphics processor smooth edges halve the number of pictures: they wait until nothing moves.
@@ -37,6 +38,8 @@ export class Stage {
     this.changed = 0; // ms, when the last picture of a motion was drawn
     this.labels = new Labels(labels);
     this.names = new Labels(names); // of ghosts
+    this.marks = new Labels(marks); // of a gap
+    this.gap = null; // the middle between two links that touch each other
     this.anchors = []; // where each ghost is named
     this.awaited = 0; // ms until which a pose is awaited
     this.naming = true; // whether ghosts are of the state on show: no animation goes away from them
@@ -58,6 +61,7 @@ export class Stage {
     this.held = false; // whether it does not move at all: a person drags something
     this.preset = null; // direction to look from
     this.overlays = new Overlays(this.viewer.scene, THREE);
+    this.outlines = new Outlines(this.viewer.scene, THREE);
     this.rendered = []; // called after each picture
     const scheme = matchMedia("(prefers-color-scheme: dark)");
     scheme.addEventListener("change", () => this.color());
@@ -121,6 +125,7 @@ export class Stage {
     this.floor.material.opacity = dark ? 0.35 : 0.13;
     for (const trace of [this.given, this.drawn, this.trail]) trace.color(value("--accent"));
     this.overlays.color(value("--accent"), value("--obstacle"));
+    this.outlines.color();
     this.dirty();
   }
 
@@ -132,6 +137,7 @@ export class Stage {
     const width = Math.max(1, this.pane.clientWidth), height = Math.max(1, this.pane.clientHeight);
     this.viewer.camera.aspect = width / height;
     this.viewer.renderer.setSize(width, height);
+    this.outlines?.resize(width, height);
     this.refit();
     this.dirty();
   }
@@ -174,6 +180,7 @@ export class Stage {
     this.labels.set(labels);
     this.boxes = this.nodes.map((n) => localBox(n));
     this.warned = null;
+    this.outlines.set([], this.nodes);
     this.seen.makeEmpty();
     this.framed.makeEmpty();
   }
@@ -238,6 +245,7 @@ export class Stage {
       node.position.fromArray(positions, 3 * i);
       node.quaternion.fromArray(quaternions, 4 * i);
     });
+    this.outlines.place(this.nodes);
     this.dirty();
   }
 
@@ -398,17 +406,20 @@ export class Stage {
     return axes;
   }
 
-  // Tint links: those of joints beyond a limit, counted from 0, and those that touch each other, 0 for the base.
-  warn(joints, touching) {
-    const key = `${joints}|${touching}`;
-    if (this.warned === key) return;
-    this.warned = key;
-    const style = getComputedStyle(document.documentElement), color = (name) => new THREE.Color(style.getPropertyValue(name).trim());
-    const limit = color("--accent"), contact = color("--contact"), none = new THREE.Color(0);
-    this.nodes.slice(0, -1).forEach((node, i) => {
-      const glow = touching.includes(i) ? contact : joints.includes(i - 1) ? limit : none;
-      for (const part of node.children) if (part.name !== "frame") part.traverse((object) => object.material?.emissive?.copy(glow).multiplyScalar(0.55));
-    });
+  // Outline links: those of joints beyond a limit, counted from 0, and two that touch each other, 0 for the base.
+  // contact: {links, points} or null; points are where the two are nearest, or null; text: what is written there.
+  warn(joints, contact, text = "") {
+    const links = contact?.links ?? [], key = `${joints}|${links}`;
+    if (this.warned !== key) {
+      this.warned = key;
+      const outlined = this.nodes.slice(0, -1).map((_, i) => (links.includes(i) ? "--contact" : joints.includes(i - 1) ? "--accent" : null));
+      this.outlines.set(outlined, this.nodes);
+    }
+    const points = contact?.points;
+    this.outlines.setGap(points, this.size);
+    this.gap = points ? new THREE.Vector3().fromArray(points[0]).add(new THREE.Vector3().fromArray(points[1])).multiplyScalar(0.5) : null;
+    this.marks.set(points && text ? [{ frame: 0, text }] : []);
+    this.marks.show(this.marks.count > 0);
     this.dirty();
   }
 
@@ -494,6 +505,7 @@ export class Stage {
     for (const material of this.old.splice(0)) material.dispose();
     this.quality.drawn(now);
     this.labels.place((frame) => this.project(this.nodes[frame].position));
+    this.marks.place(() => this.gap && this.project(this.gap));
     for (const call of this.rendered) call();
     const named = this.naming && this.names.count === this.anchors.length; // the ghosts of a message and their names come one by one
     this.names.place((ghost) => (named ? this.project(this.anchors[ghost]) : null));

@@ -38,11 +38,11 @@ export class Curves {
   }
 }
 
-// The joints, from 0, that are beyond a limit at a time of a motion, and the links that touch each other.
-export function exceeding({ duration, limits, q, qd, tau, times, touching }, time) {
+// The joints, from 0, that are beyond a limit at a time of a motion, and the links that touch each other, or null.
+export function exceeding({ duration, limits, q, qd, tau, times, contacts }, time) {
   const at = (samples) => (duration > 0 ? Math.round((time / duration) * (samples - 1)) : 0), k = at(times.length);
   const fast = (value, limit) => limit !== null && Math.abs(value) > limit * (1 + ROUNDING);
   const exceeds = (_, i) => beyond(q[k][i], limits.lower[i], limits.upper[i]) || fast(qd[k][i], limits.velocity[i]) || (tau && fast(tau[k][i], limits.effort[i]));
   const joints = q[k].flatMap((x, i) => (exceeds(x, i) ? [i] : []));
-  return [joints, touching ? touching[at(touching.length)] : []];
+  return [joints, contacts ? contacts[at(contacts.length)] : null];
 }

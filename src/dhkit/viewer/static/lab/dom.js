@@ -41,11 +41,23 @@ export function beyond(value, lower, upper) {
   return (lower !== null && value < lower) || (upper !== null && value > upper);
 }
 
-// links: two numbers, 0 for the base, or none.
-export function touchingText(links) {
-  if (!links?.length) return "";
-  const name = (link) => (link ? `link ${link}` : "the base");
-  return `${name(links[0])} and ${name(links[1])} touch each other`;
+// nearest: the two links that are nearest to each other, with their distance (null: by their capsules alone), or null.
+export function touchingText(nearest) {
+  if (!touches(nearest)) return "";
+  const [a, b] = nearest.links.map((link) => (link ? `link ${link}` : "the base"));
+  return nearest.distance === null ? `${a} and ${b} may touch each other` : `${a} and ${b} touch each other`;
+}
+
+// How deep two links penetrate each other, in a unit of UNITS; empty where they do not, or nothing is known.
+export function depthText(nearest, unit) {
+  if (!touches(nearest) || nearest.distance === null) return "";
+  const { scale, digits, sign } = UNITS[unit];
+  return `${fixed(-nearest.distance * scale, digits)}${sign} deep`;
+}
+
+// Whether two links touch each other, or may.
+export function touches(nearest) {
+  return Boolean(nearest) && (nearest.distance === null || nearest.distance < 0);
 }
 
 export function save(name, content, type) {

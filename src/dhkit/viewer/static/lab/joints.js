@@ -1,6 +1,6 @@
 // Sliders and numbers of the joints, with their limits.
 
-import { UNITS, beyond, fixed, h, onTyped, touchingText, typed } from "./dom.js";
+import { UNITS, beyond, fixed, h, onTyped, touches, touchingText, typed } from "./dom.js";
 
 const FREE = { rad: Math.PI, m: 1 }; // what a slider spans on either side where a joint has no limit
 const ANSWER = 1000; // ms in which the state that follows from a step is expected
@@ -13,21 +13,12 @@ export class JointPanel {
     this.rows = [];
     this.list = h("div", { class: "joints" });
     this.named = h("div", { class: "buttons", role: "group", "aria-label": "Configurations" });
-    this.angle = this.unitChoice("angle", ["deg", "rad"], "Angles in");
-    this.length = this.unitChoice("length", ["m", "mm", "in"], "Lengths in");
     this.note = h("p", { class: "note bad", role: "status" });
-    root.append(this.named, this.list, this.note, h("div", { class: "units" }, this.angle, this.length), h("p", { class: "hint" }, "Arrow keys move a slider by 1°, with Shift by 10°, with Alt by 0.1° (slides: mm)."));
-  }
-
-  unitChoice(name, units, label) {
-    const choose = h("select", { onchange: () => this.lab.setUnits({ [name]: choose.value }) }, units.map((unit) => h("option", { value: unit, selected: this.lab.units[name] === unit }, unit === "deg" ? "degrees" : unit)));
-    return h("label", {}, `${label} `, choose);
+    root.append(this.named, this.list, this.note, h("p", { class: "hint" }, "Arrow keys move a slider by 1°, with Shift by 10°, with Alt by 0.1° (slides: mm)."));
   }
 
   take_arm(arm) {
     this.arm = arm;
-    this.length.hidden = !arm.joints.some((joint) => joint.unit === "m");
-    this.angle.hidden = !arm.joints.some((joint) => joint.unit === "rad");
     this.named.replaceChildren(...arm.configurations.map((name) => h("button", { type: "button", onclick: () => this.go(name) }, name)));
     this.rows = arm.joints.map((joint, i) => this.row(joint, i));
     this.list.replaceChildren(...this.rows.map((row) => row.root));
@@ -100,12 +91,12 @@ export class JointPanel {
     this.lab.ask("joints.set", { q: this.q, joint: i });
   }
 
-  take_joints({ q, outside, touching }) {
+  take_joints({ q, outside, nearest }) {
     if (!this.arm || q.length !== this.arm.n) return;
     if (this.lab.page.player.active) return; // an animation is on show
     this.outside = new Set(outside);
-    this.lab.stage.warn(outside, touching);
-    this.note.textContent = touchingText(touching);
+    this.lab.warn(outside, touches(nearest) ? nearest : null);
+    this.note.textContent = touchingText(nearest);
     this.q = q.map((x, i) => this.unanswered(i, x));
     this.show();
   }

@@ -1,6 +1,8 @@
 // The lab: panels beside the scene. Python has the arm; the page asks, and shows the states that it is told.
 
-import { h } from "./dom.js";
+import { StatusCard } from "./card.js";
+import { depthText, h } from "./dom.js";
+import { remember, remembered } from "./memory.js";
 
 const SHORT = 6000; // ms that a message stays
 
@@ -33,6 +35,8 @@ export class Lab {
     this.message = h("p", { class: "message", role: "alert", hidden: true });
     const root = h("aside", { id: "lab", "aria-label": "Lab" }, h("header", {}, h("div", { class: "headline" }, this.title, this.copy), this.family), h("div", { role: "tablist", class: "tabs", "aria-label": "Panels" }, tabs), this.message, h("div", { class: "panels" }, bodies));
     document.body.prepend(root);
+    this.card = new StatusCard(this);
+    document.getElementById("stage").after(this.card.root);
     this.addViews();
     const wanted = [remembered("tab", first), first].map((name) => this.panels.findIndex((panel) => panel.name === name));
     this.open(Math.max(0, wanted.find((k) => k >= 0) ?? 0));
@@ -88,11 +92,17 @@ export class Lab {
       const family = data.family ?? "no closed form: followed by iteration";
       this.family.textContent = this.family.title = data.assumed_bodies ? `${family}; masses assumed` : family;
     }
-    for (const { panel } of this.panels) panel[`take_${name}`]?.(data);
+    for (const part of [this.card, ...this.panels.map(({ panel }) => panel)]) part[`take_${name}`]?.(data);
   }
 
   samples(message) {
     for (const { panel } of this.panels) panel.samples?.(message);
+  }
+
+  // Joints beyond a limit, counted from 0, and two links that touch each other, or null.
+  warn(joints, contact) {
+    this.stage.warn(joints, contact, depthText(contact, this.units.length));
+    this.card.warn(joints, contact);
   }
 
   // q: joint values that an animation shows at a time, or null when it is over.
@@ -157,22 +167,6 @@ export class Lab {
     Object.assign(this.units, units);
     remember("angle", this.units.angle);
     remember("length", this.units.length);
-    for (const { panel } of this.panels) panel.unitsChanged?.();
-  }
-}
-
-export function remembered(name, otherwise) {
-  try {
-    return sessionStorage.getItem(`dhkit-${name}`) ?? otherwise;
-  } catch {
-    return otherwise;
-  }
-}
-
-export function remember(name, value) {
-  try {
-    sessionStorage.setItem(`dhkit-${name}`, value);
-  } catch {
-    // A page without storage forgets.
+    for (const part of [this.card, ...this.panels.map(({ panel }) => panel)]) part.unitsChanged?.();
   }
 }

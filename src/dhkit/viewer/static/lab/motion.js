@@ -101,7 +101,7 @@ export class MotionPanel {
 
   // An animation is at a time: so are the curves.
   moved(q, time) {
-    if (q && this.motion) this.lab.stage.warn(...exceeding(this.motion, time));
+    if (q && this.motion) this.lab.warn(...exceeding(this.motion, time));
     if (!q || !this.visible) return;
     this.curves.mark(time);
   }
@@ -132,7 +132,7 @@ export class MotionPanel {
     this.facts.textContent = "";
     if (!motion) return;
     const still = this.lab.state.control?.running ? "not played: a controller moves the arm" : null;
-    const touching = motion.touching && touchingText(motion.touching.find((links) => links.length));
+    const touching = motion.contacts && touchingText(motion.contacts.find(Boolean));
     this.facts.textContent = [`${motion.kind}, ${fixed(motion.duration, 3)} s`, motion.excess, touching, still].filter(Boolean).join("; ");
     this.facts.classList.toggle("bad", Boolean(motion.excess || touching));
     this.curves.draw(motion, this.arm.joints);

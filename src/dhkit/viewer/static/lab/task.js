@@ -1,7 +1,7 @@
 // An assignment: its texts, its goals, and which of them Python has found to be met.
 
 import { h } from "./dom.js";
-import { remember, remembered } from "./lab.js";
+import { remember, remembered } from "./memory.js";
 
 export class TaskPanel {
   static optional = true; // the tab is hidden until there is an assignment

@@ -2,7 +2,8 @@
 
 import { GHOSTS } from "../colors.js";
 import { euler } from "../offline/kinematics.js";
-import { DEGREES, fixed, h, matrix, onTyped, typed } from "./dom.js";
+import { DEGREES, UNITS, fixed, h, matrix, onTyped, typed } from "./dom.js";
+import { axisName } from "./card.js";
 import { Gizmo } from "./gizmo.js";
 
 const AXES = ["x", "y", "z"];
@@ -15,14 +16,16 @@ export class ToolPanel {
     this.fields = [];
     this.gizmo = new Gizmo(lab.stage, (T) => lab.ask("tool.target", { T }), () => this.lab.state.target?.T);
     this.pose = h("div", { class: "pose" });
+    this.captions = [];
     const field = (label, k) => {
+      const caption = (this.captions[k] = h("span"));
       const input = h("input", { type: "text", inputmode: "decimal", autocomplete: "off", class: "number", "aria-label": label });
       onTyped(input, () => this.typed(), () => this.show());
       this.fields[k] = input;
-      return h("label", {}, h("span", {}, label), input);
+      return h("label", {}, caption, input);
     };
     this.order = h("select", { "aria-label": "Convention of Euler angles", onchange: () => lab.ask("tool.order", { order: this.order.value }) }, ORDERS.map((order) => h("option", { value: order }, order === order.toUpperCase() ? `${order} moving axes` : `${order} fixed axes`)));
-    this.pose.append(h("div", { class: "three" }, AXES.map((axis, k) => field(`${axis} [m]`, k))), h("div", { class: "three" }, ["A", "B", "C"].map((name, k) => field(`${name} [°]`, 3 + k))), h("label", { class: "line" }, "Euler angles ", this.order));
+    this.pose.append(h("div", { class: "three" }, AXES.map((axis, k) => field(`${axis} of the tool`, k))), h("div", { class: "three" }, ["first", "second", "third"].map((name, k) => field(`${name} Euler angle`, 3 + k))), h("label", { class: "line" }, "Euler angles ", this.order));
     this.matrix = h("details", {}, h("summary", {}, "Matrix"), h("div"));
     this.matrix.addEventListener("toggle", () => this.show());
     this.note = h("p", { class: "note", role: "status" });
@@ -66,10 +69,20 @@ export class ToolPanel {
   typed() {
     const values = this.fields.map((input) => typed(input.value));
     if (values.some((value) => value === null)) {
-      this.lab.complain("pose of the tool: expected numbers, in m and degrees");
+      this.lab.complain("pose of the tool: expected numbers");
       return this.show();
     }
-    return this.lab.ask("tool.pose", { xyz: values.slice(0, 3), euler: values.slice(3).map((x) => x / DEGREES), order: this.order.value });
+    const { length, angle } = this.scales();
+    return this.lab.ask("tool.pose", { xyz: values.slice(0, 3).map((x) => x / length.scale), euler: values.slice(3).map((x) => x / angle.scale), order: this.order.value });
+  }
+
+  // The units of positions and angles, one digit finer than those of joints.
+  scales() {
+    return { length: UNITS[this.lab.units.length], angle: UNITS[this.lab.units.angle] };
+  }
+
+  unitsChanged() {
+    this.show();
   }
 
   take_tool(tool) {
@@ -99,8 +112,13 @@ export class ToolPanel {
     // A target that cannot be reached stays in the fields: whoever types its coordinates one by one goes on from there.
     const missed = target && !target.reached, pose = missed ? target.T : T;
     const { xyz, angles } = missed ? { xyz: [pose[3], pose[7], pose[11]], angles: euler(pose, order) } : { xyz: this.tool.xyz, angles: this.tool.euler };
-    [...xyz.map((x) => fixed(x, 5)), ...angles.map((x) => fixed(x * DEGREES, 3))].forEach((text, k) => {
+    const { length, angle } = this.scales();
+    [...xyz.map((x) => fixed(x * length.scale, length.digits + 1)), ...angles.map((x) => fixed(x * angle.scale, angle.digits + 1))].forEach((text, k) => {
       if (document.activeElement !== this.fields[k]) this.fields[k].value = text;
+    });
+    this.captions.forEach((caption, k) => {
+      const words = k < 3 ? `${AXES[k]} [${length.sign.trim()}]` : `${axisName(order, k - 3)} [${angle.sign.trim()}]`;
+      if (caption.textContent !== words) caption.textContent = words;
     });
     if (this.missed !== Boolean(missed)) for (const input of this.fields) input.setAttribute("aria-invalid", String(Boolean(missed)));
     this.missed = Boolean(missed);
@@ -115,7 +133,7 @@ export class ToolPanel {
     const { T, unique } = this.tool ?? {}, far = target?.reached && T && [3, 7, 11].some((k) => Math.abs(T[k] - target.T[k]) > AWAY);
     const about = far ? null : target?.message; // what is said of the target's state is not said of another
     for (const button of this.branches.children) button.classList.toggle("away", Boolean(far));
-    const words = [far ? "the tool is not at the target: move the target, and it follows" : null, unique === false ? "A and C are not unique here" : null, about, about ? null : this.singular, target?.snapped ? "the target stays where this arm can be" : null, target?.numeric ? "no closed form: followed by iteration" : null];
+    const words = [far ? "the tool is not at the target: move the target, and it follows" : null, unique === false ? "the first and the third angle are not unique here" : null, about, about ? null : this.singular, target?.snapped ? "the target stays where this arm can be" : null, target?.numeric ? "no closed form: followed by iteration" : null];
     this.note.textContent = words.filter(Boolean).join("; ");
     this.note.classList.toggle("bad", Boolean(target && !target.reached));
   }

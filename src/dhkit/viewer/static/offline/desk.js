@@ -80,7 +80,7 @@ export class OfflineDesk {
   tellState() {
     const { q } = this, { joints } = this.data.arm;
     const outside = q.flatMap((x, i) => ((joints[i].lower ?? -Infinity) <= x && x <= (joints[i].upper ?? Infinity) ? [] : [i]));
-    this.tell("joints", { q, within: !outside.length, outside, touching: [] });
+    this.tell("joints", { q, within: !outside.length, outside, nearest: null });
     this.tell("tool", this.tool(q));
   }
 
