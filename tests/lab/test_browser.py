@@ -402,7 +402,7 @@ def test_the_four_transforms_of_a_row_are_animated(visit):
 def plots(page, name):
     """Return how many plots of a panel have a picture with curves."""
     return page.evaluate(
-        f"[...document.querySelectorAll('#panel-{name} .plot canvas')].filter(c => c.offsetWidth > 100 &&"
+        f"[...document.querySelectorAll('#dock .plot canvas')].filter(c => c.offsetWidth > 100 &&"
         " new Set(c.getContext('2d').getImageData(0, 0, c.width, c.height).data).size > 20).length"
     )
 
@@ -534,7 +534,7 @@ def test_joints_2_and_3_alone_and_an_arm_without_bodies(visit):
     page.choose(labelled_list("Follows"), "sine")
     page.click(button("Start"))
     page.until(f"{of('control')}.rows.length > 10")
-    assert page.evaluate(f"{of('control')}.columns") == ["t", "e2", "e3", "tau2", "tau3", "tool"]
+    assert page.evaluate(f"{of('control')}.columns") == ["t", "q2", "q3", "e2", "e3", "tau2", "tau3", "tool"]
     page.click(button("Stop"))
     page.until("!dhkit.lab.state.control.running")
 
@@ -626,7 +626,7 @@ def test_names_with_html_are_text_everywhere(visit):
           for (const name of ['arm', 'joints', 'tool', 'target', 'table', 'motion', 'waypoints', 'control'])
             dhkit.lab.take({{ name, data: hostile(structuredClone(dhkit.lab.state[name])) }});
           dhkit.lab.take({{ name: 'job', data: {{ id: 1, title: {json.dumps(HOSTILE)}, progress: {json.dumps(HOSTILE)}, running: true, error: null }} }});
-          dhkit.lab.samples({{ columns: ['t', 'e1', 'tau1', 'tool'], rows: new Float32Array([0, 1, 1, 1, 1, 2, 2, 2]), restart: true }});
+          dhkit.lab.samples({{ columns: ['t', 'q1', 'e1', 'tau1', 'tool'], rows: new Float32Array([0, 1, 1, 1, 1, 1, 2, 2, 2, 2]), restart: true }});
           dhkit.lab.complain({json.dumps(HOSTILE)});
           dhkit.readout.set({{ name: {json.dumps(HOSTILE)}, joints: [{{ name: {json.dumps(HOSTILE)}, unit: 'deg' }}, {{ name: {json.dumps(HOSTILE)}, unit: 'deg' }}] }});
         }})()"""
@@ -642,8 +642,7 @@ def test_names_with_html_are_text_everywhere(visit):
         "#lab .message",
         ".joint .name",
         ".points button",
-        "#panel-motion .legend li",
-        "#panel-control .legend li",
+        "#dock .legend li",
     ):
         assert page.evaluate(f"document.querySelector({json.dumps(place)}).textContent") == HOSTILE
     assert page.evaluate("document.title").startswith(HOSTILE)

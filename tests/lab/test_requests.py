@@ -291,9 +291,9 @@ def test_a_controller_runs_in_real_time_and_is_changed_on_the_way(open_lab):
     state = states(lab)["control"]
     assert state["running"] and state["paused"] and state["error"] is None and state["controller"] == "pid"
     rows = samples(lab)[0]
-    assert rows.columns[:2] == ("t", "e1") and rows.columns[-1] == "tool" and len(rows.columns) == 14
+    assert rows.columns[:2] == ("t", "q1") and rows.columns[-1] == "tool" and len(rows.columns) == 20
     assert np.all(np.diff(rows.rows[:, 0]) > 0)
-    assert np.abs(rows.rows[5:30, 1:7]).max() < 1e-3  # computed torque follows
+    assert np.abs(rows.rows[5:30, 7:13]).max() < 1e-3  # computed torque follows
     decode_samples(rows.encoded())
     assert len(decode_ghosts(lab.view._state[Slot.GHOSTS]).transforms) == 1
     download = lab.answer("control.download", {"format": "csv"})
@@ -352,7 +352,7 @@ def test_joints_2_and_3_alone(open_lab):
     lab.answer("control.start", {"controller": "pd-gravity", "reference": "sine"})
     wait_for(lambda: samples(lab) and len(samples(lab)[0].rows) > 30)
     lab.answer("control.stop", {})
-    assert samples(lab)[0].columns == ("t", "e2", "e3", "tau2", "tau3", "tool")
+    assert samples(lab)[0].columns == ("t", "q2", "q3", "e2", "e3", "tau2", "tau3", "tool")
     moved = np.flatnonzero(lab.desk.q != before)
     assert set(moved) == {1, 2}
     with pytest.raises(ValueError, match="expected at least 4"):

@@ -370,7 +370,7 @@ def test_motions_are_listed_played_and_drawn_with_their_curves(visit):
     assert told(page, "motion.name") == "there"
     tab(page, "recorded")
     page.press(" ") if told(page, "motion") is None else None
-    page.until("document.querySelectorAll('#panel-recorded .plot canvas').length === 3")
+    page.until("document.querySelectorAll('#dock .plot canvas').length === 3")
     page.evaluate("dhkit.player.pause(), dhkit.player.seek(1.0)")
     middle = motions["there"].q(1.0)
     assert (
@@ -379,7 +379,7 @@ def test_motions_are_listed_played_and_drawn_with_their_curves(visit):
     )
     page.click(button("back"))
     assert told(page, "motion.name") == "back"
-    page.until("document.querySelectorAll('#panel-recorded .plot canvas').length >= 2")
+    page.until("document.querySelectorAll('#dock .plot canvas').length >= 2")
     page.evaluate("dhkit.player.pause(), dhkit.player.seek(0)")
     assert (
         np.abs(np.array(page.evaluate("dhkit.stage.nodes.at(-1).position.toArray()")) - arm.fk(q + 0.5)[:3, 3]).max()

@@ -6,11 +6,13 @@ import logging
 import threading
 import time
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from dhkit.arm import Arm
-from dhkit.control import CONTROLLERS, Controller, FrictionCompensation, Sine, make_controller
+from dhkit.control import CONTROLLERS, PID, Controller, FrictionCompensation, Sine, make_controller
+from dhkit.control.gains import effective_inertia
 from dhkit.description import Array
 from dhkit.errors import DhkitError
 from dhkit.lab.desk import Desk, file_content, has_bodies
@@ -42,12 +44,29 @@ PUBLISH_PERIOD = 0.25
 """Time between two states of the panel while a simulation runs, s."""
 CONTROLLER_SETTINGS = ("controller", "bandwidth", "damping", "compensate")
 """Settings of which the controller is made."""
+TUNING_SETTINGS = ("controller", "bandwidth", "damping")
+"""Settings that gains are tuned by: whoever changes one has tuned gains again."""
+JOINT_CONTROLLERS = ("pid", "pd")
+"""Controllers whose gains can be typed for each joint."""
+STILL_POLE = 1e-9
+"""Size of a pole, 1/s, below which it is that of an integral that is switched off."""
 MAX_PUSH_FORCE = 1e4
 """Largest component of a push, N."""
 MAX_PUSH_DURATION = 10.0
 """Longest duration of a push, s."""
 GHOST_COLOR = (0.55, 0.6, 0.68)
 """Red, green and blue of the reference's ghost, from 0 to 1."""
+
+
+class Gains(NamedTuple):
+    """Gains of the joints' PID controllers, shape (n,) each."""
+
+    kp: Array
+    """N m/rad, of prismatic joints N/m."""
+    ki: Array
+    """N m/(rad s), N/(m s)."""
+    kd: Array
+    """N m s/rad, N s/m."""
 
 
 class ControlPanel(Panel):
@@ -72,6 +91,8 @@ class ControlPanel(Panel):
         self._paused = False
         self._speed = 1.0
         self._error: str | None = None
+        self._own_gains: Gains | None = None
+        """Gains of the joints' controllers that a person has typed; None for tuned ones."""
         desk.on_replace.append(self._forget_run)
         desk.steer = self._steer
         motions.on_change.append(self._follow_changed_motion)
@@ -135,6 +156,23 @@ class ControlPanel(Panel):
                 if "reference" in fields.data:
                     live.setpoints = self._setpoints(live, self.desk.arm)
             self.settings = settings
+            if any(getattr(settings, name) != getattr(previous, name) for name in TUNING_SETTINGS):
+                self._own_gains = None
+        self.publish()
+
+    @answers("control.gains", "kp", "ki", "kd")
+    def set_gains(self, fields: Fields) -> None:
+        """Use other gains of the joints' controllers, (n,) each, also while a simulation runs."""
+        n = self.desk.arm.n
+        gains = Gains(fields.vector("kp", n), fields.vector("ki", n), fields.vector("kd", n))
+        if min(gain.min() for gain in gains) < 0:
+            raise ValueError("control.gains: a gain is negative; expected numbers from 0 on")
+        if self.settings.controller not in JOINT_CONTROLLERS:
+            raise ValueError(f"control.gains: the controller is {self.settings.controller}; expected PID or PD")
+        with self._lock:
+            self._own_gains = gains
+            if self._live is not None and self.desk.running:
+                self._live.take(self._controller(self._live))
         self.publish()
 
     @answers("control.pause")
@@ -213,8 +251,32 @@ class ControlPanel(Panel):
                 "time": round(live.t, 3) if live is not None else 0.0,
                 "error": self._error,
                 "note": "the links' masses are assumed: uniform rods" if self.desk.assumed_bodies else None,
+                "gains": self._gains_state(),
             },
         )
+
+    def _gains_state(self) -> JsonObject | None:
+        """Return the gains of the joints' controllers, and the poles that follow, where one is chosen."""
+        arm = self.desk.arm
+        if self.settings.controller not in JOINT_CONTROLLERS or not has_bodies(arm):
+            return None
+        m = effective_inertia(arm.description)
+        gains = self._own_gains or self._tuned_gains(arm)
+        # m s^3 + kd s^2 + kp s + ki = 0 of each joint alone, with its effective inertia m
+        poles = [np.roots(row) for row in np.stack([m, gains.kd, gains.kp, gains.ki], axis=1)]
+        slowest = [max(pole.real for pole in row if abs(pole) > STILL_POLE) for row in poles]
+        return {
+            **{name: gain.tolist() for name, gain in gains._asdict().items()},
+            "slowest": [float(pole) for pole in slowest],
+            "tuned": self._own_gains is None,
+        }
+
+    def _tuned_gains(self, arm: Arm) -> Gains:
+        settings = self.settings
+        controller = make_controller(settings.controller, arm.description, settings.bandwidth, settings.damping)
+        assert isinstance(controller, PID)  # noqa: S101 - for mypy: JOINT_CONTROLLERS are PIDs
+        whole = np.ones(arm.n)
+        return Gains(whole * controller.kp, whole * controller.ki, whole * controller.kd)
 
     @property
     def locked(self) -> dict[int, float]:
@@ -273,23 +335,22 @@ class ControlPanel(Panel):
 
     def _simulate_frame(self, live: Live, steps: int) -> None:
         with self._lock:
-            error = tau = np.zeros(len(self.free))
+            tau = np.zeros(len(self.free))
             for _ in range(steps):
-                error, tau = live.advance()
-            q = self._whole_arm(live.q)
-            reference = self._whole_arm(live.setpoint_q)
-            t = live.t
+                _, tau = live.advance()
+            moved, desired, t = live.q, live.setpoint_q, live.t
+        q = self._whole_arm(moved)
+        reference = self._whole_arm(desired)
         self.desk.show(q)
         self.desk.view.ghosts(reference[None], GHOST_COLOR)
         tool_error = np.linalg.norm(self.desk.arm.fk(q)[:3, 3] - self.desk.arm.fk(reference)[:3, 3])
-        row = np.array([[t, *error, *tau, tool_error]], dtype=np.float32)
+        row = np.array([[t, *moved, *(desired - moved), *tau, tool_error]], dtype=np.float32)
         self.desk.view.append(Samples("control", self._columns(), row))
 
     def _columns(self) -> tuple[str, ...]:
-        """Return the names of a sample's numbers: time, errors and torques of the free joints, the tool's error."""
-        errors = [f"e{i + 1}" for i in self.free]
-        torques = [f"tau{i + 1}" for i in self.free]
-        return ("t", *errors, *torques, "tool")
+        """Return the names of the numbers of a sample: time, then values, errors and torques of the free joints."""
+        names = [f"{quantity}{i + 1}" for quantity in ("q", "e", "tau") for i in self.free]
+        return ("t", *names, "tool")
 
     def _report_failure(self, live: Live, stop: threading.Event, error: str) -> None:
         """Publish why a run failed, unless the run was stopped or replaced in the meantime."""
@@ -315,6 +376,7 @@ class ControlPanel(Panel):
         self._end_run()
         with self._lock:
             self._live = None
+            self._own_gains = None
             self.planar = False
             self._error = "ended: the arm was edited" if was_running else None
         self.publish()
@@ -347,11 +409,14 @@ class ControlPanel(Panel):
     def _controller(self, live: Live) -> Controller:
         settings = self.settings
         description = live.arm.description
-        controller: Controller = (
-            self.own.controller()
-            if settings.controller == OWN
-            else make_controller(settings.controller, description, settings.bandwidth, settings.damping, live.q)
-        )
+        controller: Controller
+        if settings.controller == OWN:
+            controller = self.own.controller()
+        elif settings.controller in JOINT_CONTROLLERS and self._own_gains is not None:
+            kp, ki, kd = (gain[self.free] for gain in self._own_gains)
+            controller = PID(kp, ki, kd, limit=description.numbers.effort)
+        else:
+            controller = make_controller(settings.controller, description, settings.bandwidth, settings.damping, live.q)
         return FrictionCompensation(controller, live.arm) if settings.compensate else controller
 
     def _require_reference(self, reference: ReferenceKind) -> None:

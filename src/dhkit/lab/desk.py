@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 
 EULER_TOLERANCE = 1e-6
 """The first and third Euler angles are not unique where the cosine (or sine) of the second is at most this."""
+START_TURN = 0.4
+"""Turn of every joint, rad, where an arm has no regular configuration with a name."""
+START_STROKE = 0.2
+"""Stroke of every prismatic joint likewise, as a share of the reach."""
 SINGULAR_RATIO = 1e-3
 """A state is shown as singular where the smallest over the largest singular value of the Jacobian (rad and m) is below
 this."""
@@ -38,6 +42,29 @@ def file_content(result: Trajectory | SimulationResult, kind: str) -> str:
 def has_bodies(arm: Arm) -> bool:
     """Return whether every link of an arm has a mass."""
     return all(joint.bodies for joint in arm.description.joints)
+
+
+def start_configuration(arm: Arm) -> Array:
+    """Return the joint values at which an arm is shown first, shape (n,), rad and m.
+
+    They are ``ready``, or the first named configuration that is regular, or else a small turn or stroke of every joint
+    inside its limits: at a singular configuration the tool cannot be moved in every direction.
+    """
+    first = first_configuration(arm.description)
+    for q in (first, *arm.configurations.values()):
+        if not is_singular(arm, np.asarray(q)):
+            return np.array(q, dtype=float)
+    numbers = arm.description.numbers
+    moved = np.where(numbers.prismatic, START_STROKE * arm.description.reach, START_TURN)
+    bent: Array = np.clip(moved, numbers.lower, numbers.upper)
+    return bent if not is_singular(arm, bent) else first
+
+
+def is_singular(arm: Arm, q: Array) -> bool:
+    """Return whether the tool cannot move in one of its directions at joint values, shape (n,), rad and m."""
+    sigma = singular_values(arm.description, q, "whole")
+    rank = freedoms(arm.description, "whole")
+    return bool(rank >= 1 and sigma[rank - 1] < SINGULAR_RATIO * sigma[0])
 
 
 class Desk:
@@ -58,7 +85,7 @@ class Desk:
         """Whether the links' masses are assumed, as uniform rods."""
         self.order = "XYZ"
         """Convention of the tool's Euler angles."""
-        self.q = first_configuration(arm.description)
+        self.q = start_configuration(arm)
         """Joint values on show, shape (n,), rad and m."""
         self.running = False
         """Whether a simulation moves the arm."""
@@ -82,11 +109,11 @@ class Desk:
             The new arm.
         q
             Its joint values, shape (n,), rad and m. By default those on show, if the kinds of joints are the same, and
-            otherwise the new arm's first configuration.
+            otherwise :func:`start_configuration`.
         """
         if q is None:
             same_kinds = arm.description.kinds == self.arm.description.kinds
-            q = self.q if same_kinds else first_configuration(arm.description)
+            q = self.q if same_kinds else start_configuration(arm)
         previous = self.arm, self.q, self.target_q
         self.arm = arm
         self.q = q
@@ -131,9 +158,6 @@ class Desk:
         xyz, euler = pose_parts(T, order=self.order)
         # Where this is 0 the second angle is at an end of its range: only the sum or difference of the others counts.
         uniqueness = np.cos(euler[1]) if self.order[0] != self.order[2] else np.sin(euler[1])
-        sigma = singular_values(arm.description, q, "whole")
-        rank = freedoms(arm.description, "whole")
-        singular = rank >= 1 and sigma[rank - 1] < SINGULAR_RATIO * sigma[0]
         return {
             "T": T.ravel().tolist(),
             "xyz": xyz.tolist(),
@@ -141,7 +165,7 @@ class Desk:
             "order": self.order,
             "unique": bool(abs(uniqueness) > EULER_TOLERANCE),
             "manipulability": float(arm.manipulability(q)),
-            "singular": "singular: the tool cannot move in one of its directions here" if singular else None,
+            "singular": "singular: the tool cannot move in one of its directions here" if is_singular(arm, q) else None,
         }
 
     def close(self) -> None:

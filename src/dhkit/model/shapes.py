@@ -26,8 +26,8 @@ from dhkit.model.drawing import Drawing, Solid
 
 _BASE_COLOR = "#4a4f57"
 """Foot and gripper: dark, to tell them from links."""
-_PALETTE = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#bbbbbb")
-"""Links 1, 2 ...: Tol's bright scheme (SRON/EPS/TN/09-002, 2021), which colour-blind people can tell apart too."""
+_PALETTE = ("#e6e2da", "#b4bac4")
+"""Links 1, 2 ... in turn: neutral, so that colors are left to axes, curves, ghosts and the tool's path."""
 _IDENTITY: Array = np.eye(4)
 
 

@@ -15,6 +15,7 @@ const FIELD = 34; // degrees of view, vertically
 const MARGIN = 1.07; // around the arm
 const SAMPLES = 60; // states of an animation that the camera must take in
 const SOLID_GHOSTS = 2; // more are drawn as skeletons beside panels
+const GREY = [148, 156, 168]; // of ghosts
 const REST = 400; // ms without a change after which the picture is drawn finely
 const FINEST = 2; // pixels of the picture for one of the page
 const TRACE_RADIUS = 0.0035; // share of the arm's size
@@ -453,14 +454,36 @@ export class Stage {
 
   setGhosts(message) {
     const { nodes } = this;
-    this.overlays.setGhosts(message, { nodes, boxAt: (...state) => this.boxAt(...state), skeletons: this.steady && message.tints.length > 3 * SOLID_GHOSTS });
+    this.ghosts = message;
+    this.overlays.setGhosts({ ...message, tints: this.tints() }, { nodes, boxAt: (...state) => this.boxAt(...state), skeletons: this.steady && message.tints.length > 3 * SOLID_GHOSTS });
     this.anchors = anchors(placements(message.transforms, THREE).positions, nodes.map((node) => node.position));
     this.overlaid();
   }
 
+  // Beside panels ghosts are grey, but the one that a person points at in a list.
+  tints() {
+    const { tints } = this.ghosts, several = this.steady && tints.length > 3;
+    return several ? tints.map((value, i) => (Math.floor(i / 3) === this.pointed ? value : GREY[i % 3])) : tints;
+  }
+
+  // ghost: the number of the one to show in its color and with its name, or null.
+  pointAt(ghost) {
+    if (this.pointed === ghost || !this.ghosts) return;
+    this.pointed = ghost;
+    this.setGhosts(this.ghosts);
+    this.showNames();
+  }
+
   // names: of the ghosts, {text, color} each, in their order.
   nameGhosts(names) {
-    this.names.set(names.map((name, frame) => ({ frame, ...name })));
+    this.pointed = null;
+    this.named = names;
+    this.showNames();
+  }
+
+  showNames() {
+    const shown = this.steady ? this.named?.[this.pointed] : null;
+    this.names.set(this.steady ? (shown ? [{ frame: this.pointed, ...shown }] : []) : (this.named ?? []).map((name, frame) => ({ frame, ...name })));
     this.names.show(this.overlays.shown);
     this.dirty();
   }
@@ -507,7 +530,7 @@ export class Stage {
     this.labels.place((frame) => this.project(this.nodes[frame].position));
     this.marks.place(() => this.gap && this.project(this.gap));
     for (const call of this.rendered) call();
-    const named = this.naming && this.names.count === this.anchors.length; // the ghosts of a message and their names come one by one
+    const named = this.naming && (this.named?.length ?? 0) === this.anchors.length; // the ghosts of a message and their names come one by one
     this.names.place((ghost) => (named ? this.project(this.anchors[ghost]) : null));
   }
 

@@ -1,7 +1,7 @@
 // Controllers on the simulated arm in real time, with errors and torques as they come.
 
-import { bytes, fixed, h, onTyped, save, typed, unitsOf } from "./dom.js";
-import { Plot, legend } from "./plot.js";
+import { RunCurves } from "./curves.js";
+import { bytes, fixed, h, onTyped, save, typed } from "./dom.js";
 
 const FRICTIONS = [["none", "none"], ["smooth", "smooth"], ["stiction", "with stiction"]];
 const REFERENCES = [["hold", "holds where it is"], ["sine", "a sine of every joint"], ["motion", "the planned motion, to and fro"], ["target", "the tool's target"], ["sliders", "the joint sliders"]];
@@ -9,7 +9,6 @@ const WINDOW = 10; // s that are drawn
 const MOST = 36000; // rows that are kept: ten minutes
 const ANSWER = 1000; // ms in which the state that follows from a choice is expected
 const PLOT_EVERY = 100; // ms
-const MILLI = 1000; // of errors, in rad and m
 
 export class ControlPanel {
   constructor(lab, root) {
@@ -37,17 +36,16 @@ export class ControlPanel {
     this.force = [0, 1, 2].map((k) => h("input", { type: "text", inputmode: "decimal", class: "number", "aria-label": `Force along ${"xyz"[k]}, N`, value: k === 2 ? "-50" : "0" }));
     this.time = h("input", { type: "text", inputmode: "decimal", class: "number", "aria-label": "Duration of the push, s", value: "0.2" });
     this.pushing = h("button", { type: "button", onclick: () => this.push() }, "Push");
-    this.errors = new Plot("errors", "mrad or mm");
-    this.torques = new Plot("drives", "N m or N");
-    this.legend = h("div", { class: "legends" });
+    this.curves = new RunCurves(lab);
+    this.gains = new GainTable((gains) => lab.ask("control.gains", gains), (text) => lab.complain(text));
     const download = (format) => h("button", { type: "button", onclick: () => this.download(format) }, format.toUpperCase());
     root.append(
       h("div", { class: "settings" }, choice("controller", "Controller", []), choice("reference", "Follows", REFERENCES), number("bandwidth", "Bandwidth", "rad/s"), number("damping", "Damping", ""), choice("friction", "Friction", FRICTIONS), number("payload", "Payload", "kg"), h("label", { class: "check" }, this.compensate, "The controller compensates friction")),
+      this.gains.root,
       h("p", { class: "hint" }, "The controller does not know of the payload. The ghost is what it follows."),
       h("div", { class: "buttons" }, this.start, this.pause, this.planar, this.assume),
       this.note,
       h("fieldset", { class: "push" }, h("legend", {}, "Push"), h("div", { class: "line" }, this.link, h("label", {}, "for ", this.time, " s"), this.pushing), h("div", { class: "three" }, this.force.map((input, k) => h("label", {}, h("span", {}, `${"xyz"[k]} [N]`), input)))),
-      this.legend, this.errors.root, this.torques.root,
       h("div", { class: "buttons" }, download("csv"), download("npz")),
     );
     this.rows = [];
@@ -61,9 +59,6 @@ export class ControlPanel {
     this.planar.hidden = arm.n < 4;
     this.start.disabled = !arm.bodies;
     if (!arm.bodies) this.note.textContent = "Not every link has a mass: nothing can be simulated until all are assumed to be uniform rods.";
-    const errors = unitsOf(arm.joints, "mrad", "mm"), torques = unitsOf(arm.joints, "N m", "N");
-    this.errors.setUnit(errors);
-    this.torques.setUnit(torques);
   }
 
   take_control(control) {
@@ -84,6 +79,7 @@ export class ControlPanel {
     }
     for (const name of ["bandwidth", "damping", "payload"]) if (document.activeElement !== this[name]) this[name].value = String(state[name]);
     this.compensate.checked = state.compensate;
+    this.gains.show(state.gains, this.arm?.joints ?? []);
     this.start.textContent = state.running ? "Stop" : "Start";
     this.pause.textContent = state.paused ? "Go on" : "Pause";
     this.pause.disabled = this.pushing.disabled = !state.running;
@@ -123,43 +119,81 @@ export class ControlPanel {
   forget() {
     this.rows = [];
     this.columns = [];
-    this.legend.replaceChildren();
-    this.errors.clear();
-    this.torques.clear();
+    this.curves.clear();
+    this.lab.dock.release(this.curves);
   }
 
   samples({ columns, rows, restart }) {
     if (restart || columns.length !== this.columns.length) {
       this.rows = [];
       this.columns = columns;
-      const joints = (columns.length - 2) / 2, names = columns.slice(1, 1 + joints).map((name) => this.arm?.joints[Number(name.slice(1)) - 1]?.name ?? name);
-      this.names = names;
-      this.legend.replaceChildren(legend(names));
+      const moved = columns.filter((name) => /^q\d+$/.test(name));
+      this.joints = moved.map((name) => this.arm?.joints[Number(name.slice(1)) - 1]);
+      this.lab.dock.show(this.curves);
     }
     const width = columns.length;
     for (let i = 0; i < rows.length; i += width) this.rows.push(rows.subarray(i, i + width));
     if (this.rows.length > MOST) this.rows.splice(0, this.rows.length - MOST);
     const now = performance.now();
-    if (!this.visible || now - (this.drawn ?? 0) < PLOT_EVERY) return;
+    if (!this.lab.dock.shows(this.curves) || now - (this.drawn ?? 0) < PLOT_EVERY) return;
     this.drawn = now;
     this.draw();
   }
 
   draw() {
-    if (!this.rows.length || !this.names) return;
-    const end = this.rows[this.rows.length - 1][0], n = this.names.length;
+    if (!this.rows.length || !this.joints?.every(Boolean)) return;
+    const end = this.rows[this.rows.length - 1][0];
     let begin = this.rows.length - 1;
     while (begin > 0 && this.rows[begin - 1][0] > end - WINDOW) begin--;
-    const rows = this.rows.slice(begin);
-    const column = (k, scale = 1) => rows.map((row) => row[k] * scale);
-    const times = column(0);
-    this.errors.set(this.names, [times, ...this.names.map((_, i) => column(1 + i, MILLI))]);
-    this.torques.set(this.names, [times, ...this.names.map((_, i) => column(1 + n + i))]);
-  }
-
-  shown(visible) {
-    this.visible = visible;
-    if (visible) requestAnimationFrame(() => { this.draw(); this.errors.resize(); this.torques.resize(); });
+    this.curves.draw(this.rows.slice(begin), this.joints);
   }
 }
 
+// Gains of each joint's controller, and the slowest pole that follows.
+class GainTable {
+  constructor(send, complain) {
+    this.send = send;
+    this.complain = complain;
+    this.rows = [];
+    this.body = h("tbody");
+    this.title = h("legend");
+    this.root = h("fieldset", { class: "gains", hidden: true }, this.title, h("table", {}, h("thead", {}, h("tr", {}, ["joint", "Kp", "Ki", "Kd", "pole"].map((name) => h("th", { scope: "col", title: name === "pole" ? "Real part of the slowest pole, 1/s" : name }, name)))), this.body));
+  }
+
+  // gains: of Python, with the poles; null where the controller has none.
+  show(gains, joints) {
+    this.root.hidden = !gains;
+    if (!gains || gains.kp.length !== joints.length) return;
+    this.gains = gains;
+    if (this.rows.length !== joints.length) this.build(joints);
+    this.title.textContent = gains.tuned ? "Gains, tuned" : "Gains, your own";
+    this.rows.forEach(({ inputs, pole }, i) => {
+      for (const [name, input] of Object.entries(inputs)) if (document.activeElement !== input) input.value = String(Number(gains[name][i].toPrecision(4)));
+      const real = gains.slowest[i];
+      pole.textContent = `${fixed(real, Math.abs(real) < 1 ? 3 : 1)} 1/s`;
+      pole.classList.toggle("bad", real >= 0);
+    });
+  }
+
+  build(joints) {
+    this.rows = joints.map((joint, i) => {
+      const inputs = Object.fromEntries(["kp", "ki", "kd"].map((name) => {
+        const input = h("input", { type: "text", inputmode: "decimal", "aria-label": `${name} of ${joint.name}` });
+        onTyped(input, (text) => this.take(name, i, text), () => this.show(this.gains, joints));
+        return [name, input];
+      }));
+      const pole = h("td", { class: "value" });
+      const row = h("tr", {}, h("th", { scope: "row", title: joint.name }, joint.name), Object.values(inputs).map((input) => h("td", {}, input)), pole);
+      return { row, inputs, pole };
+    });
+    this.body.replaceChildren(...this.rows.map(({ row }) => row));
+  }
+
+  take(name, i, text) {
+    const value = typed(text);
+    if (value === null) return this.complain(`${name}: found ${text.slice(0, 40)}; expected a number`);
+    const { kp, ki, kd } = structuredClone(this.gains), gains = { kp, ki, kd };
+    gains[name][i] = value;
+    return this.send(gains);
+  }
+}

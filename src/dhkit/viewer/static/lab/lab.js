@@ -1,42 +1,54 @@
 // The lab: panels beside the scene. Python has the arm; the page asks, and shows the states that it is told.
 
 import { StatusCard } from "./card.js";
+import { PlotDock } from "./dock.js";
 import { depthText, h } from "./dom.js";
+import { icon } from "./icons.js";
 import { remember, remembered } from "./memory.js";
 
 const SHORT = 6000; // ms that a message stays
+const WIDTH = 348, NARROW = 280, SCENE = 420; // px: of a panel at first, at least, and left to the scene
+const STEP = 24; // px that an arrow key moves the edge
 
 export class Lab {
-  // panels: [name, title, class] each; requests(failed): what answers them.
-  constructor(page, panels, requests, first) {
+  // groups: of panels, [name, title, class] each; requests(failed): what answers them.
+  constructor(page, groups, requests, first) {
     this.page = page;
     this.stage = page.stage;
     this.state = {};
     this.requests = requests((error, request) => this.complain(error, request));
     this.units = { angle: remembered("angle", "deg"), length: remembered("length", "m") };
-    this.build(panels, first);
+    this.build(groups, first);
     document.body.classList.add("lab");
     document.getElementById("readout").open = false;
     this.stage.resize();
   }
 
-  build(panels, first) {
-    const tabs = [], bodies = [];
-    this.panels = panels.map(([name, title, Panel], k) => {
-      const tab = h("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}`, "aria-selected": "false", tabIndex: k ? -1 : 0, hidden: Boolean(Panel.optional), onclick: () => this.open(k), onkeydown: (event) => this.moveTab(event, k) }, title);
+  build(groups, first) {
+    this.card = new StatusCard(this);
+    this.dock = new PlotDock(this);
+    const bodies = [];
+    this.panels = groups.flat().map(([name, title, Panel], k) => {
+      const tab = h("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}`, "aria-selected": "false", tabIndex: k ? -1 : 0, hidden: Boolean(Panel.optional), onclick: () => this.choose(k), onkeydown: (event) => this.moveTab(event, k) }, icon(name), h("span", {}, title));
       const body = h("section", { role: "tabpanel", id: `panel-${name}`, "aria-labelledby": `tab-${name}`, hidden: true });
-      tabs.push(tab);
       bodies.push(body);
       return { name, title, tab, body, panel: new Panel(this, body), against: new Set(Panel.optional ? [name] : []) };
     });
+    const tabs = groups.map((group) => h("div", { class: "group", role: "presentation" }, group.map(([name]) => this.panels.find((panel) => panel.name === name).tab)));
     this.title = h("h1", {}, "");
     this.family = h("p", { class: "family" });
     this.copy = h("button", { type: "button", class: "quiet", title: "The lines of Python that do the same", hidden: !this.can("python"), onclick: () => this.copyPython() }, "Copy as Python");
     this.message = h("p", { class: "message", role: "alert", hidden: true });
-    const root = h("aside", { id: "lab", "aria-label": "Lab" }, h("header", {}, h("div", { class: "headline" }, this.title, this.copy), this.family), h("div", { role: "tablist", class: "tabs", "aria-label": "Panels" }, tabs), this.message, h("div", { class: "panels" }, bodies));
-    document.body.prepend(root);
-    this.card = new StatusCard(this);
-    document.getElementById("stage").after(this.card.root);
+    this.edge = h("div", { class: "edge", role: "separator", "aria-orientation": "vertical", "aria-label": "Width of the panel", tabIndex: 0 });
+    const rail = h("nav", { "aria-label": "Panels" }, h("div", { role: "tablist", class: "tabs", "aria-label": "Panels", "aria-orientation": "vertical" }, tabs));
+    this.body = h("div", { class: "body" }, h("header", {}, h("div", { class: "headline" }, this.title, this.copy), this.family), this.message, h("div", { class: "panels" }, bodies));
+    document.body.prepend(h("aside", { id: "lab", "aria-label": "Lab" }, rail, this.body, this.edge));
+    this.edge.addEventListener("pointerdown", (event) => this.dragEdge(event));
+    this.edge.addEventListener("keydown", (event) => this.moveEdge(event));
+    this.width = Number(remembered("width", String(WIDTH)));
+    this.folded = false;
+    this.layout();
+    document.getElementById("stage").after(this.card.root, this.dock.root);
     this.addViews();
     const wanted = [remembered("tab", first), first].map((name) => this.panels.findIndex((panel) => panel.name === name));
     this.open(Math.max(0, wanted.find((k) => k >= 0) ?? 0));
@@ -45,6 +57,40 @@ export class Lab {
   addViews() {
     const views = h("select", { "aria-label": "Look from", title: "Look from", onchange: () => { this.stage.look(views.value); views.value = ""; } }, h("option", { value: "", hidden: true }, "View"), ["front", "side", "top", "iso"].map((name) => h("option", { value: name }, name)));
     document.getElementById("reset").before(views);
+  }
+
+  // A click on the panel that is open hides it, and shows it again.
+  choose(k) {
+    this.folded = !this.folded && this.panels[k].tab.getAttribute("aria-selected") === "true";
+    this.layout();
+    this.open(k);
+  }
+
+  layout() {
+    const { body } = document, width = Math.max(NARROW, Math.min(this.width, innerWidth - SCENE));
+    body.classList.toggle("folded", this.folded);
+    body.style.setProperty("--panel", this.folded ? "0px" : `${width}px`);
+  }
+
+  setWidth(width) {
+    this.width = width;
+    remember("width", String(Math.round(width)));
+    this.layout();
+  }
+
+  dragEdge(event) {
+    this.edge.setPointerCapture(event.pointerId);
+    const begin = this.body.getBoundingClientRect().left, move = ({ clientX }) => this.setWidth(clientX - begin);
+    this.edge.addEventListener("pointermove", move);
+    this.edge.addEventListener("lostpointercapture", () => this.edge.removeEventListener("pointermove", move), { once: true });
+  }
+
+  moveEdge(event) {
+    const step = { ArrowLeft: -STEP, ArrowRight: STEP }[event.key];
+    if (!step) return;
+    event.preventDefault();
+    event.stopPropagation();
+    this.setWidth(this.width + step);
   }
 
   open(k) {
@@ -68,7 +114,10 @@ export class Lab {
 
   openPanel(name) {
     const k = this.panels.findIndex((panel) => panel.name === name);
-    if (!this.panels[k].tab.hidden) this.open(k);
+    if (this.panels[k].tab.hidden) return;
+    this.folded = false;
+    this.layout();
+    this.open(k);
   }
 
   panelTitle(name) {
@@ -77,7 +126,8 @@ export class Lab {
 
   moveTab(event, k) {
     const shown = this.panels.map((_, i) => i).filter((i) => !this.panels[i].tab.hidden), at = shown.indexOf(k), count = shown.length;
-    const next = { ArrowRight: shown[(at + 1) % count], ArrowLeft: shown[(at + count - 1) % count], Home: shown[0], End: shown[count - 1] }[event.key];
+    const after = shown[(at + 1) % count], before = shown[(at + count - 1) % count];
+    const next = { ArrowRight: after, ArrowDown: after, ArrowLeft: before, ArrowUp: before, Home: shown[0], End: shown[count - 1] }[event.key];
     if (next === undefined) return;
     event.preventDefault();
     event.stopPropagation();
@@ -123,20 +173,29 @@ export class Lab {
     return this.requests.can?.(name) ?? true;
   }
 
-  ask(name, data) {
-    return this.requests.ask(name, data);
+  // What was complained of goes when the same is asked with success.
+  async ask(name, data) {
+    const answer = await this.requests.ask(name, data);
+    if (answer !== null && name === this.cause) this.hush();
+    return answer;
   }
 
   // What Python says of a request begins with the request's name, which is for programs.
   complain(error, request = "") {
     this.tell(request && error.startsWith(`${request}: `) ? error.slice(request.length + 2) : error);
+    this.cause = request;
+  }
+
+  hush() {
+    this.cause = null;
+    this.message.hidden = true;
   }
 
   tell(text) {
     this.message.textContent = text;
     this.message.hidden = false;
     clearTimeout(this.quiet);
-    this.quiet = setTimeout(() => (this.message.hidden = true), SHORT);
+    this.quiet = setTimeout(() => this.hush(), SHORT);
   }
 
   async copyPython() {
@@ -167,6 +226,6 @@ export class Lab {
     Object.assign(this.units, units);
     remember("angle", this.units.angle);
     remember("length", this.units.length);
-    for (const part of [this.card, ...this.panels.map(({ panel }) => panel)]) part.unitsChanged?.();
+    for (const part of [this.card, this.dock, ...this.panels.map(({ panel }) => panel)]) part.unitsChanged?.();
   }
 }

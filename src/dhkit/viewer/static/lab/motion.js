@@ -1,6 +1,6 @@
 // Motions: planned from the state on show, taught by waypoints, or read from a file; with their curves.
 
-import { Curves, exceeding } from "./curves.js";
+import { MotionCurves, exceeding } from "./curves.js";
 import { base64Of, bytes, fixed, h, save, touchingText, typed } from "./dom.js";
 
 const KINDS = [["quintic", "Quintic"], ["trapezoidal", "Trapezoidal"], ["least-time", "Least time"], ["line", "Straight line"], ["circle", "Circle"]];
@@ -19,7 +19,7 @@ export class MotionPanel {
     this.points = h("ol", { class: "points" });
     this.file = h("input", { type: "file", accept: ".csv,.mat,.npz,.yaml,.yml", "aria-label": "File with a motion", onchange: () => this.read() });
     this.degrees = h("input", { type: "checkbox" });
-    this.curves = new Curves();
+    this.curves = new MotionCurves(lab);
     const download = (format) => h("button", { type: "button", onclick: () => this.download(format) }, format.toUpperCase());
     this.replay = h("button", { type: "button", onclick: () => this.play() }, "Play");
     this.files = h("div", { class: "buttons", hidden: true }, this.replay, download("csv"), download("npz"), h("button", { type: "button", onclick: () => lab.ask("motion.clear") }, "Remove"));
@@ -29,7 +29,6 @@ export class MotionPanel {
       this.job,
       this.facts,
       this.files,
-      this.curves.root,
       h("fieldset", {}, h("legend", {}, "Waypoints"), h("div", { class: "buttons" }, h("button", { type: "button", onclick: () => this.teach() }, "Teach this state"), h("button", { type: "button", onclick: () => lab.ask("waypoints.clear") }, "Clear")), this.points),
       h("fieldset", {}, h("legend", {}, "From a file"), h("label", { class: "line" }, this.file), h("label", { class: "line" }, this.degrees, " angles in degrees")),
     );
@@ -102,8 +101,7 @@ export class MotionPanel {
   // An animation is at a time: so are the curves.
   moved(q, time) {
     if (q && this.motion) this.lab.warn(...exceeding(this.motion, time));
-    if (!q || !this.visible) return;
-    this.curves.mark(time);
+    if (q && this.lab.dock.shows(this.curves)) this.curves.mark(time);
   }
 
   async read() {
@@ -128,18 +126,14 @@ export class MotionPanel {
 
   take_motion(motion) {
     this.motion = motion;
-    this.files.hidden = this.curves.root.hidden = !motion;
+    this.files.hidden = !motion;
     this.facts.textContent = "";
-    if (!motion) return;
+    if (!motion) return this.lab.dock.release(this.curves);
     const still = this.lab.state.control?.running ? "not played: a controller moves the arm" : null;
     const touching = motion.contacts && touchingText(motion.contacts.find(Boolean));
     this.facts.textContent = [`${motion.kind}, ${fixed(motion.duration, 3)} s`, motion.excess, touching, still].filter(Boolean).join("; ");
     this.facts.classList.toggle("bad", Boolean(motion.excess || touching));
     this.curves.draw(motion, this.arm.joints);
-  }
-
-  shown(visible) {
-    this.visible = visible;
-    if (visible && this.motion) requestAnimationFrame(() => this.curves.resize());
+    if (!this.lab.state.control?.running) this.lab.dock.show(this.curves);
   }
 }

@@ -12,16 +12,10 @@ import { ToolPanel } from "./tool.js";
 import { TransformsPanel } from "./transforms.js";
 import { WorkspacePanel } from "./workspace.js";
 
+// In groups: to move the arm, its model, its simulation, and to learn.
 export const PANELS = [
-  ["task", "Task", TaskPanel],
-  ["joints", "Joints", JointPanel],
-  ["tool", "Tool", ToolPanel],
-  ["table", "DH table", TablePanel],
-  ["motion", "Motion", MotionPanel],
-  ["control", "Control", ControlPanel],
-  ["dynamics", "Dynamics", DynamicsPanel],
-  ["workspace", "Workspace", WorkspacePanel],
-  ["transforms", "Transforms", TransformsPanel],
-  ["submit", "Submit", SubmitPanel],
-  ["own", "Yours", OwnPanel],
+  [["joints", "Joints", JointPanel], ["tool", "Tool", ToolPanel], ["motion", "Motion", MotionPanel]],
+  [["table", "DH table", TablePanel], ["dynamics", "Dynamics", DynamicsPanel], ["workspace", "Workspace", WorkspacePanel]],
+  [["control", "Control", ControlPanel]],
+  [["task", "Task", TaskPanel], ["transforms", "Transforms", TransformsPanel], ["submit", "Answers", SubmitPanel], ["own", "My code", OwnPanel]],
 ];

@@ -3,7 +3,8 @@
 import { CURVES } from "../colors.js";
 import { h, save } from "./dom.js";
 
-const HEIGHT = 150;
+const LEAST = { width: 200, height: 96 }; // px
+const SYNC = "dhkit"; // one pointer in all plots
 const DIGITS = 8; // of numbers in a CSV
 
 let loading = null;
@@ -19,10 +20,12 @@ function load() {
 }
 
 export class Plot {
-  // names: of the curves; unit: of the values.
-  constructor(title, unit) {
+  // unit: of the values; seek(time): called where a person points at a time with the button down.
+  constructor(title, unit, seek = null) {
     this.title = title;
     this.unit = unit;
+    this.seek = seek;
+    this.hidden = new Set(); // curves that are not drawn
     this.area = h("div", { class: "plot" });
     this.csv = h("button", { type: "button", class: "quiet", title: `Save ${title} as CSV`, onclick: () => this.saveCsv() }, "CSV");
     this.png = h("button", { type: "button", class: "quiet", title: `Save ${title} as PNG`, onclick: () => this.savePng() }, "PNG");
@@ -46,10 +49,11 @@ export class Plot {
     this.plot = null;
   }
 
-  // data: times, then the values of each curve; limits: largest values that are drawn dashed, of each curve, or null.
+  // data: times, then the values of each curve, and desired ones of each where there are twice as many: they are dashed.
+  // limits: a pair of values for each curve, that are drawn dotted, or null.
   async set(names, data, limits = null) {
     this.shownData = data;
-    const key = JSON.stringify([names, limits]);
+    const key = JSON.stringify([names, limits, data.length]);
     if (this.plot && this.key === key) return void this.plot.setData(data);
     this.key = key;
     this.names = names;
@@ -65,25 +69,54 @@ export class Plot {
     const style = getComputedStyle(document.documentElement);
     const value = (name) => style.getPropertyValue(name).trim();
     const axis = { stroke: value("--faint"), grid: { stroke: value("--line"), width: 1 }, ticks: { show: false }, font: "11px system-ui" };
-    const series = this.names.map((name, k) => ({ label: name, stroke: CURVES[k % CURVES.length], width: 1.6, dash: k >= CURVES.length ? [6, 4] : undefined, points: { show: false } }));
+    const curve = (label, k, dash) => ({ label, stroke: CURVES[k % CURVES.length], width: dash ? 1.2 : 1.7, dash, show: !this.hidden.has(k), points: { show: false } });
+    const series = this.labels().map((label, i) => curve(label, i % this.names.length, i >= this.names.length ? [6, 4] : undefined));
     this.plot = new uPlot({
-      width: Math.max(200, this.area.clientWidth),
-      height: HEIGHT,
+      ...this.size(),
       scales: { x: { time: false } },
       series: [{ label: "t [s]" }, ...series],
-      axes: [{ ...axis, size: 26 }, { ...axis, size: 46 }],
+      axes: [{ ...axis, size: 26 }, { ...axis, size: 46, space: 22 }],
       legend: { show: false },
-      cursor: { points: { size: 6 }, y: false },
+      cursor: { points: { size: 6 }, y: false, drag: { x: false, y: false }, sync: { key: SYNC } },
       hooks: { draw: [(plot) => this.drawLimits(plot)] },
     }, this.shownData, this.area);
+    if (this.seek) this.follow(this.plot);
+  }
+
+  // Names of all curves: those that are shown, and the desired ones.
+  labels() {
+    const desired = this.shownData.length - 1 > this.names.length;
+    return desired ? [...this.names, ...this.names.map((name) => `${name}, desired`)] : this.names;
+  }
+
+  size() {
+    return { width: Math.max(LEAST.width, this.area.clientWidth), height: Math.max(LEAST.height, this.area.clientHeight) };
+  }
+
+  // The scene goes to the time that a person points at.
+  follow({ over }) {
+    const go = (event) => event.buttons & 1 && this.seek(this.plot.posToVal(event.offsetX, "x"));
+    over.addEventListener("pointerdown", (event) => {
+      over.setPointerCapture(event.pointerId);
+      go(event);
+    });
+    over.addEventListener("pointermove", go);
+  }
+
+  // hidden: numbers of the curves that are not drawn, nor their desired ones.
+  hide(hidden) {
+    this.hidden = hidden;
+    const n = this.names?.length;
+    this.plot?.series.forEach((_, i) => i > 0 && this.plot.setSeries(i, { show: !hidden.has((i - 1) % n) }));
   }
 
   drawLimits(plot) {
     if (!this.limits) return;
     const { ctx, bbox } = plot;
     ctx.save();
-    ctx.setLineDash([6, 4]);
+    ctx.setLineDash([2, 4]);
     this.limits.forEach((pair, k) => {
+      if (this.hidden.has(k)) return;
       for (const value of pair ?? []) {
         if (value === null || value < plot.scales.y.min || value > plot.scales.y.max) continue;
         const y = Math.round(plot.valToPos(value, "y", true)) + 0.5;
@@ -103,13 +136,13 @@ export class Plot {
   }
 
   resize() {
-    if (this.plot && this.area.clientWidth > 0) this.plot.setSize({ width: this.area.clientWidth, height: HEIGHT });
+    if (this.plot && this.area.clientWidth > 0) this.plot.setSize(this.size());
   }
 
   saveCsv() {
     if (!this.shownData) return;
     const [times, ...curves] = this.shownData;
-    const lines = [["t [s]", ...this.names.map((name) => `${name} [${this.unit}]`)].join(",")];
+    const lines = [["t [s]", ...this.labels().map((name) => `"${name} [${this.unit}]"`)].join(",")];
     times.forEach((t, i) => lines.push([t, ...curves.map((curve) => curve[i])].map((x) => String(Number(x.toPrecision(DIGITS)))).join(",")));
     save(`${this.title}.csv`, lines.join("\n") + "\n", "text/csv");
   }
@@ -151,6 +184,7 @@ export class Plot {
   }
 }
 
-export function legend(names) {
-  return h("ul", { class: "legend" }, names.map((name, k) => h("li", {}, h("i", { style: `background:${CURVES[k % CURVES.length]}` }), name)));
+// Names of curves with their colors; a click hides a curve, and shows it again.
+export function legend(names, hidden, toggle) {
+  return h("ul", { class: "legend" }, names.map((name, k) => h("li", {}, h("button", { type: "button", "aria-pressed": String(!hidden.has(k)), title: `Show or hide ${name}`, onclick: () => toggle(k) }, h("i", { style: `background:${CURVES[k % CURVES.length]}` }), name))));
 }

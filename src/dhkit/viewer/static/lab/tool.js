@@ -165,6 +165,8 @@ export class ToolPanel {
     const choose = () => this.lab.ask("tool.choose", { branch: branch.name });
     const button = h("button", { type: "button", "aria-pressed": String(branch.chosen), title: values, onclick: choose }, h("span", {}, h("i", { style: ghost === null ? null : `background:${GHOSTS[ghost % GHOSTS.length]}` }), branch.name), branch.within ? null : h("small", {}, "outside limits"));
     button.dataset.branch = branch.name;
+    for (const event of ["pointerenter", "focus"]) button.addEventListener(event, () => this.lab.stage.pointAt(ghost));
+    for (const event of ["pointerleave", "blur"]) button.addEventListener(event, () => this.lab.stage.pointAt(null));
     return button;
   }
 }

@@ -7,9 +7,7 @@ import { AboutPanel } from "./about.js";
 import { RecordedPanel } from "./recorded.js";
 
 export const PANELS = [
-  ["about", "About", AboutPanel],
-  ["joints", "Joints", JointPanel],
-  ["tool", "Tool", ToolPanel],
-  ["table", "DH table", TablePanel],
-  ["recorded", "Motions", RecordedPanel],
+  [["about", "About", AboutPanel]],
+  [["joints", "Joints", JointPanel], ["tool", "Tool", ToolPanel], ["recorded", "Motions", RecordedPanel]],
+  [["table", "DH table", TablePanel]],
 ];

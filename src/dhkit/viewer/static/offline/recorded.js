@@ -1,6 +1,6 @@
 // Motions that were saved with the page: what each shows, and its curves.
 
-import { Curves, exceeding } from "../lab/curves.js";
+import { MotionCurves, exceeding } from "../lab/curves.js";
 import { fixed, h } from "../lab/dom.js";
 
 export class RecordedPanel {
@@ -8,8 +8,8 @@ export class RecordedPanel {
     this.lab = lab;
     this.list = h("div", { class: "branches", role: "group", "aria-label": "Motions" });
     this.facts = h("p", { class: "facts" });
-    this.curves = new Curves();
-    root.append(this.list, this.facts, this.curves.root);
+    this.curves = new MotionCurves(lab);
+    root.append(this.list, this.facts);
   }
 
   take_recorded(motions) {
@@ -26,20 +26,16 @@ export class RecordedPanel {
   take_motion(motion) {
     this.motion = motion;
     [...this.list.children].forEach((button, k) => button.setAttribute("aria-pressed", String(motion?.index === k)));
-    this.curves.root.hidden = !motion;
     this.facts.textContent = motion ? [motion.excess, motion.step ? `long: drawn by a sample every ${fixed(motion.step, 2)} s` : null, motion.reference ? "the grey arm is what was asked for" : null].filter(Boolean).join("; ") : "A motion plays when it is chosen; sliders end it.";
     this.facts.classList.toggle("bad", Boolean(motion?.excess));
-    if (motion) this.curves.draw(motion, this.lab.state.arm.joints);
+    if (!motion) return this.lab.dock.release(this.curves);
+    this.curves.draw(motion, this.lab.state.arm.joints);
+    this.lab.dock.show(this.curves);
   }
 
   moved(q, time) {
     if (!q || !this.motion) return;
-    this.lab.stage.warn(...exceeding(this.motion, time));
-    if (this.visible) this.curves.mark(time);
-  }
-
-  shown(visible) {
-    this.visible = visible;
-    if (visible && this.motion) requestAnimationFrame(() => this.curves.resize());
+    this.lab.warn(...exceeding(this.motion, time));
+    if (this.lab.dock.shows(this.curves)) this.curves.mark(time);
   }
 }

@@ -2,7 +2,7 @@
 // block at each that slides.
 
 const ROD = 0.014, DRUM = 0.036; // radii, shares of the arm's size
-const COLORS = ["#8fa3bf", "#d9a066", "#7fb09a", "#b58fb8", "#c9b45c", "#86b6cf", "#c98a8a"];
+const COLORS = ["#e6e2da", "#b4bac4"]; // of links in turn: dhkit/model/shapes.py
 
 // Objects of each link 0 ... n in its DH frame, and of the tool in its own.
 export function solids(kinematics, size, THREE) {
