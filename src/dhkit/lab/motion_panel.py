@@ -27,7 +27,9 @@ from dhkit.viewer.interactive import limits_state
 from dhkit.viewer.motion import exceeded_limit
 
 KINDS = ("quintic", "trapezoidal", "least-time", "line", "circle")
-GOAL_FIELDS = ("q", "T", "waypoints")
+GOAL_FIELDS = ("q", "T", "waypoints", "radius", "plane", "centre")
+PLANES = {"horizontal": (0.0, 0.0, 1.0), "xz": (0.0, 1.0, 0.0), "yz": (1.0, 0.0, 0.0)}
+"""Normals of the planes of circles, world."""
 MAX_DURATION = 600.0
 """Longest duration of a motion, s."""
 PLOT_SAMPLES = 401
@@ -40,7 +42,11 @@ MAX_FILE_LENGTH = 700_000
 SUFFIXES = (".csv", ".mat", ".npz", ".yaml", ".yml")
 SAME_STATE = 1e-9
 """Joint values that differ by less than this, rad and m, are one state."""
-CIRCLE_RADIUS = 0.15
+USUAL_DURATION = 2.0
+"""Duration of a motion that no limit of the arm bounds, s, unless one is given."""
+CIRCLE_DURATION = 4.0
+"""That of a circle, s."""
+CIRCLE_RADIUS = 0.08
 """Radius of a circle, as a share of the arm's reach."""
 MIN_LENGTH = 1e-9
 """Distance from the base's axis, m, below which the direction to the axis is not known."""
@@ -83,7 +89,11 @@ class MotionPanel(Panel):
         if "waypoints" in goal:
             return self._plan_through_waypoints(kind, duration)
         if kind == "circle":
-            return self._start_job(kind, lambda job: _circle(arm, start, duration))
+            circles = _circles(arm, start, goal)
+            seconds = duration if duration is not None or _is_limited(arm) else CIRCLE_DURATION
+            return self._start_job(kind, lambda job: _first_circle(arm, start, circles, seconds))
+        if duration is None and not _is_limited(arm) and kind == "line":
+            duration = USUAL_DURATION
         if kind == "line":
             T = goal.pose("T") if "T" in goal else arm.fk(goal.joint_values("q", arm.n))
             call = f"arm.straight_line(arm.fk({literal(start)}), {literal(T)}, {literal(start)}, {duration!r})"
@@ -98,6 +108,8 @@ class MotionPanel(Panel):
             raise ValueError("motion.plan: the arm is there already; expected another goal")
         if kind == "least-time":
             return self._start_job("least time", lambda job: _plan_least_time(arm, start, end, [], job))
+        if duration is None and not _is_limited(arm):
+            duration = USUAL_DURATION
         make = arm.quintic if kind == "quintic" else arm.trapezoidal
         call = f"arm.{make.__name__}({literal(start)}, {literal(end)}, {duration!r})"
         self._take(kind, PlannedMotion(make(start, end, duration), call))
@@ -308,20 +320,58 @@ def _plan_least_time(arm: Arm, start: Array, goal: Array, via: list[Array], job:
     return PlannedMotion(arm.plan(start, goal, via=via, compare=False, progress=report), call)
 
 
-def _circle(arm: Arm, start: Array, duration: float | None) -> PlannedMotion:
-    """Return a full circle of the tool from joint values, shape (n,), about the world's z or, if that fails, its y."""
-    T = arm.fk(start)
-    radius = CIRCLE_RADIUS * (arm.description.reach or 1.0)
-    last_error: DhkitError | None = None
-    for axis, towards in (((0.0, 0.0, 1.0), -T[:3, 3] * [1, 1, 0]), ((0.0, 1.0, 0.0), -T[:3, 3] * [1, 0, 1])):
-        length = float(np.linalg.norm(towards))
-        if length < MIN_LENGTH:
-            continue
-        centre = T[:3, 3] + radius * towards / length
+def _is_limited(arm: Arm) -> bool:
+    """Return whether the speed or the torque of some joint is limited, so that there is a shortest duration."""
+    numbers = arm.description.numbers
+    is_fast = np.isfinite(numbers.velocity).any()
+    return bool(is_fast or (has_bodies(arm) and np.isfinite(numbers.effort).any()))
+
+
+class Circle(NamedTuple):
+    """A full circle of the tool from where it is."""
+
+    centre: Array
+    """Shape (3,), m, world."""
+    axis: tuple[float, float, float]
+    """Normal of its plane, world."""
+
+    def planned(self, arm: Arm, start: Array, duration: float | None) -> PlannedMotion:
+        """Return the motion from joint values, shape (n,), in a duration, s; the shortest if None."""
         q0 = literal(start)
-        call = f"arm.circle(arm.fk({q0}), {literal(centre)}, {axis}, q0={q0}, duration={duration!r})"
+        call = f"arm.circle(arm.fk({q0}), {literal(self.centre)}, {self.axis}, q0={q0}, duration={duration!r})"
+        return PlannedMotion(arm.circle(arm.fk(start), self.centre, self.axis, q0=start, duration=duration), call)
+
+
+def _circles(arm: Arm, start: Array, goal: Fields) -> list[Circle]:
+    """Return the circle that a request asks for, in the plane that it names or in each of several to be tried.
+
+    A circle is about a centre, or has a radius and its centre towards the normal through the world's origin.
+    """
+    position = arm.fk(start)[:3, 3]
+    planes = [goal.choice("plane", list(PLANES))] if "plane" in goal else list(PLANES)
+    radius = goal.number("radius", MIN_LENGTH, 1e3, CIRCLE_RADIUS * (arm.description.reach or 1.0))
+    circles = []
+    for plane in planes:
+        axis = np.array(PLANES[plane])
+        if "centre" in goal:
+            centre = goal.vector("centre", 3)
+            # The circle lies in the plane through the tool.
+            circles.append(Circle(centre + axis * ((position - centre) @ axis), PLANES[plane]))
+            continue
+        towards = -position + axis * (position @ axis)
+        length = float(np.linalg.norm(towards))
+        if length > MIN_LENGTH:
+            circles.append(Circle(position + radius * towards / length, PLANES[plane]))
+    if not circles:
+        raise DescriptionError("the tool stands on the normal through the origin; expected a centre, or another place")
+    return circles
+
+
+def _first_circle(arm: Arm, start: Array, circles: list[Circle], duration: float | None) -> PlannedMotion:
+    """Return the motion along the first circle that the arm can follow."""
+    for circle in circles[:-1]:
         try:
-            return PlannedMotion(arm.circle(T, centre, axis, q0=start, duration=duration), call)
-        except DhkitError as error:
-            last_error = error
-    raise last_error or DescriptionError("the tool stands on the base's axis; expected a place beside it")
+            return circle.planned(arm, start, duration)
+        except DhkitError:
+            continue
+    return circles[-1].planned(arm, start, duration)

@@ -1,7 +1,7 @@
 // Motions: planned from the state on show, taught by waypoints, or read from a file; with their curves.
 
 import { MotionCurves, exceeding } from "./curves.js";
-import { base64Of, bytes, fixed, h, save, touchingText, typed } from "./dom.js";
+import { UNITS, base64Of, bytes, fixed, h, save, touchingText, typed } from "./dom.js";
 
 const KINDS = [["quintic", "Quintic"], ["trapezoidal", "Trapezoidal"], ["least-time", "Least time"], ["line", "Straight line"], ["circle", "Circle"]];
 const LARGEST_FILE = 500000; // bytes
@@ -13,6 +13,10 @@ export class MotionPanel {
     this.goal = h("select", { "aria-label": "Goal" });
     this.duration = h("input", { type: "text", inputmode: "decimal", class: "number", "aria-label": "Duration in seconds", placeholder: "shortest", onkeydown: (event) => event.key === "Enter" && this.plan() });
     this.go = h("button", { type: "button", class: "main", onclick: () => this.plan() }, "Plan from here");
+    this.plane = h("select", { "aria-label": "Plane of the circle" }, [["", "any"], ["horizontal", "horizontal"], ["xz", "x and z"], ["yz", "y and z"]].map(([value, text]) => h("option", { value }, text)));
+    this.radius = h("input", { type: "text", inputmode: "decimal", class: "number", "aria-label": "Radius of the circle", placeholder: "usual" });
+    this.centre = h("input", { type: "text", class: "centre", "aria-label": "Centre of the circle, three numbers", placeholder: "towards the base" });
+    this.circle = h("div", { class: "line", hidden: true }, h("label", {}, "plane ", this.plane), h("label", {}, "radius ", this.radius), h("label", {}, "or centre ", this.centre));
     this.job = h("p", { class: "note", role: "status" });
     this.cancel = h("button", { type: "button", hidden: true, onclick: async () => { await lab.ask("motion.cancel"); this.job.textContent = "cancelled"; } }, "Cancel");
     this.facts = h("p", { class: "facts" });
@@ -25,6 +29,7 @@ export class MotionPanel {
     this.files = h("div", { class: "buttons", hidden: true }, this.replay, download("csv"), download("npz"), h("button", { type: "button", onclick: () => lab.ask("motion.clear") }, "Remove"));
     root.append(
       h("div", { class: "line" }, this.kind, h("label", { class: "goal" }, "to ", this.goal)),
+      this.circle,
       h("div", { class: "line" }, h("label", {}, "in ", this.duration, " s"), this.go, this.cancel),
       this.job,
       this.facts,
@@ -66,7 +71,8 @@ export class MotionPanel {
     const through = [...this.goal.options].find((option) => option.value === "waypoints");
     if (through) through.disabled = !["quintic", "least-time"].includes(this.kind.value);
     if (through?.disabled && this.goal.value === "waypoints") this.goal.value = this.goal.options[0].value;
-    this.goal.disabled = this.kind.value === "circle";
+    this.circle.hidden = this.kind.value !== "circle";
+    this.goal.closest("label").hidden = !this.circle.hidden;
     this.duration.disabled = this.kind.value === "least-time";
   }
 
@@ -80,11 +86,23 @@ export class MotionPanel {
 
   chosen() {
     const value = this.goal.value;
-    if (this.kind.value === "circle") return {};
+    if (this.kind.value === "circle") return this.chosenCircle();
     if (value === "waypoints") return { waypoints: true };
     if (value === "target") return this.kind.value === "line" ? { T: this.target.T } : { q: this.target.branches.find((branch) => branch.chosen).q };
     if (value.startsWith("waypoint ")) return { q: this.waypoints[Number(value.slice(9))].q };
     return { q: this.arm.named[value.slice(6)] };
+  }
+
+  // Lengths are in the unit of the page; null where one is not a number.
+  chosenCircle() {
+    const { scale } = UNITS[this.lab.units.length], { plane, radius, centre } = this, circle = plane.value ? { plane: plane.value } : {};
+    const numbers = centre.value.trim().split(/[\s;]+/).filter(Boolean).map(typed), r = radius.value.trim() === "" ? null : typed(radius.value);
+    if (numbers.length) {
+      if (numbers.length !== 3 || numbers.includes(null)) return void this.lab.complain(`centre ${centre.value.slice(0, 40)}: expected three numbers with spaces between them`);
+      return { ...circle, centre: numbers.map((x) => x / scale) };
+    }
+    if (radius.value.trim() !== "" && !(r > 0)) return void this.lab.complain(`radius ${radius.value.slice(0, 40)}: expected a positive number`);
+    return r === null ? circle : { ...circle, radius: r / scale };
   }
 
   async teach() {
