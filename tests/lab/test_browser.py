@@ -402,7 +402,7 @@ def test_the_four_transforms_of_a_row_are_animated(visit):
 def plots(page, name):
     """Return how many plots of a panel have a picture with curves."""
     return page.evaluate(
-        f"[...document.querySelectorAll('#dock .plot canvas')].filter(c => c.offsetWidth > 100 &&"
+        "[...document.querySelectorAll('#dock .plot canvas')].filter(c => c.offsetWidth > 100 &&"
         " new Set(c.getContext('2d').getImageData(0, 0, c.width, c.height).data).size > 20).length"
     )
 

@@ -9,9 +9,11 @@ import pytest
 from scipy.io import savemat
 
 from acceptance import slow_if
-from dhkit import Arm
+from dhkit import Arm, robots
+from dhkit.control.gains import effective_inertia
 from dhkit.description import from_toml, pose_parts
 from dhkit.lab.control_panel import ControlPanel
+from dhkit.lab.desk import is_singular, start_configuration
 from dhkit.lab.dynamics_panel import DynamicsPanel
 from dhkit.lab.lab import JointPanel
 from dhkit.lab.motion_panel import MotionPanel
@@ -483,3 +485,69 @@ def test_what_is_wrong_is_one_line_and_changes_nothing(open_lab):
     assert count >= 60
     assert {name: data for name, data in states(lab).items() if name != "control"} == before
     assert not states(lab)["control"]["running"]
+
+
+def test_gains_of_the_joints_are_tuned_typed_and_have_poles(open_lab):
+    lab = open_lab("planar2r")
+    lab.answer("control.change", {"controller": "pid", "bandwidth": 10.0})
+    tuned = states(lab)["control"]["gains"]
+    assert tuned["tuned"]
+    assert np.allclose(tuned["slowest"], -5.0)  # the pole of the integral, at half the bandwidth
+    kp, kd = [400.0, 100.0], [40.0, 10.0]
+    lab.answer("control.gains", {"kp": kp, "ki": [0.0, 0.0], "kd": kd})
+    typed = states(lab)["control"]["gains"]
+    assert not typed["tuned"] and typed["kp"] == kp
+    m = effective_inertia(lab.desk.arm.description)
+    poles = [np.roots([m[i], kd[i], kp[i]]).real.max() for i in range(2)]
+    assert np.allclose(typed["slowest"], poles)
+    lab.answer("control.start", {"reference": "sine"})
+    assert np.array_equal(lab._control._live.controller.kp, kp)
+    lab.answer("control.gains", {"kp": [500.0, 100.0], "ki": [0.0, 0.0], "kd": kd})
+    assert np.array_equal(lab._control._live.controller.kp, [500.0, 100.0])
+    lab.answer("control.stop", {})
+    lab.answer("control.change", {"bandwidth": 12.0})
+    assert states(lab)["control"]["gains"]["tuned"]
+    for bad in ({"kp": [-1.0, 1.0], "ki": kd, "kd": kd}, {"kp": [1.0], "ki": kd, "kd": kd}):
+        with pytest.raises(ValueError, match=r"control\.gains"):
+            lab.answer("control.gains", bad)
+    lab.answer("control.change", {"controller": "computed-torque"})
+    assert states(lab)["control"]["gains"] is None
+    with pytest.raises(ValueError, match="expected PID or PD"):
+        lab.answer("control.gains", {"kp": kp, "ki": kd, "kd": kd})
+
+
+@pytest.mark.parametrize(("plane", "axis"), [("horizontal", 2), ("xz", 1)])
+def test_a_circle_has_the_plane_and_the_radius_that_are_asked_for(open_lab, plane, axis):
+    lab = open_lab("puma560")
+    lab.answer("motion.plan", {"kind": "circle", "goal": {"plane": plane, "radius": 0.05}, "duration": 3.0})
+    wait_for(lambda: lab._motions.motion)
+    motion = lab._motions.motion
+    tool = lab.desk.arm.fk(motion.q(np.linspace(0, motion.duration, 60)))[:, :3, 3]
+    assert np.ptp(tool[:, axis]) < 1e-6
+    assert np.abs(np.linalg.norm(tool - (tool.max(axis=0) + tool.min(axis=0)) / 2, axis=1) - 0.05).max() < 1e-4
+
+
+def test_a_circle_has_the_centre_that_is_asked_for(open_lab):
+    lab = open_lab("puma560")
+    position = lab.desk.arm.fk(lab.desk.q)[:3, 3]
+    centre = position + np.array([-0.06, 0.02, 0.3])  # the plane is that of the tool
+    lab.answer("motion.plan", {"kind": "circle", "goal": {"plane": "horizontal", "centre": centre.tolist()}})
+    wait_for(lambda: lab._motions.motion)
+    motion = lab._motions.motion
+    tool = lab.desk.arm.fk(motion.q(np.linspace(0, motion.duration, 60)))[:, :3, 3]
+    assert np.abs(np.linalg.norm(tool[:, :2] - centre[:2], axis=1) - np.hypot(0.06, 0.02)).max() < 1e-6
+
+
+def test_a_motion_without_limits_gets_a_duration(open_lab):
+    lab = open_lab(Arm.from_dh([(0, 0, 0.5, 0), (0, 0, 0.4, 0)]))
+    for kind in ("quintic", "trapezoidal"):
+        lab.answer("motion.plan", {"kind": kind, "goal": {"q": [1.0, 0.5]}})
+        assert lab._motions.motion.duration > 0
+
+
+@pytest.mark.parametrize("name", robots())
+def test_every_arm_begins_at_a_regular_configuration(name):
+    arm = Arm.load(name)
+    q = start_configuration(arm)
+    assert not is_singular(arm, q)
+    assert np.all(q >= arm.description.numbers.lower) and np.all(q <= arm.description.numbers.upper)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from dhkit import Arm
 from dhkit.description import library_robot
 from dhkit.errors import PlanningError
 from dhkit.trajectories import Limits, cubic, least_slowdown, quintic, trapezoidal
@@ -112,3 +113,11 @@ def test_overshooting_a_joint_limit_is_named():
 def test_what_cannot_be_is_named(call, complaint):
     with pytest.raises(ValueError, match=complaint):
         call()
+
+
+def test_a_trapezoid_that_nothing_limits_has_a_usual_blend():
+    arm = Arm.from_dh([(0, 0, 0.5, 0), (0, 0, 0.4, 0)])
+    motion = arm.trapezoidal([0, 0], [1.0, 0.5], 2.0)
+    assert np.allclose(motion.breaks, [0, 0.5, 1.5, 2.0])
+    with pytest.raises(PlanningError, match="nothing limits"):
+        arm.trapezoidal([0, 0], [1.0, 0.5])

@@ -41,7 +41,7 @@ MAX_EXPRESSION_LENGTH = 200
 """Longest number that is written as an expression, characters."""
 MAX_NUMBER = 1e4
 """Largest number, rad or m."""
-PANEL_ENTRY = re.compile(r'^ +\["(\w+)", ', re.MULTILINE)
+PANEL_ENTRY = re.compile(r'^ {4}\["(\w+)", ', re.MULTILINE)
 DIRECTION_CONTROLS = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 """Characters that change the direction of the text after them, and so the text that a reader sees."""
 

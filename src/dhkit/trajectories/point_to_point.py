@@ -6,12 +6,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, takes_robot
+from dhkit.errors import PlanningError
 from dhkit.trajectories.interpolation import cubic_hermite, quintic_hermite
 from dhkit.trajectories.limits import Limits
 from dhkit.trajectories.slowdown import Torques, least_slowdowns, require_inside
 from dhkit.trajectories.timing import check_duration, configuration, default_limits, timed
 from dhkit.trajectories.trajectory import Trajectory
 
+_USUAL_BLEND = 0.25
+"""Blend, as a share of the duration, of a motion that nothing limits."""
 _MIN_BLEND = 0.01
 """Smallest share of the duration for a blend: accelerations grow without bound as it goes to 0."""
 _GRID = 50
@@ -130,7 +133,7 @@ def trapezoidal(
         As for :func:`cubic`.
     blend
         Share of the duration for accelerating, and again for braking, in (0, 0.5]; None for the one with the shortest
-        duration that the limits allow.
+        duration that the limits allow, and for 0.25 where nothing limits a motion whose duration is given.
 
     Raises
     ------
@@ -155,7 +158,7 @@ def trapezoidal(
     if blend is None:
         bounds = limits or default_limits(description)
         require_inside(_blended(description, start, goal, 0.5), bounds)
-        blend = _best_blend(description, start, goal, bounds, torques) if (start != goal).any() else 0.5
+        blend = _chosen_blend(description, start, goal, bounds, torques, duration)
     return timed(_blended(description, start, goal, blend), duration, limits, torques)
 
 
@@ -178,6 +181,25 @@ def _blended(description: Description, q0: Array, q1: Array, blend: float) -> Tr
     if blend == 0.5:
         return Trajectory(description, np.array([0.0, 0.5, 1.0]), np.stack([speed_up, brake]))
     return Trajectory(description, np.array([0.0, blend, 1 - blend, 1.0]), np.stack([speed_up, cruise, brake]))
+
+
+def _chosen_blend(
+    description: Description,
+    q0: Array,
+    q1: Array,
+    limits: Limits,
+    torques: Torques | None,
+    duration: float | None,
+) -> float:
+    """Return the best blend, and a usual one where there is no best."""
+    if not (q0 != q1).any():
+        return 0.5
+    try:
+        return _best_blend(description, q0, q1, limits, torques)
+    except PlanningError:  # nothing limits the motion
+        if duration is None:
+            raise
+        return _USUAL_BLEND
 
 
 def _best_blend(description: Description, q0: Array, q1: Array, limits: Limits, torques: Torques | None) -> float:

@@ -14,8 +14,23 @@ import { WorkspacePanel } from "./workspace.js";
 
 // In groups: to move the arm, its model, its simulation, and to learn.
 export const PANELS = [
-  [["joints", "Joints", JointPanel], ["tool", "Tool", ToolPanel], ["motion", "Motion", MotionPanel]],
-  [["table", "DH table", TablePanel], ["dynamics", "Dynamics", DynamicsPanel], ["workspace", "Workspace", WorkspacePanel]],
-  [["control", "Control", ControlPanel]],
-  [["task", "Task", TaskPanel], ["transforms", "Transforms", TransformsPanel], ["submit", "Answers", SubmitPanel], ["own", "My code", OwnPanel]],
+  [
+    ["joints", "Joints", JointPanel],
+    ["tool", "Tool", ToolPanel],
+    ["motion", "Motion", MotionPanel],
+  ],
+  [
+    ["table", "DH table", TablePanel],
+    ["dynamics", "Dynamics", DynamicsPanel],
+    ["workspace", "Workspace", WorkspacePanel],
+  ],
+  [
+    ["control", "Control", ControlPanel],
+  ],
+  [
+    ["task", "Task", TaskPanel],
+    ["transforms", "Transforms", TransformsPanel],
+    ["submit", "Answers", SubmitPanel],
+    ["own", "My code", OwnPanel],
+  ],
 ];

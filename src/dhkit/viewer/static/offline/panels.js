@@ -7,7 +7,15 @@ import { AboutPanel } from "./about.js";
 import { RecordedPanel } from "./recorded.js";
 
 export const PANELS = [
-  [["about", "About", AboutPanel]],
-  [["joints", "Joints", JointPanel], ["tool", "Tool", ToolPanel], ["recorded", "Motions", RecordedPanel]],
-  [["table", "DH table", TablePanel]],
+  [
+    ["about", "About", AboutPanel],
+  ],
+  [
+    ["joints", "Joints", JointPanel],
+    ["tool", "Tool", ToolPanel],
+    ["recorded", "Motions", RecordedPanel],
+  ],
+  [
+    ["table", "DH table", TablePanel],
+  ],
 ];
