@@ -94,8 +94,8 @@ def lock(description: Description, joints: Mapping[int | str, Quantity]) -> Desc
 
     Every remaining joint keeps its zero, limits and drive; configurations lose the locked entries. The drives of
     locked joints are removed, and their couplings: a rotor that also turns with another joint is part of that joint's
-    link (:class:`dhkit.description.values.Coupling`). If a link has no body, the joined link has none either; a base
-    without a body takes that of the link joined to it.
+    link (:class:`dhkit.description.values.Coupling`). If a link has no body, the joined link has none either; but the
+    base, which does not move, has those bodies of the links joined to it that there are.
 
     Lengths and masses that are parameters stay parameters. Parameters that determine angles of the locked rows are
     replaced by their numbers, everywhere in the arm, since the new row's form depends on them; all parameters are,
@@ -128,7 +128,8 @@ def lock(description: Description, joints: Mapping[int | str, Quantity]) -> Desc
     except ExpressionError:
         log.debug("%s: the budget of exact arithmetic is spent", description.name)
     except DescriptionError as error:
-        # The check of the new description may have exhausted the same budget; a real fault is raised again below.
+        # The check of the new description may have spent the reading budget, which it reports so; a real fault is
+        # raised again below.
         log.debug("%s: %s", description.name, error)
     names = names_in((description.base, description.joints, description.tool)) | names_in(tuple(locked.values()))
     log.info("%s: locked as numbers, since %s would make long expressions", description.name, ", ".join(sorted(names)))
@@ -337,13 +338,13 @@ def _common_normal(Y: ExactPose, values: Mapping[str, Expression]) -> _Row:
 
 
 def _parallel_axes_row(Y: ExactPose, is_opposite: bool) -> _Row:
-    """Return the row of axes in equal or opposite directions, by the normal through the origin of the first frame.
+    """Return the row of axes in equal or opposite directions, by the normal through the origin of the second frame.
 
     The angle between them is taken to be exactly 0 or pi, which moves a point 1 m away by up to 1e-10 m.
     """
-    # delta = 0 and epsilon = z. The normal points to (x, y): a (cos(beta), sin(beta)) = (x, y), with a = x or a = y,
-    # of either sign, along an axis of the frame. Y rotates x by beta + gamma if the axes point alike, by beta - gamma
-    # if they are opposite.
+    # delta = 0 and epsilon = z. The normal points to (x, y): a (cos(beta), sin(beta)) = (x, y). If x or y is 0, beta is
+    # pi/2 or 0, and a, of either sign, is the other one. Y rotates x by beta + gamma if the axes point alike, by
+    # beta - gamma if they are opposite.
     x, y, z = Y[:3, 3]
     turn = arc_tangent(Y[1, 0], Y[0, 0])
     if y.is_zero:

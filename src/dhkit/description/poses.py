@@ -71,9 +71,9 @@ def pose(
 def pose_parts(T: ArrayLike, *, order: str = "XYZ", degrees: bool = False) -> tuple[Array, Array]:
     """Return position and Euler angles of a pose.
 
-    Where the first and third axis coincide (gimbal lock), only the sum or difference of their angles is determined: the
-    third angle is then 0, and for an order in small letters the first. Angles come from arc tangents alone, which keep
-    full precision near gimbal lock.
+    Where the first and third axis coincide exactly (gimbal lock), only the sum or difference of their angles is
+    determined: the third angle is then 0, and for an order in small letters the first. Angles come from arc tangents
+    alone, which keep full precision near gimbal lock.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def one_pose(T: ArrayLike, name: str = "T") -> Array:
 
 
 def inverse_pose(T: Array) -> Array:
-    """Return the inverse of a rigid transform (R, p), T (4, 4), m, shape (4, 4): (R^T, -R^T p)."""
+    """Return the inverse of one rigid transform (R, p), T (4, 4), m, shape (4, 4): (R^T, -R^T p)."""
     inverse = np.eye(4)
     inverse[:3, :3] = T[:3, :3].T
     inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
@@ -172,7 +172,10 @@ def _array(name: str, value: ArrayLike, size: int) -> Array:
 
 
 def _axes(order: str) -> tuple[tuple[int, int, int], bool]:
-    """Return the indices i, j, k of R = R_i R_j R_k, x = 0, and whether the order is extrinsic (about fixed axes)."""
+    """Return the indices i, j, k (0 for x) of R = R_i R_j R_k, and whether the order is extrinsic (about fixed axes).
+
+    Rotations about fixed axes are multiplied in the reverse order of their letters.
+    """
     upper = order.upper()
     intrinsic = order == upper
     extrinsic = order == order.lower()

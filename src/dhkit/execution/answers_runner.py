@@ -4,8 +4,9 @@ This file is executed by its path in a process of its own, and imports nothing o
 descriptor 3, answers lines of JSON on descriptor 4. What is answered is text that dhkit reads like any answer: a file
 which changes sympy, numpy or this program only changes its own answer.
 
-The first line is ``{"functions": [...], "names": {name: line}}``, or ``{"error": text, "line": number}`` where the file
-failed. Each request has an ``id``, which its answer repeats; blank lines are skipped. Requests and their answers are
+The first answer is ``{"functions": [...], "names": {name: line}}``, or ``{"error": text, "line": number}`` where the
+file failed. Each request has an ``id``, which its answer repeats; blank lines are skipped. Requests and their answers
+are
 
 - ``{"value": name}``: the value of a name, ``{"tree": value, "definitions": {name: text}}``;
 - ``{"call": name, "arguments": {...}, "as": kind, "locals": [name, ...]}``: a function's result for symbols, and the
@@ -16,7 +17,9 @@ failed. Each request has an ``id``, which its answer repeats; blank lines are sk
   the local variable of this name; ``{"values": [...]}``: numbers, null where they are not finite.
 
 Symbolic values are text, lists of it, or objects ``{"fields": {...}}``; ``{"error": text}`` stands for a value that is
-not an answer. ``{"imported": ["dhkit"]}`` is a line of its own.
+not an answer. ``{"imported": ["dhkit"]}`` is a line of its own, which may come at any time. Arguments are passed by
+position, in the order of the object. The process's ``math``, ``numpy``, ``sympy`` and ``casadi`` are changed so that
+they calculate with symbols.
 
 Arguments: the folder of the packages that the file may import, empty where it may import all; the file.
 """
@@ -198,7 +201,8 @@ class Symbolic:
     def _holding_symbols(self, make: Callable[..., Any]) -> Callable[..., Any]:
         def made(*arguments: Any, **keywords: Any) -> Any:
             array = make(*arguments, **keywords)
-            has_type = "dtype" in keywords
+            # eye has the type as its fourth argument, the others as their second.
+            has_type = "dtype" in keywords or len(arguments) > (3 if make.__name__ == "eye" else 1)
             if not self.is_on or has_type or array.dtype.kind != "f":
                 return array
             if make.__name__ == "empty":
@@ -509,7 +513,7 @@ class Writer:
 
 
 def used_counts(root: Any) -> dict[int, int]:
-    """Return of how many operations each node of a CasADi expression is an operand; x*x counts twice."""
+    """Return how often each node of a CasADi expression occurs as an operand: x of x*x twice."""
     counts: dict[int, int] = {}
     waiting = [root]
     seen = set[int]()

@@ -1,8 +1,8 @@
 """Six joints of which 2, 3 and 4 are parallel, 1 and 5 perpendicular to them, and 5 and 6 meet at right angles.
 
-This is the Universal Robots family. The point where axes 5 and 6 meet and the direction of axis 6 give joints 1, 5 and
-6 and the rotation of link 4, which places axis 4; joints 2 and 3 then are two links in a plane (Hawkins, Analytic
-inverse kinematics for the Universal Robots UR-5/UR-10 arms, 2013).
+This is the Universal Robots family. The point where axes 5 and 6 meet gives joint 1, the direction of axis 6 gives
+joint 5 and the rotation of link 4, which places axis 4, and the tool's other directions give joint 6; joints 2 and 3
+then are two links in a plane (Hawkins, Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms, 2013).
 """
 
 from __future__ import annotations
@@ -98,8 +98,9 @@ def _wrists(
 ) -> tuple[tuple[Branch, Branch], tuple[Branch, Branch]]:
     """Return upper and lower elbow of the wrist without flip (joint 5 turned to its positive side), and with it.
 
-    Link 4 has rotated by rho = q2 + sense3 q3 + sense4 q4 about v since zero. In coordinates across v and along it, the
-    direction of axis 6 is a = (S cos(rho), S sin(rho), C) with S = sin(q5 + const), so that, up to the flip,
+    Link 4 has rotated by rho = q2 + sense3 q3 + sense4 q4 about v since zero, where a sense is +1 or -1 as an axis has
+    the direction of axis 2 or the opposite one. In coordinates across v and along it, the direction of axis 6 is
+    a = (S cos(rho), S sin(rho), C), S and C the sine and cosine of q5 + const, so that, up to the flip,
 
         rho = arg(a_1 + i a_2), or that plus pi.
     """
@@ -124,7 +125,7 @@ def _wrists(
 
 
 def _within_reach(p: Mapping[str, SX], position: Vector, rho: Pair, swing: SX, pose: PoseSymbols) -> Pair:
-    """Return rho, or the nearest one for which axis 4 is within reach of the two links.
+    """Return rho, or the nearest one for which axis 4 is in reach of the two links, if that hardly rotates the tool.
 
     Near the wrist's singularity rho is ill determined: changing it rotates the tool only ``swing`` times as much. The
     wrist with a flip has rho + pi. Rho is changed for the wrist that is out of reach; if both are, for the one that

@@ -61,8 +61,8 @@ MIN_COST_SCALE = 1e-9
 def leg_durations(arm: LoadedArm, limits: Limits, points: Array) -> Array:
     """Return estimates of the durations of legs between configurations, from rest to rest, shape (legs,), s.
 
-    Each is the least duration of a cubic, with the torques that gravity leaves at each state; 0 without limits. Torques
-    that are linear in the rates (friction) are left out.
+    Each is the least duration of a cubic, with the torques that gravity leaves in SAMPLES states; 0 without limits.
+    Torques that are linear in the rates (friction) are left out.
     """
     return np.array([_leg(arm, limits, a, b) for a, b in pairwise(points)])
 
@@ -223,7 +223,7 @@ class MotionProgram(OptimizationProgram[Knots]):
         return durations
 
     def _slowness(self, task: Task, durations: Array) -> float:
-        """Return the factor by which the constraints, which may be tighter than the limits, slow it down."""
+        """Return the factor of the durations that the constraints ask of the straight path."""
         c = task.checker.slow_down(task.checker.states(straight_motion(task, durations)))
         return c if np.isfinite(c) else 1.0
 
@@ -344,9 +344,9 @@ def curves_for(n: int, objective: Objective, *, jerk_counts: bool, friction: boo
 
     Torques of time-optimal motions jump, and so do those of least energy without losses in windings and, with friction,
     those of a joint that reverses. Constant accelerations need twice as many intervals as linear ones, but are solved
-    faster for arms of many joints. Smooth objectives come nearest to their optimum with quadratic accelerations. These
-    exceed limits between knots where torques nearly jump, as they do in motions of little more than the least time; the
-    second curve is for those.
+    faster for arms of many joints. Smooth objectives come nearest to their optimum with quadratic accelerations.
+    Quadratic accelerations exceed limits between knots where torques nearly jump, as they do in motions of little more
+    than the least time; for such motions the second curve is tried.
     """
     if objective.has_time:
         if jerk_counts:

@@ -34,7 +34,8 @@ class Constants:
     found: dict[str, Constant] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     _units: dict[Monomial, Fraction] = field(default_factory=dict)
-    """The common unit of the multiples of each monomial in angles (pi, or a parameter); see :func:`_common_angles`."""
+    """The common unit of the multiples of each monomial in angles, such as pi, a parameter or 1 (rad); see
+    :func:`_common_angles`."""
 
     @classmethod
     def of(cls, expressions: Iterable[Expression], angles: Iterable[Expression]) -> Constants:
@@ -80,7 +81,7 @@ class Constants:
         """Add the constants of which the cosine and the sine of an angle are polynomials, term by term of the angle."""
         for monomial, coefficient in angle.terms:
             if is_exact(monomial, coefficient):
-                # A multiple of 15 degrees: only square roots.
+                # A multiple of 15 degrees, whose monomial is pi: only square roots.
                 self._scan(cos(PI * coefficient))
                 self._scan(sin(PI * coefficient))
                 continue
@@ -110,7 +111,9 @@ class Constants:
 def value_of(constant: Constant, values: Mapping[str, Expression]) -> float:
     """Return the value of a constant for given parameters; NaN where it has none: 1/0, a root of a negative number."""
     try:
-        return float(substitute(constant.meaning or Expression.symbol(constant.text), values))
+        # A constant without a meaning is a parameter.
+        meaning = Expression.symbol(constant.text) if constant.meaning is None else constant.meaning
+        return float(substitute(meaning, values))
     except ExpressionError:
         return math.nan
 

@@ -1063,3 +1063,15 @@ def test_a_name_of_a_command_of_matlab_may_be_assigned(tmp_path):
 def test_a_third_derivative_is_not_an_acceleration(tmp_path):
     report = report_of(tmp_path / "answer.m", "h1 = diff(qdot1, t, 2)\n")
     assert "unreadable: h1" in str(report)
+
+
+def test_a_part_of_a_row_is_a_row(tmp_path):
+    formula = "m1*g*l1*sin(q1)/2 + m2*g*(l1*sin(q1) + l2*sin(q1 + q2)/2)"
+    text = f"v = [{formula}, 1, 2];\nw = v(1:2)*[1; 0];\nV = w(1) + 0*w(1);\n"
+    assert passing(report_of(tmp_path / "answer.m", text), "V")
+
+
+def test_a_field_in_a_handle_is_not_a_name(tmp_path):
+    """m1 of p.m1 is a field, whatever m1 is assigned afterwards."""
+    text = "p.m2 = m2;\nf = @(x) p.m2*x;\nM22 = f(l2^2/3);\nm2 = 3;\n"
+    assert "assigned after the handle" not in str(report_of(tmp_path / "answer.m", text))

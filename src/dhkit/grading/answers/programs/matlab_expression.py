@@ -66,7 +66,7 @@ class Program(Protocol):
 
 
 class MatlabExpression:
-    """Reads one expression; ``at`` is the next token, ``count`` the number of results that are assigned.
+    r"""Reads one expression; ``at`` is the next token, ``count`` the number of results that are assigned.
 
     All symbols are real, so that a conjugate transpose is a transpose.
 
@@ -75,6 +75,10 @@ class MatlabExpression:
         signed   =  (+ | -) signed  |  power
         power    =  postfix [^ [+ | -] primary {'}]
         postfix  =  primary {'}
+        primary  =  number  |  'text'  |  (sum)  |  [matrix]  |  name, name(arguments), name.field
+
+    ``.*``, ``./`` and ``.^`` stand where ``*``, ``/`` and ``^`` do. Comparisons, ``\\`` and ranges outside of an index
+    are not read.
     """
 
     def __init__(self, program: Program, tokens: Tokens, scope: Scope, count: int = 1) -> None:
@@ -260,8 +264,11 @@ class MatlabExpression:
                 j = range(n) if columns == "all" else columns
                 if isinstance(i, range) and isinstance(j, range) and i and j and i[-1] < m and j[-1] < n:
                     return matrix_of([[value.entries[(a, b)] for b in j] for a in i])
-            case Matrix(), [range() as one] if one and (value.is_flat or 1 in value.shape):
-                return matrix_of([[self.scope.scalar(self.scope.entry(value, (k,)))] for k in one])
+            case Matrix(), [range() as one] if one and (value.is_flat or 1 in value.shape):  # v(1:2)
+                entries = [self.scope.scalar(self.scope.entry(value, (k,))) for k in one]
+                # A vector that was assigned entry by entry is a row in MATLAB.
+                is_row = value.is_flat or value.shape[0] == 1
+                return matrix_of([entries] if is_row else [[entry] for entry in entries])
         raise UnreadError(f"{text_of([*inside])[:40]!r} as an index is not read")
 
     def _index_by_names(self, inside: Tokens) -> Index | None:

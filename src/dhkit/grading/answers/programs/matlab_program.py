@@ -260,7 +260,9 @@ class MatlabProgram:
         return values
 
     def applied(self, function: Function, arguments: dict[str, Value]) -> tuple[Value, Scope]:
-        """Return the result for some arguments, and the local names: ``Several`` of a function, one value of a handle.
+        """Return the result of a call, and the scope with its local names.
+
+        The result is a ``Several`` for a function, and one value for a handle.
 
         Raises
         ------
@@ -302,8 +304,10 @@ class MatlabProgram:
     def _refuse_later_names(self, function: Function) -> None:
         """Refuse a handle that reads a name which the program assigns only after it."""
         known = {*function.captured, *function.parameters, *self.own.names}
-        for token in function.definition.formula:  # empty for a function
-            if token.kind == "name" and token.text in self.bound and token.text not in known:
+        formula = function.definition.formula  # empty for a function
+        for k, token in enumerate(formula):
+            is_field = k > 0 and formula[k - 1].text == "."
+            if token.kind == "name" and not is_field and token.text in self.bound and token.text not in known:
                 raise UnreadError(
                     f"{token.text} is assigned after the handle of {function.line}, which does not see it"
                 )
