@@ -54,7 +54,7 @@ def sheets(tmp_path):
 
 def test_a_person_does_a_goal_of_the_example(visit, tmp_path):
     lab, page = visit(Assignment.read(EXAMPLES[1]))
-    assert page.evaluate(TABS) == ["task", "joints", "tool", "table", "motion", "control", "transforms"]
+    assert page.evaluate(TABS) == ["task", "joints", "tool", "motion", "table", "control", "transforms"]
     assert page.evaluate("document.getElementById('panel-task').hidden") is False
     assert page.evaluate("document.querySelector('#panel-task h2').textContent") == "The PUMA simulator in four steps"
     assert page.evaluate("[...document.querySelectorAll('.tasks details')].map(d => d.open)") == [

@@ -18,7 +18,7 @@ from PIL import Image
 from acceptance import only_accepting
 from dhkit import Arm
 from dhkit.description import pose
-from dhkit.viewer.scene import first_configuration
+from dhkit.lab.desk import start_configuration
 from lab.conftest import COMPLETE
 from lab.controls import button, labelled, panel, set_joints
 from waiting import wait_for
@@ -78,7 +78,7 @@ def test_a_slider_is_dragged_and_the_number_shown_is_the_number_sent(kept_page):
     page.settle()
     shown = float(page.evaluate(f"{labelled('shoulder, value')}.value"))
     wait_for(lambda: abs(lab.desk.q[1] / DEGREE - shown) < 1e-9)
-    assert np.abs(np.delete(lab.desk.q - first_configuration(lab.desk.arm.description), 1)).max() == 0
+    assert np.abs(np.delete(lab.desk.q - start_configuration(lab.desk.arm), 1)).max() == 0
 
 
 def test_a_number_is_typed_and_a_wrong_one_is_refused(kept_page):
@@ -556,7 +556,7 @@ def test_two_tabs_show_the_same_and_a_reload_restores_it(visit, chromium):
         lab.answer("tool.jog", {"axis": 2, "step": -0.05})
         states = "JSON.stringify(['arm', 'joints', 'tool', 'target', 'table', 'waypoints', 'control'].map(n => dhkit.lab.state[n]))"
         for tab in (page, other):
-            tab.until("dhkit.lab.state.target")
+            tab.until("dhkit.lab.state.target && dhkit.lab.state.joints.nearest")
         wait_for(lambda: page.evaluate(states) == other.evaluate(states))
         before = page.evaluate(states)
         enter_again(page, lab)

@@ -207,6 +207,7 @@ def test_a_target_out_of_reach_stays_in_the_fields_until_it_is_in_reach(kept_pag
 
 def test_what_is_said_of_a_target_is_not_said_of_another_state(open_page):
     lab, page = open_page("stanford")
+    lab.answer("joints.named", {"name": "ready"})
     panel(page, "tool")
     page.click(button("Move the tool by a target"))
     page.until("dhkit.lab.state.target?.reached")

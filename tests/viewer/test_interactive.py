@@ -249,7 +249,9 @@ def button(text):
 
 
 def tab(page, name):
-    page.click(f"document.getElementById('tab-{name}')")
+    # A click on the panel that is open hides it.
+    if page.evaluate(f"document.getElementById('tab-{name}').getAttribute('aria-selected')") != "true":
+        page.click(f"document.getElementById('tab-{name}')")
 
 
 def write(page, label, text):

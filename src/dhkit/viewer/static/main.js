@@ -233,7 +233,7 @@ function keepsKey({ target, key }) {
 // What panels cover, px; on a phone the read-out opens over the arm.
 function insets() {
   const right = 12, top = 60, bottom = element("player").hidden ? 14 : 66;
-  const readout = element("card") ?? element("readout"), beside = readout.open && !readout.hidden && innerWidth > 767;
+  const readout = element("card") ?? element("readout"), beside = readout.open && !readout.hidden && innerWidth > (readout.id === "card" ? 1100 : 560);
   const { left } = element("stage").getBoundingClientRect();
   return { left: beside ? readout.getBoundingClientRect().right - left : 12, top, right, bottom };
 }

@@ -6,6 +6,7 @@ import { UNITS, beyond, fixed, h, touchingText } from "./dom.js";
 import { remember, remembered } from "./memory.js";
 
 const AXES = ["x", "y", "z"];
+const WIDE = 1100; // px of a page that has room for the card
 const PRIMES = ["", "\u2032", "\u2033"]; // of axes that have moved once and twice
 
 export class StatusCard {
@@ -20,7 +21,7 @@ export class StatusCard {
     const cell = (k) => [h("span", {}, AXES[k]), this.position[k], this.axes[k], this.angles[k]];
     this.remarks = h("ul", { class: "remarks", role: "status" });
     this.root = h(
-      "details", { id: "card", open: remembered("card", innerWidth > 767 ? "open" : "") === "open", "aria-label": "State of the arm" },
+      "details", { id: "card", open: remembered("card", innerWidth > WIDE ? "open" : "") === "open", "aria-label": "State of the arm" },
       h("summary", {}, this.title, this.alarm),
       h("table", {}, h("caption", {}, "Joints"), this.joints),
       h("h2", {}, "Tool"),

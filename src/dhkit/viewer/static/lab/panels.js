@@ -12,8 +12,11 @@ import { ToolPanel } from "./tool.js";
 import { TransformsPanel } from "./transforms.js";
 import { WorkspacePanel } from "./workspace.js";
 
-// In groups: to move the arm, its model, its simulation, and to learn.
+// In groups: an assignment, to move the arm, its model, its simulation, and to learn.
 export const PANELS = [
+  [
+    ["task", "Task", TaskPanel],
+  ],
   [
     ["joints", "Joints", JointPanel],
     ["tool", "Tool", ToolPanel],
@@ -28,7 +31,6 @@ export const PANELS = [
     ["control", "Control", ControlPanel],
   ],
   [
-    ["task", "Task", TaskPanel],
     ["transforms", "Transforms", TransformsPanel],
     ["submit", "Answers", SubmitPanel],
     ["own", "My code", OwnPanel],
