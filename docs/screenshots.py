@@ -64,7 +64,7 @@ def motion(lab, page):
     switch_frames(page, "false")
     lab.answer("joints.named", {"name": "nominal"})
     lab.answer("motion.plan", {"kind": "least-time", "goal": {"q": [1.2, 0.3, -0.8, 0.5, -0.6, 1.0]}})
-    page.until(f"{STATE}.motion && !{STATE}.job", timeout=120.0)
+    page.until(f"{STATE}.motion && !{STATE}.job")
     page.evaluate("document.querySelector('#panel-motion select').value = 'least-time'")
     time.sleep(2.0)  # the player has shown the whole way, and the trace
     page.evaluate(
@@ -79,9 +79,9 @@ def control(lab, page):
     lab.answer("joints.named", {"name": "nominal"})
     settings = {"controller": "computed-torque", "bandwidth": 20.0, "payload": 2.5, "reference": "sine"}
     lab.answer("control.start", settings)
-    page.until(f"{STATE}.control.time > 4", timeout=60.0)
+    page.until(f"{STATE}.control.time > 4")
     lab.answer("control.push", {"link": None, "force": [0.0, 60.0, 0.0], "duration": 0.3})
-    page.until(f"{STATE}.control.time > 7", timeout=60.0)
+    page.until(f"{STATE}.control.time > 7")
     page.evaluate("document.querySelector('.panels').scrollTop = 470")
 
 
@@ -91,7 +91,7 @@ def dynamics(lab, page):
     lab.answer("joints.named", {"name": "nominal"})
     lab.answer("dynamics.entry", {"name": "M33"})
     lab.answer("dynamics.ellipsoid", {"on": True})
-    page.until("document.querySelector('#panel-dynamics .entry math')", timeout=60.0)
+    page.until("document.querySelector('#panel-dynamics .entry math')")
     time.sleep(0.5)
 
 
@@ -99,7 +99,7 @@ def workspace(lab, page):
     """Show a slice of what the tool reaches."""
     lab.answer("dynamics.ellipsoid", {"on": False})
     lab.answer("workspace.show", {"kind": "slice"})
-    page.until(f"{STATE}.workspace.count > 1000", timeout=60.0)
+    page.until(f"{STATE}.workspace.count > 1000")
     time.sleep(1.5)
 
 
