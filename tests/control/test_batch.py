@@ -229,7 +229,7 @@ def run(**options):
 BAD = {
     "one arm at a time": (
         {"controller": OperationalSpace.tuned(Arm.load("planar2r"))},
-        "OperationalSpace controls one arm at a time; expected another controller, or runs one by one",
+        "OperationalSpace controls one arm at a time; expected another controller, or simulate\\(\\) for each arm",
     ),
     "friction that is a step": ({"friction": Friction()}, "a batch has no stiction"),
     "something else to keep": ({"keep": "some"}, "keep is 'some'; expected one of final, errors, all"),

@@ -5,8 +5,9 @@ import pytest
 
 import dhkit
 from dhkit.description import from_dh, library_robot, robots
+from dhkit.description.poses import inverse_pose
 from dhkit.kinematics import classify, forward_kinematics, inverse_kinematics
-from dhkit.kinematics.axes import Axes, inverse_pose
+from dhkit.kinematics.axes import Axes
 from dhkit.kinematics.boundaries import boundaries
 from dhkit.kinematics.workspace import first_axis, workspace
 from random_arms import states

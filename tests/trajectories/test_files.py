@@ -153,7 +153,7 @@ BAD_VALUES = [
     ({"coefficients": np.full((1, 2, 2), np.inf)}, r"coefficients has inf"),
     ({"content": None}, r"no content in it"),
     ({}, r"its numbers differ from those that were written; the file is damaged"),
-    ({"payload": np.ones(9)}, r"payload has shape \(9,\); expected \(10,\)"),
+    ({"payload": np.ones(9)}, r"payload: numbers has shape \(9,\); expected \(10,\)"),
     ({"payload": np.r_[-1.0, np.zeros(9)]}, r"payload: mass is -1 kg; expected none below 0"),
     ({"payload": np.r_[np.nan, np.zeros(9)]}, r"payload: mass is nan; expected finite numbers"),
     ({"friction": np.ones(2)}, r"friction has 2 numbers; expected its width alone"),

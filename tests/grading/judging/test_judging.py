@@ -19,7 +19,7 @@ from dhkit.grading.judging.findings import Comparison, compare
 from dhkit.grading.judging.frame_changes import Change, frame_changes, joint_changes
 from dhkit.grading.judging.inverse_branch import Branch, joint_order
 from dhkit.grading.judging.inverse_edits import ORDER, Lengths, edits
-from dhkit.grading.judging.inverse_mistakes import Search
+from dhkit.grading.judging.inverse_mistakes import MistakeSearch
 from dhkit.grading.judging.inverse_poses import Poses
 from dhkit.grading.judging.numeric import doubles
 from dhkit.grading.judging.quantities import place_of
@@ -184,7 +184,7 @@ def test_a_wrong_quadrant_is_found_and_put_right():
     wrong = right.with_tree(0, read("atan2(px, py)"))
     assert right.is_right
     assert not wrong.is_right
-    assert [found.mistake for found in Search(POLAR).explanations(wrong)] == ["atan2_arguments"]
+    assert [found.mistake for found in MistakeSearch(POLAR).explanations(wrong)] == ["atan2_arguments"]
     assert joint_order([read("q2"), read("px")]) == (1, 0)
 
 

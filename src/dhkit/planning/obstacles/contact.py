@@ -48,7 +48,7 @@ def nearest_links(description: Description, q: ArrayLike) -> NearestLinks | None
     >>> from dhkit.description import library_robot
     >>> found = nearest_links(library_robot("puma560"), [0, 0, 2.7, 0, 0, 0])
     >>> found.first.name, found.second.name
-    ('link 1', 'link 4')
+    ('link 3', 'link 5')
     """
     q = joint_vector(description, q)
     bounds = _lower_bounds(description, q)
