@@ -12,7 +12,8 @@ export class PlotDock {
     this.lab = lab;
     this.sources = []; // curves that there are, the latest first
     this.height = Number(remembered("dock-height", String(USUAL)));
-    this.open = remembered("dock", innerWidth > 720 ? "open" : "") === "open";
+    // A saved page shows the arm first.
+    this.open = remembered("dock", innerWidth > 720 && lab.can("motion.plan") ? "open" : "") === "open";
     this.grip = h("div", { class: "grip", role: "separator", "aria-orientation": "horizontal", "aria-label": "Height of the plots", tabIndex: 0 });
     this.choice = h("div", { class: "choice", role: "group", "aria-label": "Curves of" });
     this.legend = h("div", { class: "names" });
