@@ -69,8 +69,8 @@ export class PlotDock {
     this.root.classList.toggle("folded", !this.open);
     this.fold.textContent = this.open ? "Hide plots" : "Show plots";
     this.fold.setAttribute("aria-expanded", String(this.open));
-    body.classList.toggle("plotted", visible);
-    body.style.setProperty("--plots", visible ? `${this.open ? height : 42}px` : "0px");
+    body.classList.toggle("plotted", visible && this.open);
+    body.style.setProperty("--plots", visible && this.open ? `${height}px` : "0px");
     if (visible && this.open) requestAnimationFrame(() => this.shown?.resize());
   }
 

@@ -7,7 +7,7 @@ import { icon } from "./icons.js";
 import { remember, remembered } from "./memory.js";
 
 const SHORT = 6000; // ms that a message stays
-const WIDTH = 348, NARROW = 280, SCENE = 420; // px: of a panel at first, at least, and left to the scene
+const WIDTH = 348, SLIM = 322, NARROW = 280, SCENE = 420; // px: of a panel at first, on a small page, at least, and left to the scene
 const STEP = 24; // px that an arrow key moves the edge
 
 export class Lab {
@@ -45,7 +45,7 @@ export class Lab {
     document.body.prepend(h("aside", { id: "lab", "aria-label": "Lab" }, rail, this.body, this.edge));
     this.edge.addEventListener("pointerdown", (event) => this.dragEdge(event));
     this.edge.addEventListener("keydown", (event) => this.moveEdge(event));
-    this.width = Number(remembered("width", String(WIDTH)));
+    this.width = Number(remembered("width", String(innerWidth < 1000 ? SLIM : WIDTH)));
     this.folded = false;
     this.layout();
     document.getElementById("stage").after(this.card.root, this.dock.root);
