@@ -504,9 +504,12 @@ def test_gains_of_the_joints_are_tuned_typed_and_have_poles(open_lab):
     assert np.array_equal(lab._control._live.controller.kp, kp)
     lab.answer("control.gains", {"kp": [500.0, 100.0], "ki": [0.0, 0.0], "kd": kd})
     assert np.array_equal(lab._control._live.controller.kp, [500.0, 100.0])
-    lab.answer("control.stop", {})
-    lab.answer("control.change", {"bandwidth": 12.0})
+    assert "dhkit.PID([500.0, 100.0], [0.0, 0.0], [40.0, 10.0], limit=" in lab.answer("python", {})["text"]
+    lab.answer("control.change", {"bandwidth": 12.0})  # also of the controller that runs
     assert states(lab)["control"]["gains"]["tuned"]
+    assert lab._control._live.controller.kp[0] != 500.0
+    assert "dhkit.PID.tuned(arm, 12.0" in lab.answer("python", {})["text"]
+    lab.answer("control.stop", {})
     for bad in ({"kp": [-1.0, 1.0], "ki": kd, "kd": kd}, {"kp": [1.0], "ki": kd, "kd": kd}):
         with pytest.raises(ValueError, match=r"control\.gains"):
             lab.answer("control.gains", bad)

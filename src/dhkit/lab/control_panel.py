@@ -6,14 +6,14 @@ import logging
 import threading
 import time
 from dataclasses import replace
-from typing import NamedTuple
+from functools import lru_cache
 
 import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.control import CONTROLLERS, PID, Controller, FrictionCompensation, Sine, make_controller
 from dhkit.control.gains import effective_inertia
-from dhkit.description import Array
+from dhkit.description import Array, Description
 from dhkit.errors import DhkitError
 from dhkit.lab.desk import Desk, file_content, has_bodies
 from dhkit.lab.live import Live
@@ -22,8 +22,10 @@ from dhkit.lab.own_panel import OwnPanel
 from dhkit.lab.requests import Fields, JsonObject, Panel, answers
 from dhkit.lab.run_settings import (
     CONTROLLER_TITLES,
+    JOINT_CONTROLLERS,
     OWN,
     SETTING_NAMES,
+    Gains,
     ReferenceKind,
     Setpoints,
     Settings,
@@ -44,10 +46,6 @@ PUBLISH_PERIOD = 0.25
 """Time between two states of the panel while a simulation runs, s."""
 CONTROLLER_SETTINGS = ("controller", "bandwidth", "damping", "compensate")
 """Settings of which the controller is made."""
-TUNING_SETTINGS = ("controller", "bandwidth", "damping")
-"""Settings that gains are tuned by: whoever changes one has tuned gains again."""
-JOINT_CONTROLLERS = ("pid", "pd")
-"""Controllers whose gains can be typed for each joint."""
 STILL_POLE = 1e-9
 """Size of a pole, 1/s, below which it is that of an integral that is switched off."""
 MAX_PUSH_FORCE = 1e4
@@ -56,17 +54,6 @@ MAX_PUSH_DURATION = 10.0
 """Longest duration of a push, s."""
 GHOST_COLOR = (0.55, 0.6, 0.68)
 """Red, green and blue of the reference's ghost, from 0 to 1."""
-
-
-class Gains(NamedTuple):
-    """Gains of the joints' PID controllers, shape (n,) each."""
-
-    kp: Array
-    """N m/rad, of prismatic joints N/m."""
-    ki: Array
-    """N m/(rad s), N/(m s)."""
-    kd: Array
-    """N m s/rad, N s/m."""
 
 
 class ControlPanel(Panel):
@@ -91,8 +78,6 @@ class ControlPanel(Panel):
         self._paused = False
         self._speed = 1.0
         self._error: str | None = None
-        self._own_gains: Gains | None = None
-        """Gains of the joints' controllers that a person has typed; None for tuned ones."""
         desk.on_replace.append(self._forget_run)
         desk.steer = self._steer
         motions.on_change.append(self._follow_changed_motion)
@@ -156,21 +141,19 @@ class ControlPanel(Panel):
                 if "reference" in fields.data:
                     live.setpoints = self._setpoints(live, self.desk.arm)
             self.settings = settings
-            if any(getattr(settings, name) != getattr(previous, name) for name in TUNING_SETTINGS):
-                self._own_gains = None
         self.publish()
 
     @answers("control.gains", "kp", "ki", "kd")
     def set_gains(self, fields: Fields) -> None:
         """Use other gains of the joints' controllers, (n,) each, also while a simulation runs."""
         n = self.desk.arm.n
-        gains = Gains(fields.vector("kp", n), fields.vector("ki", n), fields.vector("kd", n))
-        if min(gain.min() for gain in gains) < 0:
+        gains = Gains(*(tuple(fields.vector(name, n).tolist()) for name in Gains._fields))
+        if min(map(min, gains)) < 0:
             raise ValueError("control.gains: a gain is negative; expected numbers from 0 on")
         if self.settings.controller not in JOINT_CONTROLLERS:
             raise ValueError(f"control.gains: the controller is {self.settings.controller}; expected PID or PD")
         with self._lock:
-            self._own_gains = gains
+            self.settings = replace(self.settings, gains=gains)
             if self._live is not None and self.desk.running:
                 self._live.take(self._controller(self._live))
         self.publish()
@@ -260,23 +243,17 @@ class ControlPanel(Panel):
         arm = self.desk.arm
         if self.settings.controller not in JOINT_CONTROLLERS or not has_bodies(arm):
             return None
-        m = effective_inertia(arm.description)
-        gains = self._own_gains or self._tuned_gains(arm)
+        settings = self.settings
+        m, tuned = _tuned(arm.description, settings.controller, settings.bandwidth, settings.damping)
+        gains = tuned if settings.gains is None else settings.gains
         # m s^3 + kd s^2 + kp s + ki = 0 of each joint alone, with its effective inertia m
         poles = [np.roots(row) for row in np.stack([m, gains.kd, gains.kp, gains.ki], axis=1)]
         slowest = [max(pole.real for pole in row if abs(pole) > STILL_POLE) for row in poles]
         return {
-            **{name: gain.tolist() for name, gain in gains._asdict().items()},
+            **gains._asdict(),
             "slowest": [float(pole) for pole in slowest],
-            "tuned": self._own_gains is None,
+            "tuned": settings.gains is None,
         }
-
-    def _tuned_gains(self, arm: Arm) -> Gains:
-        settings = self.settings
-        controller = make_controller(settings.controller, arm.description, settings.bandwidth, settings.damping)
-        assert isinstance(controller, PID)  # noqa: S101 - for mypy: JOINT_CONTROLLERS are PIDs
-        whole = np.ones(arm.n)
-        return Gains(whole * controller.kp, whole * controller.ki, whole * controller.kd)
 
     @property
     def locked(self) -> dict[int, float]:
@@ -376,7 +353,7 @@ class ControlPanel(Panel):
         self._end_run()
         with self._lock:
             self._live = None
-            self._own_gains = None
+            self.settings = replace(self.settings, gains=None)
             self.planar = False
             self._error = "ended: the arm was edited" if was_running else None
         self.publish()
@@ -412,8 +389,8 @@ class ControlPanel(Panel):
         controller: Controller
         if settings.controller == OWN:
             controller = self.own.controller()
-        elif settings.controller in JOINT_CONTROLLERS and self._own_gains is not None:
-            kp, ki, kd = (gain[self.free] for gain in self._own_gains)
+        elif settings.controller in JOINT_CONTROLLERS and settings.gains is not None:
+            kp, ki, kd = (np.array(gain)[self.free] for gain in settings.gains)
             controller = PID(kp, ki, kd, limit=description.numbers.effort)
         else:
             controller = make_controller(settings.controller, description, settings.bandwidth, settings.damping, live.q)
@@ -475,3 +452,12 @@ class ControlPanel(Panel):
             self.settings = replace(self.settings, reference=ReferenceKind.SLIDERS)
             live.setpoints = lambda t: (held, at_rest, at_rest)
         self.publish()
+
+
+@lru_cache(maxsize=4)
+def _tuned(description: Description, name: str, bandwidth: float, damping: float) -> tuple[Array, Gains]:
+    """Return the effective inertias of the joints, shape (n,), and the gains that a joint controller is tuned to."""
+    controller = make_controller(name, description, bandwidth, damping)
+    assert isinstance(controller, PID)  # noqa: S101 - for mypy: JOINT_CONTROLLERS are PIDs
+    gains = (np.broadcast_to(gain, description.n) for gain in (controller.kp, controller.ki, controller.kd))
+    return effective_inertia(description), Gains(*(tuple(gain.tolist()) for gain in gains))

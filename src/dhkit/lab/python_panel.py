@@ -88,6 +88,9 @@ class PythonPanel(Panel):
         if settings.controller == OWN:
             return [*lines, "# The controller is your own program's: give arm.simulate a function in its place."]
         controller = CONSTRUCTORS[settings.controller].format(w=repr(settings.bandwidth), z=repr(settings.damping))
+        if settings.gains is not None:
+            kp, ki, kd = ([gain[i] for i in self.control.free] for gain in settings.gains)
+            controller = f"dhkit.PID({kp}, {ki}, {kd}, limit=arm.description.numbers.effort)"
         if settings.compensate:
             controller = f"dhkit.FrictionCompensation({controller}, arm)"
         arguments = ["controller", literal(self.control.setpoint), "duration=5.0", "q0=q"]

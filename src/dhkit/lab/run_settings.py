@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -31,6 +31,10 @@ CONTROLLER_TITLES = {
     "adaptive": "Adaptive",
     "lqr": "LQR",
 }
+JOINT_CONTROLLERS = ("pid", "pd")
+"""Controllers whose gains can be typed for each joint."""
+TUNING_SETTINGS = ("controller", "bandwidth", "damping")
+"""Settings that gains are tuned by."""
 SINE_AMPLITUDE = 0.3
 """Range of a sine from end to end, rad and shares of the arm's reach; less where limits are near."""
 SINE_FREQUENCY = 0.25
@@ -62,6 +66,17 @@ class ReferenceKind(StrEnum):
     SLIDERS = "sliders"
 
 
+class Gains(NamedTuple):
+    """Gains of the joints' PID controllers, n numbers each."""
+
+    kp: tuple[float, ...]
+    """N m/rad, of prismatic joints N/m."""
+    ki: tuple[float, ...]
+    """N m/(rad s), N/(m s)."""
+    kd: tuple[float, ...]
+    """N m s/rad, N s/m."""
+
+
 @dataclass(frozen=True)
 class Settings:
     """Settings of a run.
@@ -80,6 +95,8 @@ class Settings:
         Whether the controller compensates friction.
     reference
         Reference that the run follows.
+    gains
+        Gains that a person has typed for PID or PD; None for those tuned by bandwidth and damping.
     """
 
     controller: str = "computed-torque"
@@ -89,16 +106,19 @@ class Settings:
     payload: float = 0.0
     compensate: bool = False
     reference: ReferenceKind = ReferenceKind.HOLD
+    gains: Gains | None = None
 
     def changed(self, given: Fields) -> Settings:
         """Return the settings with the values of a request's fields instead of their own.
+
+        Typed gains go where the controller, its bandwidth or its damping changes.
 
         Raises
         ------
         ValueError
             A value does not fit.
         """
-        return Settings(
+        settings = Settings(
             given.choice("controller", [*CONTROLLERS, OWN], self.controller),
             given.number("bandwidth", 0.1, 1000.0, self.bandwidth),
             given.number("damping", 0.01, 10.0, self.damping),
@@ -107,6 +127,8 @@ class Settings:
             given.flag("compensate", self.compensate),
             ReferenceKind(given.choice("reference", list(ReferenceKind), self.reference)),
         )
+        is_tuned_anew = any(getattr(settings, name) != getattr(self, name) for name in TUNING_SETTINGS)
+        return settings if is_tuned_anew else replace(settings, gains=self.gains)
 
     @property
     def friction_model(self) -> Friction | None:
@@ -116,7 +138,8 @@ class Settings:
         return Friction(SMOOTHING_RATE) if self.friction is FrictionKind.SMOOTH else Friction()
 
 
-SETTING_NAMES = tuple(field.name for field in fields(Settings))
+SETTING_NAMES = tuple(field.name for field in fields(Settings) if field.name != "gains")
+"""Settings that a request may change; gains have a request of their own."""
 
 
 def back_and_forth(motion: Trajectory, t: float, free: list[int]) -> tuple[Array, Array, Array]:
