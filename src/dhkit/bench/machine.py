@@ -13,7 +13,7 @@ from dhkit.kernels import kernel_mode
 
 _FLAGS = ("sse4_2", "avx", "avx2", "fma", "avx512f", "avx512dq", "avx512vl", "asimd", "sve")
 PACKAGES = (
-    "dhkit",
+    "dhkit-robotics",
     "numpy",
     "scipy",
     "llvmlite",

@@ -92,7 +92,8 @@ def solve_in_closed_form(
         if fit.ring is not None and fit.parameters["offset"]:
             # The kernel's distance is that of the nearest point in one plane: too much if the plane has an offset.
             beyond = np.flatnonzero(distance.reshape(count) > 0)
-            distance.reshape(count)[beyond] = nearest_wrist_distance(fit, poses.reshape(count, 4, 4)[beyond])
+            if beyond.size:
+                distance.reshape(count)[beyond] = nearest_wrist_distance(fit, poses.reshape(count, 4, 4)[beyond])
     return IKSolutions(
         q=q,
         valid=valid.view(np.bool_),
