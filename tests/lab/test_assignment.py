@@ -17,7 +17,7 @@ from dhkit.errors import DescriptionError
 from dhkit.execution.isolation import Isolation, Kind
 from dhkit.lab import Assignment, Lab, serve
 from dhkit.lab.assignment import JointsAt, MotionBetween, OwnScore, ToolAt, is_assignment
-from dhkit.lab.assignment_form import AssignmentForm, assignment_schema, panel_names
+from dhkit.lab.assignment_form import PANELS, AssignmentForm, assignment_schema
 from dhkit.viewer.page import page_files
 from lab.test_requests import states
 from waiting import wait_for
@@ -113,8 +113,8 @@ def test_the_documents_format_is_one(read):
 
 
 def test_panels_are_those_of_the_page():
-    assert {"joints", "tool", "table", "motion", "control", "own"} <= set(panel_names())
-    assert "task" not in panel_names() and "lab/task.js" in page_files()
+    assert {"joints", "tool", "table", "motion", "control", "own"} <= set(PANELS)
+    assert "task" not in PANELS and "lab/task.js" in page_files()
 
 
 # Files

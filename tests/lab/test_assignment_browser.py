@@ -10,7 +10,7 @@ import pytest
 
 from bad_assignments import GOOD
 from dhkit.lab import Assignment
-from dhkit.lab.assignment_form import panel_names
+from dhkit.lab.assignment_form import PANELS
 from lab.test_assignment import EXAMPLES, met
 from waiting import wait_for
 
@@ -114,7 +114,7 @@ def test_texts_are_texts_and_the_order_of_states_does_not_matter(visit, read, op
         page.evaluate(f"{told}({names})")
         assert page.evaluate(TABS) == ["task", "joints", "motion"]
     page.evaluate("dhkit.lab.take({ name: 'task', data: { ...dhkit.lab.state.task, panels: null } })")
-    assert page.evaluate(TABS) == ["task", *panel_names()]
+    assert page.evaluate(TABS) == ["task", *PANELS]
     page.evaluate("dhkit.lab.take({ name: 'task', data: null })")
-    assert page.evaluate(TABS) == [*panel_names()]
+    assert page.evaluate(TABS) == [*PANELS]
     assert page.evaluate("document.getElementById('panel-joints').hidden") is False

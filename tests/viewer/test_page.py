@@ -59,6 +59,6 @@ def test_a_missing_viewer_is_named(monkeypatch, tmp_path, spec, content, complai
 
 def test_the_page_draws_in_the_colors_of_python():
     script = (resources.files("dhkit.viewer") / "static" / "colors.js").read_text("utf-8")
-    axes, ghosts, grey = (re.findall(r'"(#[0-9a-f]{6})"', line) for line in script.splitlines() if "export" in line)
+    _, axes, ghosts, grey = (re.findall(r'"(#[0-9a-f]{6})"', part) for part in script.split("export const"))
     assert (tuple(axes), tuple(ghosts)) == (AXIS_COLORS, TINTS)
     assert (*TINTS[:6], *grey) == CURVE_COLORS

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import difflib
-import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from functools import cache
-from importlib import resources
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import (
@@ -41,16 +38,10 @@ MAX_EXPRESSION_LENGTH = 200
 """Longest number that is written as an expression, characters."""
 MAX_NUMBER = 1e4
 """Largest number, rad or m."""
-PANEL_ENTRY = re.compile(r'^ {4}\["(\w+)", ', re.MULTILINE)
+PANELS = ("joints", "tool", "motion", "table", "dynamics", "workspace", "control", "transforms", "submit", "own")
+"""Names of the lab's panels that an assignment may show, in the order in which the page lists them."""
 DIRECTION_CONTROLS = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 """Characters that change the direction of the text after them, and so the text that a reader sees."""
-
-
-@cache
-def panel_names() -> tuple[str, ...]:
-    """Return the names of the lab's panels that an assignment may show, as the page lists them."""
-    script = (resources.files("dhkit.viewer") / "static" / "lab" / "panels.js").read_text("utf-8")
-    return tuple(name for name in PANEL_ENTRY.findall(script) if name != "task")
 
 
 def _number(value: object) -> float:
@@ -94,8 +85,8 @@ def _in_one_line(text: str) -> str:
 
 
 def _panel(name: str) -> str:
-    if name not in panel_names():
-        raise PydanticCustomError("text", f"no panel {name[:40]!r}{_hint(name, panel_names())}")
+    if name not in PANELS:
+        raise PydanticCustomError("text", f"no panel {name[:40]!r}{_hint(name, PANELS)}")
     return name
 
 
@@ -117,7 +108,7 @@ JointValues: TypeAlias = Annotated[
 ]
 Line = Annotated[str, Field(max_length=MAX_LINE_LENGTH), AfterValidator(_readable), AfterValidator(_in_one_line)]
 Text = Annotated[str, Field(max_length=MAX_TEXT_LENGTH), AfterValidator(_readable)]
-Panel = Annotated[str, AfterValidator(_panel), Field(json_schema_extra=lambda s: s.update(enum=[*panel_names()]))]
+Panel = Annotated[str, AfterValidator(_panel), Field(json_schema_extra=lambda s: s.update(enum=list(PANELS)))]
 Order = Annotated[str, AfterValidator(_order), Field(json_schema_extra=lambda s: s.update(enum=[*EULER_ORDERS]))]
 Points = Annotated[float, Field(strict=True, ge=0, le=1000, allow_inf_nan=False)]
 Within = Annotated[float, Field(strict=True, gt=0, le=1, allow_inf_nan=False)]

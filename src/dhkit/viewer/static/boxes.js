@@ -10,7 +10,9 @@ export function inView(v) {
 export function corners(box) {
   const { min, max } = box;
   const points = [];
-  for (const x of [min.x, max.x]) for (const y of [min.y, max.y]) for (const z of [min.z, max.z]) points.push(new THREE.Vector3(x, y, z));
+  for (const x of [min.x, max.x])
+    for (const y of [min.y, max.y])
+      for (const z of [min.z, max.z]) points.push(new THREE.Vector3(x, y, z));
   return points;
 }
 
@@ -24,7 +26,9 @@ export function localBox(node) {
       if (!object.geometry) return;
       if (!object.geometry.boundingBox) object.geometry.computeBoundingBox();
       const own = object.geometry.boundingBox.clone();
-      box.union(own.applyMatrix4(new THREE.Matrix4().multiplyMatrices(inverse, object.matrixWorld)));
+      box.union(
+        own.applyMatrix4(new THREE.Matrix4().multiplyMatrices(inverse, object.matrixWorld)),
+      );
     });
   }
   return box;

@@ -1,7 +1,8 @@
 // The way to Python: a websocket that comes back by itself, and says when it is gone.
 
 const SILENCE = 6500; // ms without a sign of life: three beats and a little
-const FIRST_RETRY = 250, LAST_RETRY = 4000; // ms
+const FIRST_RETRY = 250,
+  LAST_RETRY = 4000; // ms
 
 export class Connection {
   // told(message): called with what comes as text; lost(): when the connection ends.

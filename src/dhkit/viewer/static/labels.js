@@ -1,6 +1,7 @@
 // Names written beside points of the scene: of frames, and of ghosts.
 
-const GAP = 9, HEIGHT = 20; // px
+const GAP = 9,
+  HEIGHT = 20; // px
 
 export class Labels {
   constructor(container) {

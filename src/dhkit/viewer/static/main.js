@@ -13,7 +13,13 @@ const STEP = 1 / 30; // s that an arrow key moves an animation
 
 class Page {
   constructor() {
-    this.stage = new Stage(element("pane"), element("labels"), element("names"), element("marks"), insets);
+    this.stage = new Stage(
+      element("pane"),
+      element("labels"),
+      element("names"),
+      element("marks"),
+      insets,
+    );
     this.readout = new Readout(element("readout"));
     this.player = new Player(element("player"), { show: (time) => this.showTime(time) });
     this.motion = null; // what is on show: {q, positions, quaternions}, for an animation with times and more
@@ -56,8 +62,13 @@ class Page {
   }
 
   async openLab() {
-    document.head.append(Object.assign(document.createElement("link"), { rel: "stylesheet", href: "lab/lab.css" }));
-    const [{ Requests }, { PANELS }] = await Promise.all([import("./lab/requests.js"), import("./lab/panels.js")]);
+    document.head.append(
+      Object.assign(document.createElement("link"), { rel: "stylesheet", href: "lab/lab.css" }),
+    );
+    const [{ Requests }, { PANELS }] = await Promise.all([
+      import("./lab/requests.js"),
+      import("./lab/panels.js"),
+    ]);
     await this.showLab(PANELS, (failed) => new Requests(this.connection, failed));
     for (const message of this.early.splice(0)) this.takePanel(message);
   }
@@ -69,8 +80,15 @@ class Page {
 
   // The panels of a page without Python, which answers itself; its style is in the page.
   async openOffline(data) {
-    const [{ OfflineDesk }, { PANELS }] = await Promise.all([import("./offline/desk.js"), import("./offline/panels.js")]);
-    await this.showLab(PANELS, (failed) => new OfflineDesk(this, data, failed), data.about.caption || data.motions.length ? "about" : "joints");
+    const [{ OfflineDesk }, { PANELS }] = await Promise.all([
+      import("./offline/desk.js"),
+      import("./offline/panels.js"),
+    ]);
+    await this.showLab(
+      PANELS,
+      (failed) => new OfflineDesk(this, data, failed),
+      data.about.caption || data.motions.length ? "about" : "joints",
+    );
     this.lab.requests.begin();
     if (parent !== window) parent.postMessage("ready", "*");
   }
@@ -84,7 +102,10 @@ class Page {
   }
 
   takeScene(message) {
-    if (message.about.panels && this.connection && !this.opening) this.opening = this.openLab().catch((error) => banner(`The panels could not be loaded: ${error.message}`));
+    if (message.about.panels && this.connection && !this.opening)
+      this.opening = this.openLab().catch((error) =>
+        banner(`The panels could not be loaded: ${error.message}`),
+      );
     this.stage.build(message);
     this.takeOverlay(() => this.stage.leaveArm());
     if (this.lab) this.stage.awaited = performance.now() + POSE_TIME;
@@ -118,9 +139,13 @@ class Page {
     this.stage.forget();
     this.takeOverlay(() => this.stage.setCompanion(motion.ghost));
     this.stage.include(motion);
-    const tool = 3 * (motion.nodes - 1), points = new Float32Array(message.flag ? 3 * motion.times.length : 0);
+    const tool = 3 * (motion.nodes - 1),
+      points = new Float32Array(message.flag ? 3 * motion.times.length : 0);
     for (let i = 0; i < points.length / 3; i++) {
-      points.set(motion.positions.subarray(3 * i * motion.nodes + tool, 3 * i * motion.nodes + tool + 3), 3 * i);
+      points.set(
+        motion.positions.subarray(3 * i * motion.nodes + tool, 3 * i * motion.nodes + tool + 3),
+        3 * i,
+      );
     }
     this.stage.setTrace(this.stage.drawn, points);
     this.stage.trail.clear();
@@ -145,7 +170,8 @@ class Page {
     const { times, q, joints, nodes, ghost } = this.motion;
     const last = times.length - 1;
     const at = (time / times[last]) * last;
-    const k = Math.min(last - 1, Math.floor(at)), share = at - k;
+    const k = Math.min(last - 1, Math.floor(at)),
+      share = at - k;
     const between = ({ positions, quaternions }) => ({
       positions: mix(positions, 3 * nodes, k, share),
       quaternions: turn(quaternions, nodes, k, share),
@@ -215,7 +241,8 @@ class Page {
     };
     addEventListener("keydown", (event) => {
       const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-      if (!act || !this.motion || event.ctrlKey || event.metaKey || event.altKey || keepsKey(event)) return;
+      if (!act || !this.motion || event.ctrlKey || event.metaKey || event.altKey || keepsKey(event))
+        return;
       event.preventDefault();
       act();
     });
@@ -232,22 +259,34 @@ function keepsKey({ target, key }) {
 
 // What panels cover, px; on a phone the read-out opens over the arm.
 function insets() {
-  const right = 12, top = 60, bottom = element("player").hidden ? 14 : 66;
-  const readout = element("card") ?? element("readout"), beside = readout.open && !readout.hidden && innerWidth > (readout.id === "card" ? 1100 : 560);
+  const right = 12,
+    top = 60,
+    bottom = element("player").hidden ? 14 : 66;
+  const readout = element("card") ?? element("readout"),
+    beside = readout.open && !readout.hidden && innerWidth > (readout.id === "card" ? 1100 : 560);
   const { left } = element("stage").getBoundingClientRect();
   return { left: beside ? readout.getBoundingClientRect().right - left : 12, top, right, bottom };
 }
 
 function mix(values, width, k, share) {
   const row = new Float32Array(width);
-  for (let i = 0; i < width; i++) row[i] = (1 - share) * values[k * width + i] + share * values[(k + 1) * width + i];
+  for (let i = 0; i < width; i++)
+    row[i] = (1 - share) * values[k * width + i] + share * values[(k + 1) * width + i];
   return row;
 }
 
 function turn(quaternions, nodes, k, share) {
   const row = new Float32Array(4 * nodes);
   for (let i = 0; i < nodes; i++) {
-    THREE.Quaternion.slerpFlat(row, 4 * i, quaternions, 4 * (k * nodes + i), quaternions, 4 * ((k + 1) * nodes + i), share);
+    THREE.Quaternion.slerpFlat(
+      row,
+      4 * i,
+      quaternions,
+      4 * (k * nodes + i),
+      quaternions,
+      4 * ((k + 1) * nodes + i),
+      share,
+    );
   }
   return row;
 }
@@ -267,7 +306,10 @@ function start() {
     for (const text of JSON.parse(inlined.textContent)) page.receive(bytes(text));
     follow(page);
     const offline = element("offline");
-    if (offline) page.openOffline(JSON.parse(offline.textContent)).catch((error) => banner(`The panels could not be loaded: ${error.message}`));
+    if (offline)
+      page
+        .openOffline(JSON.parse(offline.textContent))
+        .catch((error) => banner(`The panels could not be loaded: ${error.message}`));
     return;
   }
   const url = new URL("socket", location.href.replace(/^http/, "ws"));

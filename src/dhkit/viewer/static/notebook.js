@@ -1,12 +1,14 @@
 // A view's page in a notebook's output: it only relays what Python sends to the page in its frame.
 
 function render({ model, el }) {
-  const frame = document.createElement("iframe"), waiting = [];
+  const frame = document.createElement("iframe"),
+    waiting = [];
   let ready = false;
   frame.setAttribute("sandbox", "allow-scripts");
   frame.setAttribute("style", model.get("style"));
   frame.title = model.get("title");
-  const relay = (message) => (ready ? frame.contentWindow.postMessage(message, "*") : waiting.push(message));
+  const relay = (message) =>
+    ready ? frame.contentWindow.postMessage(message, "*") : waiting.push(message);
   const heard = ({ source, data }) => {
     if (source !== frame.contentWindow || data !== "ready") return;
     ready = true;

@@ -3,7 +3,8 @@
 import { bareCopy } from "./overlays.js";
 
 const WIDTH = 3; // px
-const ROD = 0.004, END = 0.009; // radii of the gap's rod and ends, share of the arm's size
+const ROD = 0.004,
+  END = 0.009; // radii of the gap's rod and ends, share of the arm's size
 
 export class Outlines {
   constructor(scene, THREE) {
@@ -23,7 +24,9 @@ export class Outlines {
   // colors: of each node, the name of a CSS variable, or null for none.
   set(colors, nodes) {
     this.group.clear();
-    this.links = colors.flatMap((name, node) => (name ? [{ node, copy: bareCopy(nodes[node], this.material(name), this.THREE) }] : []));
+    this.links = colors.flatMap((name, node) =>
+      name ? [{ node, copy: bareCopy(nodes[node], this.material(name), this.THREE) }] : [],
+    );
     for (const { copy } of this.links) this.group.add(copy);
     this.place(nodes);
   }
@@ -39,10 +42,14 @@ export class Outlines {
   setGap(points, size) {
     this.gap.visible = Boolean(points);
     if (!points) return;
-    const { THREE } = this, [from, to] = points.map((point) => new THREE.Vector3().fromArray(point));
-    const along = to.clone().sub(from), length = along.length(), [rod, ...ends] = this.gap.children;
+    const { THREE } = this,
+      [from, to] = points.map((point) => new THREE.Vector3().fromArray(point));
+    const along = to.clone().sub(from),
+      length = along.length(),
+      [rod, ...ends] = this.gap.children;
     rod.visible = length > 0;
-    if (length > 0) rod.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), along.divideScalar(length));
+    if (length > 0)
+      rod.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), along.divideScalar(length));
     rod.position.addVectors(from, to).multiplyScalar(0.5);
     rod.scale.set(ROD * size, length, ROD * size);
     ends.forEach((end, k) => {
@@ -53,7 +60,8 @@ export class Outlines {
 
   color() {
     const style = getComputedStyle(document.documentElement);
-    for (const [name, material] of this.materials) material.color.set(style.getPropertyValue(name).trim());
+    for (const [name, material] of this.materials)
+      material.color.set(style.getPropertyValue(name).trim());
     this.gapMaterial.color.set(style.getPropertyValue("--contact").trim());
   }
 
@@ -76,10 +84,16 @@ export class Outlines {
   }
 
   rod() {
-    const { THREE } = this, group = new THREE.Group(), look = { depthTest: false, transparent: true };
+    const { THREE } = this,
+      group = new THREE.Group(),
+      look = { depthTest: false, transparent: true };
     const material = new THREE.MeshBasicMaterial(look);
     this.gapMaterial = material;
-    for (const geometry of [new THREE.CylinderGeometry(1, 1, 1, 8), new THREE.SphereGeometry(1, 12, 8), new THREE.SphereGeometry(1, 12, 8)]) {
+    for (const geometry of [
+      new THREE.CylinderGeometry(1, 1, 1, 8),
+      new THREE.SphereGeometry(1, 12, 8),
+      new THREE.SphereGeometry(1, 12, 8),
+    ]) {
       const mesh = new THREE.Mesh(geometry, material);
       mesh.renderOrder = 8;
       group.add(mesh);

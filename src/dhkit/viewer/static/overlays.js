@@ -9,7 +9,8 @@ const NAMES = ["points", "ellipsoids", "ghosts", "companion", "obstacles"];
 const ROD = 0.0035; // radius of a skeleton's rods, share of its size
 const NONE = new Uint8Array(0);
 const SAME = 1e-4; // m and rad
-const GHOST = 0.3, BALL = 0.3; // opacities
+const GHOST = 0.3,
+  BALL = 0.3; // opacities
 
 export class Overlays {
   constructor(scene, THREE) {
@@ -22,7 +23,10 @@ export class Overlays {
   }
 
   get empty() {
-    return !this.skeletons.count && Object.values(this.layers).every((layer) => !layer.group.children.length);
+    return (
+      !this.skeletons.count &&
+      Object.values(this.layers).every((layer) => !layer.group.children.length)
+    );
   }
 
   // Take all that is shown into a box.
@@ -35,7 +39,8 @@ export class Overlays {
   }
 
   show(visible) {
-    for (const { group } of [this.skeletons, ...Object.values(this.layers)]) group.visible = visible;
+    for (const { group } of [this.skeletons, ...Object.values(this.layers)])
+      group.visible = visible;
   }
 
   color(balls, solids) {
@@ -51,14 +56,23 @@ export class Overlays {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
     geometry.setAttribute("color", new THREE.BufferAttribute(colors, 3, true));
-    const look = { size: size / Math.tan((field * Math.PI) / 360), vertexColors: true, map: this.dot, alphaTest: 0.5 };
+    const look = {
+      size: size / Math.tan((field * Math.PI) / 360),
+      vertexColors: true,
+      map: this.dot,
+      alphaTest: 0.5,
+    };
     const box = new THREE.Box3().setFromBufferAttribute(geometry.attributes.position);
-    this.layers.points.fill(points.length ? [new THREE.Points(geometry, new THREE.PointsMaterial(look))] : [], box);
+    this.layers.points.fill(
+      points.length ? [new THREE.Points(geometry, new THREE.PointsMaterial(look))] : [],
+      box,
+    );
   }
 
   setEllipsoids({ transforms }) {
     const { THREE } = this;
-    const balls = [], box = new THREE.Box3();
+    const balls = [],
+      box = new THREE.Box3();
     for (let at = 0; at < transforms.length; at += PER_TRANSFORM) {
       const ball = unitBall(this.ballColor, THREE);
       ball.matrixAutoUpdate = false;
@@ -72,7 +86,8 @@ export class Overlays {
 
   // What was drawn for an arm goes with it; obstacles stay.
   leaveArm() {
-    for (const name of ["points", "ellipsoids", "ghosts"]) this.layers[name].fill([], new this.THREE.Box3());
+    for (const name of ["points", "ellipsoids", "ghosts"])
+      this.layers[name].fill([], new this.THREE.Box3());
     this.skeletons.set(new Float32Array(), 1, NONE, 0);
     this.last = null;
   }
@@ -82,17 +97,29 @@ export class Overlays {
   setGhosts({ transforms, tints }, { nodes, boxAt, skeletons = false }) {
     const { THREE } = this;
     const { positions, quaternions } = placements(transforms, THREE);
-    const ghosts = [], box = new THREE.Box3(), count = tints.length / 3;
+    const ghosts = [],
+      box = new THREE.Box3(),
+      count = tints.length / 3;
     for (let k = 0; k < count; k++) box.union(boxAt(positions, quaternions, k));
-    const { layers: { ghosts: layer }, last } = this, key = tints.join();
-    this.skeletons.set(positions, nodes.length, skeletons ? tints : NONE, ROD * box.getSize(new THREE.Vector3()).length());
+    const {
+        layers: { ghosts: layer },
+        last,
+      } = this,
+      key = tints.join();
+    this.skeletons.set(
+      positions,
+      nodes.length,
+      skeletons ? tints : NONE,
+      ROD * box.getSize(new THREE.Vector3()).length(),
+    );
     if (skeletons) {
       this.last = null;
       return void layer.fill([], box);
     }
     if (last?.nodes === nodes && last.key === key) {
       const each = nodes.length - 1;
-      for (let k = 0; k < count; k++) place(layer.group.children.slice(k * each, (k + 1) * each), positions, quaternions, k);
+      for (let k = 0; k < count; k++)
+        place(layer.group.children.slice(k * each, (k + 1) * each), positions, quaternions, k);
       showOnce(layer.group.children, each);
       layer.box = box;
       return;
@@ -120,12 +147,14 @@ export class Overlays {
 
   setObstacles({ solids }) {
     const { THREE } = this;
-    const objects = [], box = new THREE.Box3();
+    const objects = [],
+      box = new THREE.Box3();
     for (let at = 0; at < solids.length; at += PER_SOLID) {
       const numbers = solids.subarray(at, at + PER_SOLID);
       const object = solid(numbers, this.solidColor, THREE);
       // A floor has no end that could be in view.
-      if (!isFloor(numbers)) box.union(new THREE.Box3().copy(object.geometry.boundingBox).applyMatrix4(object.matrix));
+      if (!isFloor(numbers))
+        box.union(new THREE.Box3().copy(object.geometry.boundingBox).applyMatrix4(object.matrix));
       objects.push(object);
     }
     this.layers.obstacles.fill(objects, box);
@@ -159,7 +188,12 @@ function ghostOf(nodes, [r, g, b], THREE) {
   const color = new THREE.Color(r / 255, g / 255, b / 255);
   // A ghost that is where the arm is lies behind it, and does not flicker through its surface.
   const behind = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 };
-  const material = new THREE.MeshLambertMaterial({ color, transparent: true, opacity: GHOST, ...behind });
+  const material = new THREE.MeshLambertMaterial({
+    color,
+    transparent: true,
+    opacity: GHOST,
+    ...behind,
+  });
   return nodes.slice(1).map((node) => bareCopy(node, material, THREE));
 }
 
@@ -194,12 +228,15 @@ class Skeletons {
       used++;
       return Object.assign(mesh, { geometry, material, visible: true, renderOrder: 1 });
     };
-    const at = (i) => new this.THREE.Vector3().fromArray(positions, 3 * i), up = new this.THREE.Vector3(0, 1, 0);
+    const at = (i) => new this.THREE.Vector3().fromArray(positions, 3 * i),
+      up = new this.THREE.Vector3(0, 1, 0);
     for (let k = 0; k < tints.length / 3; k++) {
       const material = this.material(tints.subarray(3 * k, 3 * k + 3));
       let from = at(k * nodes);
       for (let i = 1; i < nodes; i++) {
-        const to = at(k * nodes + i), along = to.clone().sub(from), length = along.length();
+        const to = at(k * nodes + i),
+          along = to.clone().sub(from),
+          length = along.length();
         if (length < radius) continue;
         const rod = next(this.rod, material);
         rod.position.addVectors(from, to).multiplyScalar(0.5);
@@ -217,7 +254,13 @@ class Skeletons {
 
   material([r, g, b]) {
     const key = `${r} ${g} ${b}`;
-    if (!this.materials.has(key)) this.materials.set(key, new this.THREE.MeshBasicMaterial({ color: new this.THREE.Color(r / 255, g / 255, b / 255) }));
+    if (!this.materials.has(key))
+      this.materials.set(
+        key,
+        new this.THREE.MeshBasicMaterial({
+          color: new this.THREE.Color(r / 255, g / 255, b / 255),
+        }),
+      );
     return this.materials.get(key);
   }
 }
@@ -228,7 +271,12 @@ function showOnce(copies, each) {
     copy.visible = true;
     for (let j = i % each; j < i && copy.visible; j += each) {
       const other = copies[j];
-      if (other.visible && other.position.distanceTo(copy.position) < SAME && other.quaternion.angleTo(copy.quaternion) < SAME) copy.visible = false;
+      if (
+        other.visible &&
+        other.position.distanceTo(copy.position) < SAME &&
+        other.quaternion.angleTo(copy.quaternion) < SAME
+      )
+        copy.visible = false;
     }
   });
 }
@@ -249,9 +297,14 @@ export function bareCopy(node, material, THREE) {
 // A ball of radius 1 with the circles around its axes, so that its shape is seen.
 function unitBall(color, THREE) {
   const look = { color, transparent: true, opacity: BALL, depthWrite: false };
-  const ball = new THREE.Mesh(new THREE.SphereGeometry(1, 48, 32), new THREE.MeshLambertMaterial(look));
+  const ball = new THREE.Mesh(
+    new THREE.SphereGeometry(1, 48, 32),
+    new THREE.MeshLambertMaterial(look),
+  );
   ball.renderOrder = 2;
-  const circle = new THREE.BufferGeometry().setFromPoints(new THREE.EllipseCurve(0, 0, 1, 1).getPoints(64));
+  const circle = new THREE.BufferGeometry().setFromPoints(
+    new THREE.EllipseCurve(0, 0, 1, 1).getPoints(64),
+  );
   for (const axis of ["x", "y", "z"]) {
     const line = new THREE.LineLoop(circle, new THREE.LineBasicMaterial({ color }));
     if (axis !== "z") line.rotation[axis] = Math.PI / 2;

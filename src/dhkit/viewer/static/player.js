@@ -8,7 +8,8 @@ export class Player {
     this.duration = 0;
     this.time = 0;
     this.playing = false;
-    for (const name of ["play", "time", "clock", "speed", "loop"]) this[`${name}Control`] = root.querySelector(`#${name}`);
+    for (const name of ["play", "time", "clock", "speed", "loop"])
+      this[`${name}Control`] = root.querySelector(`#${name}`);
     this.playControl.addEventListener("click", () => this.toggle());
     this.timeControl.addEventListener("input", () => {
       this.pause();

@@ -8,7 +8,8 @@ export function smoothNormals(geometry, THREE) {
   if (geometry.index || position.count > MOST) return;
   const faces = faceNormals(position, THREE);
   const around = cornersByPlace(geometry, position);
-  const normals = new Float32Array(3 * position.count), sum = new THREE.Vector3();
+  const normals = new Float32Array(3 * position.count),
+    sum = new THREE.Vector3();
   for (const corners of around.values()) {
     for (const corner of corners) {
       const own = faces[Math.floor(corner / 3)];
@@ -27,7 +28,10 @@ function faceNormals(position, THREE) {
   const at = (i) => new THREE.Vector3().fromBufferAttribute(position, i);
   const faces = [];
   for (let i = 0; i < position.count; i += 3) {
-    const a = at(i), normal = at(i + 1).sub(a).cross(at(i + 2).sub(a));
+    const a = at(i),
+      normal = at(i + 1)
+        .sub(a)
+        .cross(at(i + 2).sub(a));
     const area = normal.length();
     faces.push({ normal: normal.normalize(), area });
   }
@@ -40,7 +44,9 @@ function cornersByPlace(geometry, position) {
   const cell = 1e-5 * geometry.boundingSphere.radius || 1;
   const around = new Map();
   for (let i = 0; i < position.count; i++) {
-    const key = [position.getX(i), position.getY(i), position.getZ(i)].map((x) => Math.round(x / cell)).join();
+    const key = [position.getX(i), position.getY(i), position.getZ(i)]
+      .map((x) => Math.round(x / cell))
+      .join();
     if (around.has(key)) around.get(key).push(i);
     else around.set(key, [i]);
   }

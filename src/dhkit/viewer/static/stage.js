@@ -89,7 +89,10 @@ export class Stage {
     this.key.shadow.mapSize.set(1024, 1024);
     this.key.shadow.radius = 4;
     this.fill = new THREE.DirectionalLight(0xffffff, 0.16);
-    this.floor = new THREE.Mesh(new THREE.PlaneGeometry(1, 1), new THREE.ShadowMaterial({ opacity: 0.16, depthWrite: false }));
+    this.floor = new THREE.Mesh(
+      new THREE.PlaneGeometry(1, 1),
+      new THREE.ShadowMaterial({ opacity: 0.16, depthWrite: false }),
+    );
     this.floor.receiveShadow = true;
     this.viewer.scene.add(this.sky, this.key, this.key.target, this.fill, this.floor);
   }
@@ -99,7 +102,11 @@ export class Stage {
     this.steady = true;
     if (this.software) this.quality.save();
     // The arm of an edited table has surfaces that meshes have not: their program is compiled with the first picture.
-    const like = new THREE.MeshPhongMaterial({ shininess: 40, specular: 0x222222, side: THREE.FrontSide });
+    const like = new THREE.MeshPhongMaterial({
+      shininess: 40,
+      specular: 0x222222,
+      side: THREE.FrontSide,
+    });
     this.viewer.scene.add(new THREE.Mesh(new THREE.SphereGeometry(0, 3, 2), like));
   }
 
@@ -135,7 +142,8 @@ export class Stage {
   }
 
   resize() {
-    const width = Math.max(1, this.pane.clientWidth), height = Math.max(1, this.pane.clientHeight);
+    const width = Math.max(1, this.pane.clientWidth),
+      height = Math.max(1, this.pane.clientHeight);
     this.viewer.camera.aspect = width / height;
     this.viewer.renderer.setSize(width, height);
     this.outlines?.resize(width, height);
@@ -147,13 +155,25 @@ export class Stage {
     const { viewer } = this;
     const node = (...path) => viewer.scene_tree.find(["dhkit", ...path]).object;
     // An edited arm has the parts it had: nodes stay (meshcat hangs controls on every new one), and what is equal.
-    const paths = about.nodes.join(), stay = this.paths === paths;
-    const changed = commands.map((command, k) => k).filter((k) => !stay || !equal(commands[k], this.commands[k]));
-    const objects = stay ? changed.map((k) => about.nodes[k]).filter(Boolean).map((path) => node(...path.split("/"), "<object>")) : [node()];
+    const paths = about.nodes.join(),
+      stay = this.paths === paths;
+    const changed = commands
+      .map((command, k) => k)
+      .filter((k) => !stay || !equal(commands[k], this.commands[k]));
+    const objects = stay
+      ? changed
+          .map((k) => about.nodes[k])
+          .filter(Boolean)
+          .map((path) => node(...path.split("/"), "<object>"))
+      : [node()];
     this.keepPrograms(objects);
     if (!stay) viewer.delete_path(["dhkit"]);
     for (const k of changed) viewer.handle_command_bytearray(commands[k]);
-    for (const k of changed) if (about.nodes[k]) node(...about.nodes[k].split("/"), "<object>").traverse((object) => object.isMesh && smoothNormals(object.geometry, THREE));
+    for (const k of changed)
+      if (about.nodes[k])
+        node(...about.nodes[k].split("/"), "<object>").traverse(
+          (object) => object.isMesh && smoothNormals(object.geometry, THREE),
+        );
     [this.paths, this.commands] = [paths, commands];
     this.nodes = [];
     for (let i = 0; i <= joints; i++) this.nodes.push(node(`link${i}`));
@@ -175,7 +195,8 @@ export class Stage {
   takeParts(labels) {
     // Looked up among the children: finding a path in the tree would create it.
     this.triads = this.nodes.map((n) => n.children.find((child) => child.name === "frame"));
-    for (const triad of this.triads) triad?.traverse((o) => void ((o.renderOrder = 2), (o.castShadow = o.receiveShadow = false)));
+    for (const triad of this.triads)
+      triad?.traverse((o) => void ((o.renderOrder = 2), (o.castShadow = o.receiveShadow = false)));
     // A scene begins with its triads hidden: what a person has switched on stays on.
     for (const triad of this.triads) if (triad) triad.visible = this.framesShown;
     this.labels.set(labels);
@@ -191,7 +212,8 @@ export class Stage {
     this.parts ??= this.nodes.map((node) => [...node.children]);
     this.nodes.forEach((node, i) => {
       node.clear();
-      for (const object of objects ? [...objects[i], this.triad()] : this.parts[i]) node.add(object);
+      for (const object of objects ? [...objects[i], this.triad()] : this.parts[i])
+        node.add(object);
     });
     if (!objects) this.parts = null;
     this.takeParts(labels);
@@ -207,11 +229,12 @@ export class Stage {
   // A program whose last material goes is compiled anew for the next: the old materials go behind the next picture.
   keepPrograms(objects) {
     const spent = new THREE.Material();
-    for (const root of objects) root.traverse((object) => {
-      if (!object.material) return;
-      this.old.push(...[object.material].flat());
-      object.material = spent;
-    });
+    for (const root of objects)
+      root.traverse((object) => {
+        if (!object.material) return;
+        this.old.push(...[object.material].flat());
+        object.material = spent;
+      });
   }
 
   setUp() {
@@ -231,7 +254,12 @@ export class Stage {
     place(this.key, 0.7, -2.1, 2.6);
     place(this.fill, -2, 1, 0.5);
     const shadow = this.key.shadow.camera;
-    Object.assign(shadow, { left: -1.5 * size, right: 1.5 * size, top: 1.5 * size, bottom: -1.5 * size });
+    Object.assign(shadow, {
+      left: -1.5 * size,
+      right: 1.5 * size,
+      top: 1.5 * size,
+      bottom: -1.5 * size,
+    });
     Object.assign(shadow, { near: 0.1 * size, far: 6 * size });
     shadow.updateProjectionMatrix();
     this.key.shadow.bias = -0.0015;
@@ -268,7 +296,8 @@ export class Stage {
 
   // The box around the arm in all states of a motion, or nearly all.
   boxOf({ positions, quaternions }) {
-    const count = positions.length / (3 * this.nodes.length), whole = new THREE.Box3();
+    const count = positions.length / (3 * this.nodes.length),
+      whole = new THREE.Box3();
     const stride = Math.max(1, Math.floor(count / SAMPLES));
     for (let k = 0; k < count; k += stride) whole.union(this.boxAt(positions, quaternions, k));
     return whole.union(this.boxAt(positions, quaternions, count - 1));
@@ -292,7 +321,9 @@ export class Stage {
 
   boxAt(positions, quaternions, k) {
     const around = this.framesShown ? TRIAD * this.size : 0;
-    const whole = new THREE.Box3(), pose = new THREE.Matrix4(), one = new THREE.Vector3(1, 1, 1);
+    const whole = new THREE.Box3(),
+      pose = new THREE.Matrix4(),
+      one = new THREE.Vector3(1, 1, 1);
     this.boxes.forEach((box, i) => {
       const at = k * this.boxes.length + i;
       const position = new THREE.Vector3().fromArray(positions, 3 * at);
@@ -328,7 +359,8 @@ export class Stage {
   // Put the middle of the view into the middle of what panels leave free; return half its width and height at 1 m.
   freeField() {
     const { camera } = this.viewer;
-    const width = this.pane.clientWidth, height = this.pane.clientHeight;
+    const width = this.pane.clientWidth,
+      height = this.pane.clientHeight;
     const { left, top, right, bottom } = this.insets();
     camera.setViewOffset(width, height, (right - left) / 2, (bottom - top) / 2, width, height);
     const perPixel = (2 * Math.tan((FIELD * Math.PI) / 360)) / height;
@@ -339,7 +371,8 @@ export class Stage {
   // From where to look, z up: an arm that moves in a vertical plane from the front, others from the side and above.
   direction(box) {
     if (this.preset) return this.preset.clone();
-    if (Math.abs(this.up.z) < 0.5) return new THREE.Vector3(0.18, 0, 1).addScaledVector(this.up, 0.14);
+    if (Math.abs(this.up.z) < 0.5)
+      return new THREE.Vector3(0.18, 0, 1).addScaledVector(this.up, 0.14);
     const span = box.getSize(new THREE.Vector3());
     const flat = span.z < 0.25 * Math.max(span.x, span.y);
     return new THREE.Vector3(0.62, -0.78, (flat ? 0.85 : 0.36) * Math.sign(this.up.z));
@@ -347,9 +380,15 @@ export class Stage {
 
   // name: front, side, top or iso, as the arm stands.
   look(name) {
-    const up = this.up.clone(), front = Math.abs(up.z) < 0.5 ? new THREE.Vector3(0, 0, 1) : new THREE.Vector3(1, 0, 0);
+    const up = this.up.clone(),
+      front = Math.abs(up.z) < 0.5 ? new THREE.Vector3(0, 0, 1) : new THREE.Vector3(1, 0, 0);
     const side = new THREE.Vector3().crossVectors(front, up);
-    const views = { front, side, top: up.clone().addScaledVector(side, 1e-3), iso: front.clone().add(side).addScaledVector(up, 0.8) };
+    const views = {
+      front,
+      side,
+      top: up.clone().addScaledVector(side, 1e-3),
+      iso: front.clone().add(side).addScaledVector(up, 0.8),
+    };
     this.preset = views[name];
     this.touched = false;
     this.setUp();
@@ -380,7 +419,10 @@ export class Stage {
     if (!from) return;
     const [p, q] = [from, to].map((T) => {
       const matrix = new THREE.Matrix4().set(...T);
-      return { at: new THREE.Vector3().setFromMatrixPosition(matrix), turn: new THREE.Quaternion().setFromRotationMatrix(matrix) };
+      return {
+        at: new THREE.Vector3().setFromMatrixPosition(matrix),
+        turn: new THREE.Quaternion().setFromRotationMatrix(matrix),
+      };
     });
     this.moving.position.lerpVectors(p.at, q.at, share);
     this.moving.quaternion.slerpQuaternions(p.turn, q.turn, share);
@@ -397,7 +439,10 @@ export class Stage {
   axes(length, thickness) {
     const axes = new THREE.Group();
     AXES.forEach((color, k) => {
-      const rod = new THREE.Mesh(new THREE.CylinderGeometry(thickness, thickness, length, 8), new THREE.MeshBasicMaterial({ color, depthTest: false, transparent: true }));
+      const rod = new THREE.Mesh(
+        new THREE.CylinderGeometry(thickness, thickness, length, 8),
+        new THREE.MeshBasicMaterial({ color, depthTest: false, transparent: true }),
+      );
       rod.position.setComponent(k, length / 2);
       if (k === 0) rod.rotation.z = -Math.PI / 2;
       if (k === 2) rod.rotation.x = Math.PI / 2;
@@ -410,15 +455,25 @@ export class Stage {
   // Outline links: those of joints beyond a limit, counted from 0, and two that touch each other, 0 for the base.
   // contact: {links, points} or null; points are where the two are nearest, or null; text: what is written there.
   warn(joints, contact, text = "") {
-    const links = contact?.links ?? [], key = `${joints}|${links}`;
+    const links = contact?.links ?? [],
+      key = `${joints}|${links}`;
     if (this.warned !== key) {
       this.warned = key;
-      const outlined = this.nodes.slice(0, -1).map((_, i) => (links.includes(i) ? "--contact" : joints.includes(i - 1) ? "--accent" : null));
+      const outlined = this.nodes
+        .slice(0, -1)
+        .map((_, i) =>
+          links.includes(i) ? "--contact" : joints.includes(i - 1) ? "--accent" : null,
+        );
       this.outlines.set(outlined, this.nodes);
     }
     const points = contact?.points;
     this.outlines.setGap(points, this.size);
-    this.gap = points ? new THREE.Vector3().fromArray(points[0]).add(new THREE.Vector3().fromArray(points[1])).multiplyScalar(0.5) : null;
+    this.gap = points
+      ? new THREE.Vector3()
+          .fromArray(points[0])
+          .add(new THREE.Vector3().fromArray(points[1]))
+          .multiplyScalar(0.5)
+      : null;
     this.marks.set(points && text ? [{ frame: 0, text }] : []);
     this.marks.show(this.marks.count > 0);
     this.dirty();
@@ -455,15 +510,28 @@ export class Stage {
   setGhosts(message) {
     const { nodes } = this;
     this.ghosts = message;
-    this.overlays.setGhosts({ ...message, tints: this.tints() }, { nodes, boxAt: (...state) => this.boxAt(...state), skeletons: this.steady && message.tints.length > 3 * SOLID_GHOSTS });
-    this.anchors = anchors(placements(message.transforms, THREE).positions, nodes.map((node) => node.position));
+    this.overlays.setGhosts(
+      { ...message, tints: this.tints() },
+      {
+        nodes,
+        boxAt: (...state) => this.boxAt(...state),
+        skeletons: this.steady && message.tints.length > 3 * SOLID_GHOSTS,
+      },
+    );
+    this.anchors = anchors(
+      placements(message.transforms, THREE).positions,
+      nodes.map((node) => node.position),
+    );
     this.overlaid();
   }
 
   // Beside panels ghosts are grey, but the one that a person points at in a list.
   tints() {
-    const { tints } = this.ghosts, several = this.steady && tints.length > 3;
-    return several ? tints.map((value, i) => (Math.floor(i / 3) === this.pointed ? value : GREY[i % 3])) : tints;
+    const { tints } = this.ghosts,
+      several = this.steady && tints.length > 3;
+    return several
+      ? tints.map((value, i) => (Math.floor(i / 3) === this.pointed ? value : GREY[i % 3]))
+      : tints;
   }
 
   // ghost: the number of the one to show in its color and with its name, or null.
@@ -483,7 +551,13 @@ export class Stage {
 
   showNames() {
     const shown = this.steady ? this.named?.[this.pointed] : null;
-    this.names.set(this.steady ? (shown ? [{ frame: this.pointed, ...shown }] : []) : (this.named ?? []).map((name, frame) => ({ frame, ...name })));
+    this.names.set(
+      this.steady
+        ? shown
+          ? [{ frame: this.pointed, ...shown }]
+          : []
+        : (this.named ?? []).map((name, frame) => ({ frame, ...name })),
+    );
     this.names.show(this.overlays.shown);
     this.dirty();
   }
@@ -546,7 +620,10 @@ export class Stage {
   project(point) {
     const p = inView(point).project(this.viewer.camera);
     if (p.z > 1) return null;
-    return { x: ((p.x + 1) * this.pane.clientWidth) / 2, y: ((1 - p.y) * this.pane.clientHeight) / 2 };
+    return {
+      x: ((p.x + 1) * this.pane.clientWidth) / 2,
+      y: ((1 - p.y) * this.pane.clientHeight) / 2,
+    };
   }
 }
 
@@ -556,9 +633,11 @@ function equal(a, b) {
 
 // Where ghosts are named: at the frame at which they and the arm are furthest apart.
 function anchors(positions, arm) {
-  const nodes = arm.length, count = positions.length / (3 * nodes);
+  const nodes = arm.length,
+    count = positions.length / (3 * nodes);
   const at = (ghost, node) => new THREE.Vector3().fromArray(positions, 3 * (ghost * nodes + node));
-  let best = 0, widest = -1;
+  let best = 0,
+    widest = -1;
   for (let node = 0; node < nodes; node++) {
     const box = new THREE.Box3(arm[node].clone(), arm[node].clone());
     for (let ghost = 0; ghost < count; ghost++) box.expandByPoint(at(ghost, node));

@@ -84,7 +84,9 @@ export class Trail {
   append(point) {
     if (!this.line.visible) return;
     const last = this.points.subarray(3 * this.count - 3, 3 * this.count);
-    const step = this.count ? Math.hypot(point[0] - last[0], point[1] - last[1], point[2] - last[2]) : Infinity;
+    const step = this.count
+      ? Math.hypot(point[0] - last[0], point[1] - last[1], point[2] - last[2])
+      : Infinity;
     if (step < REST * this.size) return;
     if (this.count && step > JUMP * this.size) this.clear();
     if (this.count === MOST_POINTS) {
@@ -99,7 +101,10 @@ export class Trail {
   upload() {
     this.line.geometry.setDrawRange(0, this.count);
     if (this.sent === this.count) return;
-    Object.assign(this.attribute.updateRange, { offset: 3 * this.sent, count: 3 * (this.count - this.sent) });
+    Object.assign(this.attribute.updateRange, {
+      offset: 3 * this.sent,
+      count: 3 * (this.count - this.sent),
+    });
     this.attribute.needsUpdate = true;
     this.sent = this.count;
   }
@@ -109,7 +114,9 @@ function tubeGeometry(points, radius, THREE) {
   const count = points.length / 3;
   const at = (i) => new THREE.Vector3().fromArray(points, 3 * Math.max(0, Math.min(count - 1, i)));
   const positions = new Float32Array(3 * SIDES * count);
-  const tangent = new THREE.Vector3(0, 0, 1), normal = new THREE.Vector3(1, 0, 0), side = new THREE.Vector3();
+  const tangent = new THREE.Vector3(0, 0, 1),
+    normal = new THREE.Vector3(1, 0, 0),
+    side = new THREE.Vector3();
   for (let i = 0; i < count; i++) {
     const along = at(i + 1).sub(at(i - 1));
     if (along.lengthSq() > 0) tangent.copy(along).normalize(); // at rest, the last direction stays
@@ -128,7 +135,8 @@ function tubeGeometry(points, radius, THREE) {
   const index = new Uint32Array(6 * SIDES * (count - 1));
   for (let i = 0, at = 0; i < count - 1; i++) {
     for (let k = 0; k < SIDES; k++, at += 6) {
-      const a = i * SIDES + k, b = i * SIDES + ((k + 1) % SIDES);
+      const a = i * SIDES + k,
+        b = i * SIDES + ((k + 1) % SIDES);
       index.set([a, b, a + SIDES, b, b + SIDES, a + SIDES], at);
     }
   }

@@ -21,13 +21,27 @@ export class StatusCard {
     const cell = (k) => [h("span", {}, AXES[k]), this.position[k], this.axes[k], this.angles[k]];
     this.remarks = h("ul", { class: "remarks", role: "status" });
     this.root = h(
-      "details", { id: "card", open: remembered("card", innerWidth > WIDE ? "open" : "") === "open", "aria-label": "State of the arm" },
+      "details",
+      {
+        id: "card",
+        open: remembered("card", innerWidth > WIDE ? "open" : "") === "open",
+        "aria-label": "State of the arm",
+      },
       h("summary", {}, this.title, this.alarm),
       h("table", {}, h("caption", {}, "Joints"), this.joints),
       h("h2", {}, "Tool"),
-      h("div", { class: "tool" }, AXES.map((_, k) => cell(k))),
+      h(
+        "div",
+        { class: "tool" },
+        AXES.map((_, k) => cell(k)),
+      ),
       this.remarks,
-      h("div", { class: "units" }, this.unitChoice("angle", ["deg", "rad"], "Unit of angles"), this.unitChoice("length", ["m", "mm", "in"], "Unit of lengths")),
+      h(
+        "div",
+        { class: "units" },
+        this.unitChoice("angle", ["deg", "rad"], "Unit of angles"),
+        this.unitChoice("length", ["m", "mm", "in"], "Unit of lengths"),
+      ),
     );
     this.root.addEventListener("toggle", () => {
       remember("card", this.root.open ? "open" : "");
@@ -38,7 +52,17 @@ export class StatusCard {
   }
 
   unitChoice(name, units, label) {
-    const buttons = units.map((unit) => h("button", { type: "button", "aria-pressed": String(this.lab.units[name] === unit), onclick: () => this.lab.setUnits({ [name]: unit }) }, unit === "deg" ? "°" : unit));
+    const buttons = units.map((unit) =>
+      h(
+        "button",
+        {
+          type: "button",
+          "aria-pressed": String(this.lab.units[name] === unit),
+          onclick: () => this.lab.setUnits({ [name]: unit }),
+        },
+        unit === "deg" ? "°" : unit,
+      ),
+    );
     (this.choices ??= []).push({ name, units, buttons });
     return h("div", { role: "group", "aria-label": label }, buttons);
   }
@@ -47,9 +71,20 @@ export class StatusCard {
     this.arm = arm;
     this.title.textContent = arm.name;
     this.rows = arm.joints.map((joint) => {
-      const mark = h("i"), value = h("td", { class: "value" });
-      const bar = h("span", { class: joint.lower === null || joint.upper === null ? "bar endless" : "bar" }, mark);
-      const row = h("tr", {}, h("th", { scope: "row", title: joint.name }, joint.name), h("td", {}, bar), value);
+      const mark = h("i"),
+        value = h("td", { class: "value" });
+      const bar = h(
+        "span",
+        { class: joint.lower === null || joint.upper === null ? "bar endless" : "bar" },
+        mark,
+      );
+      const row = h(
+        "tr",
+        {},
+        h("th", { scope: "row", title: joint.name }, joint.name),
+        h("td", {}, bar),
+        value,
+      );
       return { row, mark, value };
     });
     this.joints.replaceChildren(...this.rows.map(({ row }) => row));
@@ -62,23 +97,38 @@ export class StatusCard {
   // What every panel shows of a state: joint values, and the poses of all nodes, of which the tool's is the last.
   show(q, positions, quaternions) {
     if (!this.arm || q.length !== this.arm.n) return;
-    this.state = { q: [...q], position: [...positions.slice(-3)], quaternion: [...quaternions.slice(-4)] };
+    this.state = {
+      q: [...q],
+      position: [...positions.slice(-3)],
+      quaternion: [...quaternions.slice(-4)],
+    };
     this.write();
   }
 
   write() {
     if (!this.state || !this.root.open) return;
-    const { q, position, quaternion } = this.state, { units } = this.lab;
+    const { q, position, quaternion } = this.state,
+      { units } = this.lab;
     this.arm.joints.forEach((joint, i) => {
-      const { row, mark, value } = this.rows[i], { scale, digits, sign } = UNITS[joint.unit === "m" ? units.length : units.angle];
-      const free = joint.unit === "m" ? this.arm.reach || 1 : Math.PI, low = joint.lower ?? -free, high = joint.upper ?? free;
+      const { row, mark, value } = this.rows[i],
+        { scale, digits, sign } = UNITS[joint.unit === "m" ? units.length : units.angle];
+      const free = joint.unit === "m" ? this.arm.reach || 1 : Math.PI,
+        low = joint.lower ?? -free,
+        high = joint.upper ?? free;
       text(value, `${fixed(q[i] * scale, Math.max(digits - 1, 0))}${sign}`);
       mark.style.left = `${100 * Math.min(1, Math.max(0, (q[i] - low) / (high - low || 1)))}%`;
       row.classList.toggle("outside", beyond(q[i], joint.lower, joint.upper));
     });
-    const order = this.lab.state.tool?.order ?? "XYZ", pose = new THREE.Matrix4().compose(new THREE.Vector3(...position), new THREE.Quaternion(...quaternion), new THREE.Vector3(1, 1, 1));
-    const T = pose.transpose().toArray(), angles = euler(T, order);
-    const length = UNITS[units.length], angle = UNITS[units.angle];
+    const order = this.lab.state.tool?.order ?? "XYZ",
+      pose = new THREE.Matrix4().compose(
+        new THREE.Vector3(...position),
+        new THREE.Quaternion(...quaternion),
+        new THREE.Vector3(1, 1, 1),
+      );
+    const T = pose.transpose().toArray(),
+      angles = euler(T, order);
+    const length = UNITS[units.length],
+      angle = UNITS[units.angle];
     AXES.forEach((_, k) => {
       text(this.position[k], `${fixed(position[k] * length.scale, length.digits)}${length.sign}`);
       text(this.axes[k], axisName(order, k));
@@ -105,21 +155,31 @@ export class StatusCard {
 
   remark() {
     if (!this.arm) return;
-    const { player } = this.lab.page, { tool } = this.lab.state, { control } = this;
+    const { player } = this.lab.page,
+      { tool } = this.lab.state,
+      { control } = this;
     const wrong = this.outside.map((i) => `${this.arm.joints[i].name} is beyond a limit`);
     if (this.contact) wrong.push(touchingText(this.contact));
     if (!player.active && tool?.singular) wrong.push("singular configuration");
-    const running = control?.running ? `simulated at ${fixed(Math.min(control.speed, 1) * 100, 0)} % of real time` : null;
+    const running = control?.running
+      ? `simulated at ${fixed(Math.min(control.speed, 1) * 100, 0)} % of real time`
+      : null;
     const key = `${wrong.join("|")}|${running}`;
     if (key === this.remarked) return;
     this.remarked = key;
-    this.remarks.replaceChildren(...wrong.map((words) => h("li", { class: "bad" }, words)), ...(running ? [h("li", {}, running)] : []));
+    this.remarks.replaceChildren(
+      ...wrong.map((words) => h("li", { class: "bad" }, words)),
+      ...(running ? [h("li", {}, running)] : []),
+    );
     this.alarm.hidden = !wrong.length;
     this.alarm.textContent = this.alarm.title = wrong[0] ?? "";
   }
 
   unitsChanged() {
-    for (const { name, units, buttons } of this.choices) buttons.forEach((button, k) => button.setAttribute("aria-pressed", String(this.lab.units[name] === units[k])));
+    for (const { name, units, buttons } of this.choices)
+      buttons.forEach((button, k) =>
+        button.setAttribute("aria-pressed", String(this.lab.units[name] === units[k])),
+      );
     this.write();
   }
 }

@@ -36,8 +36,12 @@ class JointCurves {
 
   // What the values of a joint are multiplied by, and the sign of their unit; per: "", or "/s" of rates.
   units(joints, per = "") {
-    const { angle, length } = this.lab.units, sign = (unit) => UNITS[unit].sign.trim() + per;
-    return { scales: joints.map((joint) => UNITS[joint.unit === "m" ? length : angle].scale), text: unitsOf(joints, sign(angle), sign(length)) };
+    const { angle, length } = this.lab.units,
+      sign = (unit) => UNITS[unit].sign.trim() + per;
+    return {
+      scales: joints.map((joint) => UNITS[joint.unit === "m" ? length : angle].scale),
+      text: unitsOf(joints, sign(angle), sign(length)),
+    };
   }
 
   mark(time) {
@@ -51,8 +55,13 @@ class JointCurves {
 
 export class MotionCurves extends JointCurves {
   constructor(lab) {
-    const { player } = lab.page, seek = (time) => player.active && (player.pause(), player.seek(time));
-    const plots = [new Plot("joints", "° or m", seek), new Plot("rates", "°/s or m/s", seek), new Plot("torques", "N m or N", seek)];
+    const { player } = lab.page,
+      seek = (time) => player.active && (player.pause(), player.seek(time));
+    const plots = [
+      new Plot("joints", "° or m", seek),
+      new Plot("rates", "°/s or m/s", seek),
+      new Plot("torques", "N m or N", seek),
+    ];
     super(lab, "Motion", plots);
   }
 
@@ -60,15 +69,31 @@ export class MotionCurves extends JointCurves {
   draw(motion, joints) {
     this.shown = { motion, joints };
     this.name(joints.map((joint) => joint.name));
-    const [q, qd, tau] = this.plots, { limits } = motion, ones = joints.map(() => 1);
-    const positions = this.units(joints), rates = this.units(joints, "/s");
+    const [q, qd, tau] = this.plots,
+      { limits } = motion,
+      ones = joints.map(() => 1);
+    const positions = this.units(joints),
+      rates = this.units(joints, "/s");
     q.setUnit(positions.text);
     qd.setUnit(rates.text);
     tau.setUnit(unitsOf(joints, "N m", "N"));
-    const curves = (rows, scales) => [motion.times, ...joints.map((_, i) => rows.map((row) => row[i] * scales[i]))];
-    const pairs = (lower, upper, scales) => joints.map((_, i) => [lower[i], upper[i]].map((x) => (x === null ? null : x * scales[i])));
-    const both = (limit, scales) => pairs(limit.map((x) => (x === null ? null : -x)), limit, scales);
-    q.set(this.names, curves(motion.q, positions.scales), pairs(limits.lower, limits.upper, positions.scales));
+    const curves = (rows, scales) => [
+      motion.times,
+      ...joints.map((_, i) => rows.map((row) => row[i] * scales[i])),
+    ];
+    const pairs = (lower, upper, scales) =>
+      joints.map((_, i) => [lower[i], upper[i]].map((x) => (x === null ? null : x * scales[i])));
+    const both = (limit, scales) =>
+      pairs(
+        limit.map((x) => (x === null ? null : -x)),
+        limit,
+        scales,
+      );
+    q.set(
+      this.names,
+      curves(motion.q, positions.scales),
+      pairs(limits.lower, limits.upper, positions.scales),
+    );
     qd.set(this.names, curves(motion.qd, rates.scales), both(limits.velocity, rates.scales));
     tau.root.hidden = !motion.tau;
     if (motion.tau) tau.set(this.names, curves(motion.tau, ones), both(limits.effort, ones));
@@ -81,21 +106,38 @@ export class MotionCurves extends JointCurves {
 
 export class RunCurves extends JointCurves {
   constructor(lab) {
-    super(lab, "Simulation", [new Plot("joints, desired dashed", "° or m"), new Plot("errors", "mrad or mm"), new Plot("torques", "N m or N")]);
+    super(lab, "Simulation", [
+      new Plot("joints, desired dashed", "° or m"),
+      new Plot("errors", "mrad or mm"),
+      new Plot("torques", "N m or N"),
+    ]);
   }
 
   // joints: those of the rows; rows: time, joint values, errors and torques of each, in rad, m, N m and N.
   draw(rows, joints) {
     this.shown = { rows, joints };
     this.name(joints.map((joint) => joint.name));
-    const [q, errors, torques] = this.plots, n = joints.length, { scales, text } = this.units(joints);
+    const [q, errors, torques] = this.plots,
+      n = joints.length,
+      { scales, text } = this.units(joints);
     q.setUnit(text);
     errors.setUnit(unitsOf(joints, "mrad", "mm"));
     torques.setUnit(unitsOf(joints, "N m", "N"));
-    const times = rows.map((row) => row[0]), every = (value) => joints.map((_, i) => rows.map((row) => value(row, i)));
-    q.set(this.names, [times, ...every((row, i) => row[1 + i] * scales[i]), ...every((row, i) => (row[1 + i] + row[1 + n + i]) * scales[i])]);
+    const times = rows.map((row) => row[0]),
+      every = (value) => joints.map((_, i) => rows.map((row) => value(row, i)));
+    q.set(this.names, [
+      times,
+      ...every((row, i) => row[1 + i] * scales[i]),
+      ...every((row, i) => (row[1 + i] + row[1 + n + i]) * scales[i]),
+    ]);
     errors.set(this.names, [times, ...every((row, i) => row[1 + n + i] * MILLI)]);
-    torques.set(this.names, [times, ...every((row, i) => row[1 + 2 * n + i])], joints.map(({ effort }) => (effort === null || effort === undefined ? null : [-effort, effort])));
+    torques.set(
+      this.names,
+      [times, ...every((row, i) => row[1 + 2 * n + i])],
+      joints.map(({ effort }) =>
+        effort === null || effort === undefined ? null : [-effort, effort],
+      ),
+    );
   }
 
   clear() {
@@ -110,9 +152,13 @@ export class RunCurves extends JointCurves {
 
 // The joints, from 0, that are beyond a limit at a time of a motion, and the links that touch each other, or null.
 export function exceeding({ duration, limits, q, qd, tau, times, contacts }, time) {
-  const at = (samples) => (duration > 0 ? Math.round((time / duration) * (samples - 1)) : 0), k = at(times.length);
+  const at = (samples) => (duration > 0 ? Math.round((time / duration) * (samples - 1)) : 0),
+    k = at(times.length);
   const fast = (value, limit) => limit !== null && Math.abs(value) > limit * (1 + ROUNDING);
-  const exceeds = (_, i) => beyond(q[k][i], limits.lower[i], limits.upper[i]) || fast(qd[k][i], limits.velocity[i]) || (tau && fast(tau[k][i], limits.effort[i]));
+  const exceeds = (_, i) =>
+    beyond(q[k][i], limits.lower[i], limits.upper[i]) ||
+    fast(qd[k][i], limits.velocity[i]) ||
+    (tau && fast(tau[k][i], limits.effort[i]));
   const joints = q[k].flatMap((x, i) => (exceeds(x, i) ? [i] : []));
   return [joints, contacts ? contacts[at(contacts.length)] : null];
 }

@@ -3,7 +3,8 @@
 import { h } from "./dom.js";
 import { remember, remembered } from "./memory.js";
 
-const USUAL = 236, LEAST = 150; // px
+const USUAL = 236,
+  LEAST = 150; // px
 const STEP = 24; // px that an arrow key moves the edge
 const SCENE = 200; // px that are left to the scene
 
@@ -13,13 +14,26 @@ export class PlotDock {
     this.sources = []; // curves that there are, the latest first
     this.height = Number(remembered("dock-height", String(USUAL)));
     // A saved page shows the arm first.
-    this.open = remembered("dock", innerWidth > 720 && lab.can("motion.plan") ? "open" : "") === "open";
-    this.grip = h("div", { class: "grip", role: "separator", "aria-orientation": "horizontal", "aria-label": "Height of the plots", tabIndex: 0 });
+    this.open =
+      remembered("dock", innerWidth > 720 && lab.can("motion.plan") ? "open" : "") === "open";
+    this.grip = h("div", {
+      class: "grip",
+      role: "separator",
+      "aria-orientation": "horizontal",
+      "aria-label": "Height of the plots",
+      tabIndex: 0,
+    });
     this.choice = h("div", { class: "choice", role: "group", "aria-label": "Curves of" });
     this.legend = h("div", { class: "names" });
     this.fold = h("button", { type: "button", class: "quiet", onclick: () => this.toggle() });
     this.row = h("div", { class: "row" });
-    this.root = h("section", { id: "dock", "aria-label": "Plots", hidden: true }, this.grip, h("header", {}, this.choice, this.legend, this.fold), this.row);
+    this.root = h(
+      "section",
+      { id: "dock", "aria-label": "Plots", hidden: true },
+      this.grip,
+      h("header", {}, this.choice, this.legend, this.fold),
+      this.row,
+    );
     this.grip.addEventListener("pointerdown", (event) => this.drag(event));
     this.grip.addEventListener("keydown", (event) => this.key(event));
     this.layout();
@@ -51,7 +65,21 @@ export class PlotDock {
     const { shown } = this;
     this.root.hidden = !shown;
     const all = [...this.sources].sort((a, b) => (a.title < b.title ? -1 : 1));
-    this.choice.replaceChildren(...(all.length > 1 ? all.map((curves) => h("button", { type: "button", "aria-pressed": String(curves === shown), onclick: () => this.show(curves) }, curves.title)) : []));
+    this.choice.replaceChildren(
+      ...(all.length > 1
+        ? all.map((curves) =>
+            h(
+              "button",
+              {
+                type: "button",
+                "aria-pressed": String(curves === shown),
+                onclick: () => this.show(curves),
+              },
+              curves.title,
+            ),
+          )
+        : []),
+    );
     this.legend.replaceChildren(...(shown ? [shown.legend] : []));
     this.row.replaceChildren(...(shown ? shown.plots.map((plot) => plot.root) : []));
     this.layout();
@@ -64,7 +92,8 @@ export class PlotDock {
   }
 
   layout() {
-    const { body } = document, visible = !this.root.hidden;
+    const { body } = document,
+      visible = !this.root.hidden;
     const height = Math.max(LEAST, Math.min(this.height, innerHeight - SCENE));
     this.root.classList.toggle("folded", !this.open);
     this.fold.textContent = this.open ? "Hide plots" : "Show plots";
@@ -84,7 +113,11 @@ export class PlotDock {
     this.grip.setPointerCapture(event.pointerId);
     const move = ({ clientY }) => this.resize(innerHeight - clientY);
     this.grip.addEventListener("pointermove", move);
-    this.grip.addEventListener("lostpointercapture", () => this.grip.removeEventListener("pointermove", move), { once: true });
+    this.grip.addEventListener(
+      "lostpointercapture",
+      () => this.grip.removeEventListener("pointermove", move),
+      { once: true },
+    );
   }
 
   key(event) {

@@ -6,10 +6,19 @@ export function h(tag, attributes = {}, ...children) {
   for (const [name, value] of Object.entries(attributes)) {
     if (value === false || value === null || value === undefined) continue;
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
-    else if (name in element && !["list", "form", "type", "class"].includes(name) && typeof value !== "string") element[name] = value;
+    else if (
+      name in element &&
+      !["list", "form", "type", "class"].includes(name) &&
+      typeof value !== "string"
+    )
+      element[name] = value;
     else element.setAttribute(name === "className" ? "class" : name, value === true ? "" : value);
   }
-  element.append(...children.flat(Infinity).filter((child) => child !== null && child !== undefined && child !== false));
+  element.append(
+    ...children
+      .flat(Infinity)
+      .filter((child) => child !== null && child !== undefined && child !== false),
+  );
   return element;
 }
 
@@ -45,7 +54,9 @@ export function beyond(value, lower, upper) {
 export function touchingText(nearest) {
   if (!touches(nearest)) return "";
   const [a, b] = nearest.links.map((link) => (link ? `link ${link}` : "the base"));
-  return nearest.distance === null ? `${a} and ${b} may touch each other` : `${a} and ${b} touch each other`;
+  return nearest.distance === null
+    ? `${a} and ${b} may touch each other`
+    : `${a} and ${b} touch each other`;
 }
 
 // How deep two links penetrate each other, in a unit of UNITS; empty where they do not, or nothing is known.
@@ -74,7 +85,8 @@ export function bytes(base64) {
 export async function base64Of(file) {
   const content = new Uint8Array(await file.arrayBuffer());
   let text = "";
-  for (let i = 0; i < content.length; i += 8192) text += String.fromCharCode(...content.subarray(i, i + 8192));
+  for (let i = 0; i < content.length; i += 8192)
+    text += String.fromCharCode(...content.subarray(i, i + 8192));
   return btoa(text);
 }
 
@@ -112,9 +124,21 @@ export function matrix(numbers, name = "") {
   };
   // A sign takes its room where there is none: the digits stand below each other.
   const sign = (text) => m(text.startsWith("-") ? "mrow" : "mphantom", m("mn", "\u2212"));
-  const entry = (x) => m("mtd", m("mrow", sign(fixed(x, 5)), m("mn", fixed(x, 5).replace("-", ""))));
-  const rows = [0, 1, 2, 3].map((i) => m("mtr", ...[0, 1, 2, 3].map((j) => entry(numbers[4 * i + j]))));
-  const math = m("math", m("mrow", ...(name ? [name, m("mo", "=")] : []), m("mo", "["), m("mtable", ...rows), m("mo", "]")));
+  const entry = (x) =>
+    m("mtd", m("mrow", sign(fixed(x, 5)), m("mn", fixed(x, 5).replace("-", ""))));
+  const rows = [0, 1, 2, 3].map((i) =>
+    m("mtr", ...[0, 1, 2, 3].map((j) => entry(numbers[4 * i + j]))),
+  );
+  const math = m(
+    "math",
+    m(
+      "mrow",
+      ...(name ? [name, m("mo", "=")] : []),
+      m("mo", "["),
+      m("mtable", ...rows),
+      m("mo", "]"),
+    ),
+  );
   math.setAttribute("class", "matrix");
   return math;
 }
@@ -122,7 +146,10 @@ export function matrix(numbers, name = "") {
 // A letter with an index, for a formula.
 export function indexed(letter, index) {
   const element = document.createElementNS("http://www.w3.org/1998/Math/MathML", "msub");
-  for (const [tag, text] of [["mi", letter], ["mn", String(index)]]) {
+  for (const [tag, text] of [
+    ["mi", letter],
+    ["mn", String(index)],
+  ]) {
     const part = document.createElementNS(element.namespaceURI, tag);
     part.textContent = text;
     element.append(part);

@@ -14,14 +14,40 @@ export class DynamicsPanel extends FollowingPanel {
     this.inertia = h("h2", {}, "Mass matrix");
     this.torques = null; // of a controller or a motion, by joint; gravity's where there are none
     this.matrix = h("div", { class: "wide" });
-    this.ellipsoid = h("button", { type: "button", "aria-pressed": "false", onclick: () => lab.ask("dynamics.ellipsoid", { on: this.ellipsoid.getAttribute("aria-pressed") !== "true" }) }, "Ellipsoid of velocities");
+    this.ellipsoid = h(
+      "button",
+      {
+        type: "button",
+        "aria-pressed": "false",
+        onclick: () =>
+          lab.ask("dynamics.ellipsoid", {
+            on: this.ellipsoid.getAttribute("aria-pressed") !== "true",
+          }),
+      },
+      "Ellipsoid of velocities",
+    );
     this.facts = h("p", { class: "facts" });
     this.entry = h("div", { class: "wide entry", "aria-live": "polite" });
-    root.append(this.note, this.heading, this.bars, this.inertia, this.matrix, h("p", { class: "hint" }, "An entry, or the name of a torque, shows its formula."), this.entry, h("h2", {}, "Manipulability"), h("div", { class: "buttons" }, this.ellipsoid), this.facts);
+    root.append(
+      this.note,
+      this.heading,
+      this.bars,
+      this.inertia,
+      this.matrix,
+      h("p", { class: "hint" }, "An entry, or the name of a torque, shows its formula."),
+      this.entry,
+      h("h2", {}, "Manipulability"),
+      h("div", { class: "buttons" }, this.ellipsoid),
+      this.facts,
+    );
   }
 
   take_arm(arm) {
-    this.note.textContent = arm.bodies ? (arm.assumed_bodies ? "the links' masses are assumed: uniform rods" : "") : "this arm has no masses: assume uniform links in Control";
+    this.note.textContent = arm.bodies
+      ? arm.assumed_bodies
+        ? "the links' masses are assumed: uniform rods"
+        : ""
+      : "this arm has no masses: assume uniform links in Control";
     this.built = null;
     super.take_arm(arm);
   }
@@ -31,16 +57,25 @@ export class DynamicsPanel extends FollowingPanel {
   }
 
   moved(q, time) {
-    const { motion } = this.lab.state, tau = q && motion?.tau;
-    this.torques = tau ? { title: "Torques of the motion", tau: tau[Math.round((time / motion.duration) * (tau.length - 1))] } : null;
+    const { motion } = this.lab.state,
+      tau = q && motion?.tau;
+    this.torques = tau
+      ? {
+          title: "Torques of the motion",
+          tau: tau[Math.round((time / motion.duration) * (tau.length - 1))],
+        }
+      : null;
     super.moved(q);
   }
 
   // Joints that a run has locked have no torque of a controller.
   samples({ columns, rows }) {
     if (!this.visible || !this.running || !rows.length) return;
-    const last = rows.subarray(rows.length - columns.length), tau = new Array(this.arm.n).fill(0);
-    columns.forEach((name, k) => name.startsWith("tau") && (tau[Number(name.slice(3)) - 1] = last[k]));
+    const last = rows.subarray(rows.length - columns.length),
+      tau = new Array(this.arm.n).fill(0);
+    columns.forEach(
+      (name, k) => name.startsWith("tau") && (tau[Number(name.slice(3)) - 1] = last[k]),
+    );
     this.torques = { title: "Torques of the controller", tau, controlled: true };
   }
 
@@ -55,34 +90,98 @@ export class DynamicsPanel extends FollowingPanel {
   show({ M, g, effort, lengths, manipulability, condition }) {
     const { joints } = this.arm;
     if (this.built !== this.arm) this.build(Boolean(M));
-    const tau = this.torques?.tau ?? g ?? [], largest = Math.max(1e-9, ...tau.map(Math.abs));
+    const tau = this.torques?.tau ?? g ?? [],
+      largest = Math.max(1e-9, ...tau.map(Math.abs));
     this.heading.textContent = this.torques?.title ?? "Gravity torques";
     this.rows.forEach(({ bar, value }, i) => {
-      const limit = effort[i], share = Math.min(1, Math.abs(tau[i]) / (limit ?? largest)), unit = joints[i].unit === "m" ? "N" : "N m";
+      const limit = effort[i],
+        share = Math.min(1, Math.abs(tau[i]) / (limit ?? largest)),
+        unit = joints[i].unit === "m" ? "N" : "N m";
       bar.style.width = `${50 * share}%`;
       bar.style.left = tau[i] < 0 ? `${50 - 50 * share}%` : "50%";
       bar.classList.toggle("over", limit !== null && Math.abs(tau[i]) > limit);
       value.textContent = `${fixed(tau[i], 2)} ${unit}${limit === null ? "" : ` (${fixed((100 * Math.abs(tau[i])) / limit, 0)} %)`}`;
     });
-    if (M) this.cells.forEach((row, i) => row.forEach((cell, j) => (cell.textContent = fixed(M[i][j], 4))));
-    const axes = lengths.filter((x) => x !== null).map((x) => fixed(x, 3)).join(", ");
+    if (M)
+      this.cells.forEach((row, i) =>
+        row.forEach((cell, j) => (cell.textContent = fixed(M[i][j], 4))),
+      );
+    const axes = lengths
+      .filter((x) => x !== null)
+      .map((x) => fixed(x, 3))
+      .join(", ");
     this.facts.textContent = `half axes ${axes} m/s for joint rates of norm 1; manipulability ${manipulability.toPrecision(3)}; condition number ${condition === null ? "infinite: singular" : condition.toPrecision(3)}`;
   }
 
   build(bodies) {
-    const { arm } = this, ask = (name) => () => this.lab.ask("dynamics.entry", { name });
+    const { arm } = this,
+      ask = (name) => () => this.lab.ask("dynamics.entry", { name });
     this.built = arm;
     const slides = arm.joints.map((joint) => joint.unit === "m");
     this.inertia.textContent = `Mass matrix [${slides.every(Boolean) ? "kg" : slides.some(Boolean) ? "kg m², kg m, kg" : "kg m²"}]`;
-    this.rows = bodies ? arm.joints.map(() => ({ bar: h("i"), value: h("span", { class: "value" }) })) : [];
-    this.bars.replaceChildren(...this.rows.map(({ bar, value }, i) => h("div", { class: "bar" }, h("button", { type: "button", class: "quiet", title: `formula of g${i + 1}`, onclick: ask(`g${i + 1}`) }, arm.joints[i].name), h("span", { class: "track" }, bar), value)));
-    this.cells = bodies ? arm.joints.map((_, i) => arm.joints.map((_, j) => h("button", { type: "button", class: "quiet", title: `formula of M${i + 1}${j + 1}`, "aria-label": `M${i + 1}${j + 1}`, onclick: ask(`M${i + 1}${j + 1}`) }))) : [];
-    this.matrix.replaceChildren(h("table", { class: "numbers dense" }, h("tbody", {}, this.cells.map((row) => h("tr", {}, row.map((cell) => h("td", {}, cell)))))));
+    this.rows = bodies
+      ? arm.joints.map(() => ({ bar: h("i"), value: h("span", { class: "value" }) }))
+      : [];
+    this.bars.replaceChildren(
+      ...this.rows.map(({ bar, value }, i) =>
+        h(
+          "div",
+          { class: "bar" },
+          h(
+            "button",
+            {
+              type: "button",
+              class: "quiet",
+              title: `formula of g${i + 1}`,
+              onclick: ask(`g${i + 1}`),
+            },
+            arm.joints[i].name,
+          ),
+          h("span", { class: "track" }, bar),
+          value,
+        ),
+      ),
+    );
+    this.cells = bodies
+      ? arm.joints.map((_, i) =>
+          arm.joints.map((_, j) =>
+            h("button", {
+              type: "button",
+              class: "quiet",
+              title: `formula of M${i + 1}${j + 1}`,
+              "aria-label": `M${i + 1}${j + 1}`,
+              onclick: ask(`M${i + 1}${j + 1}`),
+            }),
+          ),
+        )
+      : [];
+    this.matrix.replaceChildren(
+      h(
+        "table",
+        { class: "numbers dense" },
+        h(
+          "tbody",
+          {},
+          this.cells.map((row) =>
+            h(
+              "tr",
+              {},
+              row.map((cell) => h("td", {}, cell)),
+            ),
+          ),
+        ),
+      ),
+    );
   }
 
   take_entry(entry) {
     if (!entry) return this.entry.replaceChildren();
-    if (entry.deriving) return this.entry.replaceChildren(h("p", { class: "hint" }, `deriving ${entry.name} …`));
-    this.entry.replaceChildren(...(entry.error ? [h("p", { class: "bad" }, entry.error)] : entry.lines.map((line) => formula(line) ?? "")));
+    if (entry.deriving)
+      return this.entry.replaceChildren(h("p", { class: "hint" }, `deriving ${entry.name} …`));
+    this.entry.replaceChildren(
+      ...(entry.error
+        ? [h("p", { class: "bad" }, entry.error)]
+        : entry.lines.map((line) => formula(line) ?? "")),
+    );
   }
 }

@@ -30,7 +30,8 @@ export class FollowingPanel {
 
   async read(q = this.lab.state.joints?.q) {
     if (!this.visible || !q || q.length !== this.arm?.n) return;
-    const { arm } = this, numbers = await this.lab.ask(this.request, { q });
+    const { arm } = this,
+      numbers = await this.lab.ask(this.request, { q });
     if (numbers && arm === this.arm) this.show(numbers);
   }
 }

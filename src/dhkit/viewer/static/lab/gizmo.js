@@ -22,7 +22,9 @@ export class Gizmo {
     stage.viewer.scene.add(this.group);
     const canvas = stage.viewer.renderer.domElement;
     // Before the camera's own listeners, which would turn the view.
-    stage.pane.addEventListener("pointerdown", (event) => this.grab(event, canvas), { capture: true });
+    stage.pane.addEventListener("pointerdown", (event) => this.grab(event, canvas), {
+      capture: true,
+    });
     addEventListener("pointermove", (event) => this.drag(event));
     addEventListener("pointerup", () => this.release());
     addEventListener("pointercancel", () => this.release());
@@ -30,16 +32,25 @@ export class Gizmo {
   }
 
   material(axis) {
-    return new THREE.MeshBasicMaterial({ color: AXES[axis], transparent: true, opacity: 0.9, depthTest: false });
+    return new THREE.MeshBasicMaterial({
+      color: AXES[axis],
+      transparent: true,
+      opacity: 0.9,
+      depthTest: false,
+    });
   }
 
   arrow(axis) {
-    const handle = new THREE.Group(), material = this.material(axis);
+    const handle = new THREE.Group(),
+      material = this.material(axis);
     const shaft = new THREE.Mesh(new THREE.CylinderGeometry(0.025, 0.025, 0.8, 10), material);
     shaft.position.y = 0.4;
     const tip = new THREE.Mesh(new THREE.ConeGeometry(0.075, 0.22, 16), material);
     tip.position.y = 0.9;
-    const wide = new THREE.Mesh(new THREE.CylinderGeometry(0.1, 0.1, 1.1, 8), new THREE.MeshBasicMaterial({ visible: false }));
+    const wide = new THREE.Mesh(
+      new THREE.CylinderGeometry(0.1, 0.1, 1.1, 8),
+      new THREE.MeshBasicMaterial({ visible: false }),
+    );
     wide.position.y = 0.55;
     handle.add(shaft, tip, wide);
     if (axis === 0) handle.rotation.z = -Math.PI / 2;
@@ -48,8 +59,15 @@ export class Gizmo {
   }
 
   ring(axis) {
-    const handle = new THREE.Group(), material = this.material(axis);
-    handle.add(new THREE.Mesh(new THREE.TorusGeometry(0.72, 0.02, 8, 60), material), new THREE.Mesh(new THREE.TorusGeometry(0.72, 0.07, 6, 40), new THREE.MeshBasicMaterial({ visible: false })));
+    const handle = new THREE.Group(),
+      material = this.material(axis);
+    handle.add(
+      new THREE.Mesh(new THREE.TorusGeometry(0.72, 0.02, 8, 60), material),
+      new THREE.Mesh(
+        new THREE.TorusGeometry(0.72, 0.07, 6, 40),
+        new THREE.MeshBasicMaterial({ visible: false }),
+      ),
+    );
     if (axis === 0) handle.rotation.y = Math.PI / 2;
     if (axis === 1) handle.rotation.x = Math.PI / 2;
     return this.keep(handle, { axis, turns: true, material });
@@ -67,19 +85,26 @@ export class Gizmo {
     this.group.visible = Boolean(T);
     this.reach = reach;
     if (T && !this.dragged) this.pose.set(...T);
-    for (const { userData } of this.handles) userData.material.color.set(reached ? AXES[userData.axis] : OUT_OF_REACH);
+    for (const { userData } of this.handles)
+      userData.material.color.set(reached ? AXES[userData.axis] : OUT_OF_REACH);
     this.place();
   }
 
   place() {
-    this.group.matrix.copy(this.pose).scale(new THREE.Vector3().setScalar(LENGTH * (this.reach || 1)));
+    this.group.matrix
+      .copy(this.pose)
+      .scale(new THREE.Vector3().setScalar(LENGTH * (this.reach || 1)));
     this.group.matrixWorldNeedsUpdate = true;
     this.stage.dirty();
   }
 
   ray(event) {
-    const { pane, viewer } = this.stage, box = pane.getBoundingClientRect();
-    const point = new THREE.Vector2(((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2);
+    const { pane, viewer } = this.stage,
+      box = pane.getBoundingClientRect();
+    const point = new THREE.Vector2(
+      ((event.clientX - box.left) / box.width) * 2 - 1,
+      1 - ((event.clientY - box.top) / box.height) * 2,
+    );
     const caster = new THREE.Raycaster();
     caster.setFromCamera(point, viewer.camera);
     return caster;
@@ -109,7 +134,8 @@ export class Gizmo {
     event.stopPropagation();
     event.preventDefault();
     const { axis, turns } = handle.userData;
-    const start = this.pose.clone(), origin = inView(new THREE.Vector3().setFromMatrixPosition(start));
+    const start = this.pose.clone(),
+      origin = inView(new THREE.Vector3().setFromMatrixPosition(start));
     const direction = inView(new THREE.Vector3().setFromMatrixColumn(start, axis)).normalize();
     const at = (e) => (turns ? this.angle(e, origin, direction) : this.along(e, origin, direction));
     const first = at(event);
@@ -122,9 +148,11 @@ export class Gizmo {
 
   drag(event) {
     if (!this.dragged) return;
-    const { axis, turns, start, at, first } = this.dragged, now = at(event);
+    const { axis, turns, start, at, first } = this.dragged,
+      now = at(event);
     if (now === null) return;
-    const step = new THREE.Matrix4(), by = now - first;
+    const step = new THREE.Matrix4(),
+      by = now - first;
     if (turns) step.makeRotationAxis(new THREE.Vector3().setComponent(axis, 1), by);
     else step.makeTranslation(...[0, 1, 2].map((k) => (k === axis ? by : 0)));
     this.pose.multiplyMatrices(start, step);
@@ -145,20 +173,26 @@ export class Gizmo {
 
   // How far along an axis the pointer is: where its ray is nearest to the axis.
   along(event, origin, direction) {
-    const { ray } = this.ray(event), between = origin.clone().sub(ray.origin);
-    const b = direction.dot(ray.direction), d = direction.dot(between), e = ray.direction.dot(between);
+    const { ray } = this.ray(event),
+      between = origin.clone().sub(ray.origin);
+    const b = direction.dot(ray.direction),
+      d = direction.dot(between),
+      e = ray.direction.dot(between);
     const slant = 1 - b * b;
     return slant < 1e-4 ? null : (b * e - d) / slant;
   }
 
   // How far round an axis the pointer is, on the plane at right angles to it.
   angle(event, origin, direction) {
-    const { ray } = this.ray(event), plane = new THREE.Plane().setFromNormalAndCoplanarPoint(direction, origin);
+    const { ray } = this.ray(event),
+      plane = new THREE.Plane().setFromNormalAndCoplanarPoint(direction, origin);
     const point = ray.intersectPlane(plane, new THREE.Vector3());
     if (!point) return null;
     point.sub(origin);
-    const seen = Math.abs(direction.y) < 0.9 ? new THREE.Vector3(0, 1, 0) : new THREE.Vector3(1, 0, 0);
-    const u = new THREE.Vector3().crossVectors(seen, direction).normalize(), v = new THREE.Vector3().crossVectors(direction, u);
+    const seen =
+      Math.abs(direction.y) < 0.9 ? new THREE.Vector3(0, 1, 0) : new THREE.Vector3(1, 0, 0);
+    const u = new THREE.Vector3().crossVectors(seen, direction).normalize(),
+      v = new THREE.Vector3().crossVectors(direction, u);
     return Math.atan2(point.dot(v), point.dot(u));
   }
 }

@@ -14,41 +14,80 @@ export class JointPanel {
     this.list = h("div", { class: "joints" });
     this.named = h("div", { class: "buttons", role: "group", "aria-label": "Configurations" });
     this.note = h("p", { class: "note bad", role: "status" });
-    root.append(this.named, this.list, this.note, h("p", { class: "hint" }, "Arrow keys move a slider by 1°, with Shift by 10°, with Alt by 0.1° (slides: mm)."));
+    root.append(
+      this.named,
+      this.list,
+      this.note,
+      h(
+        "p",
+        { class: "hint" },
+        "Arrow keys move a slider by 1°, with Shift by 10°, with Alt by 0.1° (slides: mm).",
+      ),
+    );
   }
 
   take_arm(arm) {
     this.arm = arm;
-    this.named.replaceChildren(...arm.configurations.map((name) => h("button", { type: "button", onclick: () => this.go(name) }, name)));
+    this.named.replaceChildren(
+      ...arm.configurations.map((name) =>
+        h("button", { type: "button", onclick: () => this.go(name) }, name),
+      ),
+    );
     this.rows = arm.joints.map((joint, i) => this.row(joint, i));
     this.list.replaceChildren(...this.rows.map((row) => row.root));
     this.q = new Array(arm.n).fill(0);
   }
 
   row(joint, i) {
-    const lower = joint.lower ?? -FREE[joint.unit], upper = joint.upper ?? FREE[joint.unit];
-    const slider = h("input", { type: "range", min: String(lower), max: String(upper), step: "any", value: "0", "aria-label": joint.name });
-    const number = h("input", { type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": `${joint.name}, value`, class: "number" });
+    const lower = joint.lower ?? -FREE[joint.unit],
+      upper = joint.upper ?? FREE[joint.unit];
+    const slider = h("input", {
+      type: "range",
+      min: String(lower),
+      max: String(upper),
+      step: "any",
+      value: "0",
+      "aria-label": joint.name,
+    });
+    const number = h("input", {
+      type: "text",
+      inputmode: "decimal",
+      autocomplete: "off",
+      "aria-label": `${joint.name}, value`,
+      class: "number",
+    });
     const unit = h("span", { class: "unit" });
-    const low = h("span"), high = h("span");
+    const low = h("span"),
+      high = h("span");
     slider.addEventListener("input", () => this.slide(i, Number(slider.value)));
     slider.addEventListener("keydown", (event) => this.key(event, i));
-    onTyped(number, (text) => {
-      const value = typed(text);
-      if (value === null) {
-        this.lab.complain(`${joint.name}: found ${text.slice(0, 40)}; expected a number`);
-        return this.show();
-      }
-      const { scale } = this.unit(i);
-      this.rows[i].typed = { text: String(value), value: value / scale, scale };
-      this.set(i, value / scale);
-    }, () => this.show());
+    onTyped(
+      number,
+      (text) => {
+        const value = typed(text);
+        if (value === null) {
+          this.lab.complain(`${joint.name}: found ${text.slice(0, 40)}; expected a number`);
+          return this.show();
+        }
+        const { scale } = this.unit(i);
+        this.rows[i].typed = { text: String(value), value: value / scale, scale };
+        this.set(i, value / scale);
+      },
+      () => this.show(),
+    );
     number.addEventListener("keydown", (event) => {
       if (event.key !== "ArrowUp" && event.key !== "ArrowDown") return;
       this.key(event, i);
       number.value = this.text(i);
     });
-    const root = h("div", { class: "joint" }, h("span", { class: "name", title: joint.name }, joint.name), h("span", { class: "value" }, number, unit), slider, h("span", { class: "limits" }, low, high));
+    const root = h(
+      "div",
+      { class: "joint" },
+      h("span", { class: "name", title: joint.name }, joint.name),
+      h("span", { class: "value" }, number, unit),
+      slider,
+      h("span", { class: "limits" }, low, high),
+    );
     return { root, slider, number, unit, low, high, lower, upper, joint };
   }
 
@@ -62,12 +101,18 @@ export class JointPanel {
     event.preventDefault();
     event.stopPropagation();
     const size = event.altKey ? KEYS.alt : event.shiftKey ? KEYS.shift : KEYS.plain;
-    this.set(i, this.q[i] + direction * size * (this.arm.joints[i].unit === "m" ? 1e-3 : Math.PI / 180));
+    this.set(
+      i,
+      this.q[i] + direction * size * (this.arm.joints[i].unit === "m" ? 1e-3 : Math.PI / 180),
+    );
   }
 
   // Joints that a simulation has locked cannot be moved.
   take_control({ running, planar }) {
-    this.rows.forEach((row, i) => (row.slider.disabled = row.number.disabled = running && planar && i !== 1 && i !== 2));
+    this.rows.forEach(
+      (row, i) =>
+        (row.slider.disabled = row.number.disabled = running && planar && i !== 1 && i !== 2),
+    );
   }
 
   go(name) {
@@ -103,9 +148,11 @@ export class JointPanel {
 
   // A state that was sent before Python knew of a step must not undo it: the next step would begin there.
   unanswered(i, told) {
-    const row = this.rows[i], { sent } = row;
+    const row = this.rows[i],
+      { sent } = row;
     const dragged = row.slider === document.activeElement && row.slider.matches(":active");
-    if (sent && sent.value !== told && (dragged || performance.now() < sent.time + ANSWER)) return sent.value;
+    if (sent && sent.value !== told && (dragged || performance.now() < sent.time + ANSWER))
+      return sent.value;
     if (!dragged) row.sent = null;
     return told;
   }
@@ -115,15 +162,22 @@ export class JointPanel {
     if (!this.arm) return;
     if (!q) return this.lab.state.joints && this.take_joints(this.lab.state.joints);
     this.q = [...q];
-    this.outside = new Set(this.q.flatMap((x, i) => (beyond(x, this.arm.joints[i].lower, this.arm.joints[i].upper) ? [i] : [])));
+    this.outside = new Set(
+      this.q.flatMap((x, i) =>
+        beyond(x, this.arm.joints[i].lower, this.arm.joints[i].upper) ? [i] : [],
+      ),
+    );
     this.note.textContent = "";
     if (!this.root.hidden) this.show();
   }
 
   // A value with the digits of its unit, or as it was typed.
   text(i) {
-    const { scale, digits } = this.unit(i), { typed: exact } = this.rows[i];
-    return exact && exact.value === this.q[i] && exact.scale === scale ? exact.text : fixed(this.q[i] * scale, digits);
+    const { scale, digits } = this.unit(i),
+      { typed: exact } = this.rows[i];
+    return exact && exact.value === this.q[i] && exact.scale === scale
+      ? exact.text
+      : fixed(this.q[i] * scale, digits);
   }
 
   shown(visible) {
@@ -132,13 +186,16 @@ export class JointPanel {
 
   show() {
     this.rows.forEach((row, i) => {
-      const { scale, digits, sign } = this.unit(i), text = this.text(i);
+      const { scale, digits, sign } = this.unit(i),
+        text = this.text(i);
       if (document.activeElement !== row.number) row.number.value = text;
       if (Number(row.slider.value) !== this.q[i]) row.slider.value = String(this.q[i]);
       row.slider.setAttribute("aria-valuetext", `${text}${sign}`);
       row.unit.textContent = sign.trim();
-      row.low.textContent = row.joint.lower === null ? "no limit" : fixed(row.lower * scale, Math.min(digits, 2));
-      row.high.textContent = row.joint.upper === null ? "" : fixed(row.upper * scale, Math.min(digits, 2));
+      row.low.textContent =
+        row.joint.lower === null ? "no limit" : fixed(row.lower * scale, Math.min(digits, 2));
+      row.high.textContent =
+        row.joint.upper === null ? "" : fixed(row.upper * scale, Math.min(digits, 2));
       row.root.classList.toggle("outside", Boolean(this.outside?.has(i)));
     });
   }

@@ -7,7 +7,10 @@ import { icon } from "./icons.js";
 import { remember, remembered } from "./memory.js";
 
 const SHORT = 6000; // ms that a message stays
-const WIDTH = 348, SLIM = 322, NARROW = 280, SCENE = 420; // px: of a panel at first, on a small page, at least, and left to the scene
+const WIDTH = 348,
+  SLIM = 322,
+  NARROW = 280,
+  SCENE = 420; // px: of a panel at first, on a small page, at least, and left to the scene
 const STEP = 24; // px that an arrow key moves the edge
 
 export class Lab {
@@ -29,20 +32,85 @@ export class Lab {
     this.dock = new PlotDock(this);
     const bodies = [];
     this.panels = groups.flat().map(([name, title, Panel], k) => {
-      const tab = h("button", { type: "button", role: "tab", id: `tab-${name}`, "aria-controls": `panel-${name}`, "aria-selected": "false", tabIndex: k ? -1 : 0, hidden: Boolean(Panel.optional), onclick: () => this.choose(k), onkeydown: (event) => this.moveTab(event, k) }, icon(name), h("span", {}, title));
-      const body = h("section", { role: "tabpanel", id: `panel-${name}`, "aria-labelledby": `tab-${name}`, hidden: true });
+      const tab = h(
+        "button",
+        {
+          type: "button",
+          role: "tab",
+          id: `tab-${name}`,
+          "aria-controls": `panel-${name}`,
+          "aria-selected": "false",
+          tabIndex: k ? -1 : 0,
+          hidden: Boolean(Panel.optional),
+          onclick: () => this.choose(k),
+          onkeydown: (event) => this.moveTab(event, k),
+        },
+        icon(name),
+        h("span", {}, title),
+      );
+      const body = h("section", {
+        role: "tabpanel",
+        id: `panel-${name}`,
+        "aria-labelledby": `tab-${name}`,
+        hidden: true,
+      });
       bodies.push(body);
-      return { name, title, tab, body, panel: new Panel(this, body), against: new Set(Panel.optional ? [name] : []) };
+      return {
+        name,
+        title,
+        tab,
+        body,
+        panel: new Panel(this, body),
+        against: new Set(Panel.optional ? [name] : []),
+      };
     });
-    const tabs = groups.map((group) => h("div", { class: "group", role: "presentation" }, group.map(([name]) => this.panels.find((panel) => panel.name === name).tab)));
+    const tabs = groups.map((group) =>
+      h(
+        "div",
+        { class: "group", role: "presentation" },
+        group.map(([name]) => this.panels.find((panel) => panel.name === name).tab),
+      ),
+    );
     this.title = h("h1", {}, "");
     this.family = h("p", { class: "family" });
-    this.copy = h("button", { type: "button", class: "quiet", title: "The lines of Python that do the same", hidden: !this.can("python"), onclick: () => this.copyPython() }, "Copy as Python");
+    this.copy = h(
+      "button",
+      {
+        type: "button",
+        class: "quiet",
+        title: "The lines of Python that do the same",
+        hidden: !this.can("python"),
+        onclick: () => this.copyPython(),
+      },
+      "Copy as Python",
+    );
     this.message = h("p", { class: "message", role: "alert", hidden: true });
-    this.edge = h("div", { class: "edge", role: "separator", "aria-orientation": "vertical", "aria-label": "Width of the panel", tabIndex: 0 });
-    const rail = h("nav", { "aria-label": "Panels" }, h("div", { role: "tablist", class: "tabs", "aria-label": "Panels", "aria-orientation": "vertical" }, tabs));
-    this.body = h("div", { class: "body" }, h("header", {}, h("div", { class: "headline" }, this.title, this.copy), this.family), this.message, h("div", { class: "panels" }, bodies));
-    document.body.prepend(h("aside", { id: "lab", "aria-label": "Lab" }, rail, this.body, this.edge));
+    this.edge = h("div", {
+      class: "edge",
+      role: "separator",
+      "aria-orientation": "vertical",
+      "aria-label": "Width of the panel",
+      tabIndex: 0,
+    });
+    const rail = h(
+      "nav",
+      { "aria-label": "Panels" },
+      h(
+        "div",
+        { role: "tablist", class: "tabs", "aria-label": "Panels", "aria-orientation": "vertical" },
+        tabs,
+      ),
+    );
+    this.body = h(
+      "div",
+      { class: "body" },
+      h("header", {}, h("div", { class: "headline" }, this.title, this.copy), this.family),
+      this.message,
+      h("div", { class: "panels" }, bodies),
+    );
+    document.body.prepend(
+      h("aside", { id: "lab", "aria-label": "Lab" }, rail, this.body, this.edge),
+    );
     this.edge.addEventListener("pointerdown", (event) => this.dragEdge(event));
     this.edge.addEventListener("keydown", (event) => this.moveEdge(event));
     this.width = Number(remembered("width", String(innerWidth < 1000 ? SLIM : WIDTH)));
@@ -50,12 +118,26 @@ export class Lab {
     this.layout();
     document.getElementById("stage").after(this.card.root, this.dock.root);
     this.addViews();
-    const wanted = [remembered("tab", first), first].map((name) => this.panels.findIndex((panel) => panel.name === name));
+    const wanted = [remembered("tab", first), first].map((name) =>
+      this.panels.findIndex((panel) => panel.name === name),
+    );
     this.open(Math.max(0, wanted.find((k) => k >= 0) ?? 0));
   }
 
   addViews() {
-    const views = h("select", { "aria-label": "Look from", title: "Look from", onchange: () => { this.stage.look(views.value); views.value = ""; } }, h("option", { value: "", hidden: true }, "View"), ["front", "side", "top", "iso"].map((name) => h("option", { value: name }, name)));
+    const views = h(
+      "select",
+      {
+        "aria-label": "Look from",
+        title: "Look from",
+        onchange: () => {
+          this.stage.look(views.value);
+          views.value = "";
+        },
+      },
+      h("option", { value: "", hidden: true }, "View"),
+      ["front", "side", "top", "iso"].map((name) => h("option", { value: name }, name)),
+    );
     document.getElementById("reset").before(views);
   }
 
@@ -67,7 +149,8 @@ export class Lab {
   }
 
   layout() {
-    const { body } = document, width = Math.max(NARROW, Math.min(this.width, innerWidth - SCENE));
+    const { body } = document,
+      width = Math.max(NARROW, Math.min(this.width, innerWidth - SCENE));
     body.classList.toggle("folded", this.folded);
     body.style.setProperty("--panel", this.folded ? "0px" : `${width}px`);
   }
@@ -80,9 +163,14 @@ export class Lab {
 
   dragEdge(event) {
     this.edge.setPointerCapture(event.pointerId);
-    const begin = this.body.getBoundingClientRect().left, move = ({ clientX }) => this.setWidth(clientX - begin);
+    const begin = this.body.getBoundingClientRect().left,
+      move = ({ clientX }) => this.setWidth(clientX - begin);
     this.edge.addEventListener("pointermove", move);
-    this.edge.addEventListener("lostpointercapture", () => this.edge.removeEventListener("pointermove", move), { once: true });
+    this.edge.addEventListener(
+      "lostpointercapture",
+      () => this.edge.removeEventListener("pointermove", move),
+      { once: true },
+    );
   }
 
   moveEdge(event) {
@@ -109,7 +197,13 @@ export class Lab {
     if (visible) against.delete(who);
     else against.add(who);
     tab.hidden = against.size > 0;
-    if (tab.hidden && tab.getAttribute("aria-selected") === "true") this.open(Math.max(0, this.panels.findIndex((panel) => !panel.against.size)));
+    if (tab.hidden && tab.getAttribute("aria-selected") === "true")
+      this.open(
+        Math.max(
+          0,
+          this.panels.findIndex((panel) => !panel.against.size),
+        ),
+      );
   }
 
   openPanel(name) {
@@ -125,9 +219,19 @@ export class Lab {
   }
 
   moveTab(event, k) {
-    const shown = this.panels.map((_, i) => i).filter((i) => !this.panels[i].tab.hidden), at = shown.indexOf(k), count = shown.length;
-    const after = shown[(at + 1) % count], before = shown[(at + count - 1) % count];
-    const next = { ArrowRight: after, ArrowDown: after, ArrowLeft: before, ArrowUp: before, Home: shown[0], End: shown[count - 1] }[event.key];
+    const shown = this.panels.map((_, i) => i).filter((i) => !this.panels[i].tab.hidden),
+      at = shown.indexOf(k),
+      count = shown.length;
+    const after = shown[(at + 1) % count],
+      before = shown[(at + count - 1) % count];
+    const next = {
+      ArrowRight: after,
+      ArrowDown: after,
+      ArrowLeft: before,
+      ArrowUp: before,
+      Home: shown[0],
+      End: shown[count - 1],
+    }[event.key];
     if (next === undefined) return;
     event.preventDefault();
     event.stopPropagation();
@@ -140,9 +244,12 @@ export class Lab {
     if (name === "arm") {
       this.title.textContent = data.name;
       const family = data.family ?? "no closed form: followed by iteration";
-      this.family.textContent = this.family.title = data.assumed_bodies ? `${family}; masses assumed` : family;
+      this.family.textContent = this.family.title = data.assumed_bodies
+        ? `${family}; masses assumed`
+        : family;
     }
-    for (const part of [this.card, ...this.panels.map(({ panel }) => panel)]) part[`take_${name}`]?.(data);
+    for (const part of [this.card, ...this.panels.map(({ panel }) => panel)])
+      part[`take_${name}`]?.(data);
   }
 
   samples(message) {
@@ -182,7 +289,9 @@ export class Lab {
 
   // What Python says of a request begins with the request's name, which is for programs.
   complain(error, request = "") {
-    this.tell(request && error.startsWith(`${request}: `) ? error.slice(request.length + 2) : error);
+    this.tell(
+      request && error.startsWith(`${request}: `) ? error.slice(request.length + 2) : error,
+    );
     this.cause = request;
   }
 
@@ -215,7 +324,13 @@ export class Lab {
     const close = () => dialog.remove();
     const area = h("textarea", { readOnly: true, rows: 14, "aria-label": title });
     area.value = text;
-    const dialog = h("dialog", { class: "text" }, h("h2", {}, title), area, h("button", { type: "button", onclick: close }, "Close"));
+    const dialog = h(
+      "dialog",
+      { class: "text" },
+      h("h2", {}, title),
+      area,
+      h("button", { type: "button", onclick: close }, "Close"),
+    );
     document.body.append(dialog);
     dialog.addEventListener("close", close);
     dialog.showModal();
@@ -226,6 +341,7 @@ export class Lab {
     Object.assign(this.units, units);
     remember("angle", this.units.angle);
     remember("length", this.units.length);
-    for (const part of [this.card, this.dock, ...this.panels.map(({ panel }) => panel)]) part.unitsChanged?.();
+    for (const part of [this.card, this.dock, ...this.panels.map(({ panel }) => panel)])
+      part.unitsChanged?.();
   }
 }

@@ -3,30 +3,101 @@
 import { MotionCurves, exceeding } from "./curves.js";
 import { UNITS, base64Of, bytes, fixed, h, save, touchingText, typed } from "./dom.js";
 
-const KINDS = [["quintic", "Quintic"], ["trapezoidal", "Trapezoidal"], ["least-time", "Least time"], ["line", "Straight line"], ["circle", "Circle"]];
+const KINDS = [
+  ["quintic", "Quintic"],
+  ["trapezoidal", "Trapezoidal"],
+  ["least-time", "Least time"],
+  ["line", "Straight line"],
+  ["circle", "Circle"],
+];
 const LARGEST_FILE = 500000; // bytes
 
 export class MotionPanel {
   constructor(lab, root) {
     this.lab = lab;
-    this.kind = h("select", { "aria-label": "Kind of motion", onchange: () => this.fit() }, KINDS.map(([value, text]) => h("option", { value }, text)));
+    this.kind = h(
+      "select",
+      { "aria-label": "Kind of motion", onchange: () => this.fit() },
+      KINDS.map(([value, text]) => h("option", { value }, text)),
+    );
     this.goal = h("select", { "aria-label": "Goal" });
-    this.duration = h("input", { type: "text", inputmode: "decimal", class: "number", "aria-label": "Duration in seconds", placeholder: "shortest", onkeydown: (event) => event.key === "Enter" && this.plan() });
-    this.go = h("button", { type: "button", class: "main", onclick: () => this.plan() }, "Plan from here");
-    this.plane = h("select", { "aria-label": "Plane of the circle" }, [["", "any"], ["horizontal", "horizontal"], ["xz", "x and z"], ["yz", "y and z"]].map(([value, text]) => h("option", { value }, text)));
-    this.radius = h("input", { type: "text", inputmode: "decimal", class: "number", "aria-label": "Radius of the circle", placeholder: "usual" });
-    this.centre = h("input", { type: "text", class: "centre", "aria-label": "Centre of the circle, three numbers", placeholder: "towards the base" });
-    this.circle = h("div", { class: "line", hidden: true }, h("label", {}, "plane ", this.plane), h("label", {}, "radius ", this.radius), h("label", {}, "or centre ", this.centre));
+    this.duration = h("input", {
+      type: "text",
+      inputmode: "decimal",
+      class: "number",
+      "aria-label": "Duration in seconds",
+      placeholder: "shortest",
+      onkeydown: (event) => event.key === "Enter" && this.plan(),
+    });
+    this.go = h(
+      "button",
+      { type: "button", class: "main", onclick: () => this.plan() },
+      "Plan from here",
+    );
+    this.plane = h(
+      "select",
+      { "aria-label": "Plane of the circle" },
+      [
+        ["", "any"],
+        ["horizontal", "horizontal"],
+        ["xz", "x and z"],
+        ["yz", "y and z"],
+      ].map(([value, text]) => h("option", { value }, text)),
+    );
+    this.radius = h("input", {
+      type: "text",
+      inputmode: "decimal",
+      class: "number",
+      "aria-label": "Radius of the circle",
+      placeholder: "usual",
+    });
+    this.centre = h("input", {
+      type: "text",
+      class: "centre",
+      "aria-label": "Centre of the circle, three numbers",
+      placeholder: "towards the base",
+    });
+    this.circle = h(
+      "div",
+      { class: "line", hidden: true },
+      h("label", {}, "plane ", this.plane),
+      h("label", {}, "radius ", this.radius),
+      h("label", {}, "or centre ", this.centre),
+    );
     this.job = h("p", { class: "note", role: "status" });
-    this.cancel = h("button", { type: "button", hidden: true, onclick: async () => { await lab.ask("motion.cancel"); this.job.textContent = "cancelled"; } }, "Cancel");
+    this.cancel = h(
+      "button",
+      {
+        type: "button",
+        hidden: true,
+        onclick: async () => {
+          await lab.ask("motion.cancel");
+          this.job.textContent = "cancelled";
+        },
+      },
+      "Cancel",
+    );
     this.facts = h("p", { class: "facts" });
     this.points = h("ol", { class: "points" });
-    this.file = h("input", { type: "file", accept: ".csv,.mat,.npz,.yaml,.yml", "aria-label": "File with a motion", onchange: () => this.read() });
+    this.file = h("input", {
+      type: "file",
+      accept: ".csv,.mat,.npz,.yaml,.yml",
+      "aria-label": "File with a motion",
+      onchange: () => this.read(),
+    });
     this.degrees = h("input", { type: "checkbox" });
     this.curves = new MotionCurves(lab);
-    const download = (format) => h("button", { type: "button", onclick: () => this.download(format) }, format.toUpperCase());
+    const download = (format) =>
+      h("button", { type: "button", onclick: () => this.download(format) }, format.toUpperCase());
     this.replay = h("button", { type: "button", onclick: () => this.play() }, "Play");
-    this.files = h("div", { class: "buttons", hidden: true }, this.replay, download("csv"), download("npz"), h("button", { type: "button", onclick: () => lab.ask("motion.clear") }, "Remove"));
+    this.files = h(
+      "div",
+      { class: "buttons", hidden: true },
+      this.replay,
+      download("csv"),
+      download("npz"),
+      h("button", { type: "button", onclick: () => lab.ask("motion.clear") }, "Remove"),
+    );
     root.append(
       h("div", { class: "line" }, this.kind, h("label", { class: "goal" }, "to ", this.goal)),
       this.circle,
@@ -34,8 +105,25 @@ export class MotionPanel {
       this.job,
       this.facts,
       this.files,
-      h("fieldset", {}, h("legend", {}, "Waypoints"), h("div", { class: "buttons" }, h("button", { type: "button", onclick: () => this.teach() }, "Teach this state"), h("button", { type: "button", onclick: () => lab.ask("waypoints.clear") }, "Clear")), this.points),
-      h("fieldset", {}, h("legend", {}, "From a file"), h("label", { class: "line" }, this.file), h("label", { class: "line" }, this.degrees, " angles in degrees")),
+      h(
+        "fieldset",
+        {},
+        h("legend", {}, "Waypoints"),
+        h(
+          "div",
+          { class: "buttons" },
+          h("button", { type: "button", onclick: () => this.teach() }, "Teach this state"),
+          h("button", { type: "button", onclick: () => lab.ask("waypoints.clear") }, "Clear"),
+        ),
+        this.points,
+      ),
+      h(
+        "fieldset",
+        {},
+        h("legend", {}, "From a file"),
+        h("label", { class: "line" }, this.file),
+        h("label", { class: "line" }, this.degrees, " angles in degrees"),
+      ),
     );
   }
 
@@ -46,7 +134,33 @@ export class MotionPanel {
 
   take_waypoints(points) {
     this.waypoints = points;
-    this.points.replaceChildren(...points.map((point, index) => h("li", {}, h("button", { type: "button", class: "quiet", onclick: () => this.lab.ask("waypoints.go", { index }) }, point.name), h("button", { type: "button", class: "quiet", "aria-label": `Forget ${point.name}`, onclick: () => this.lab.ask("waypoints.remove", { index }) }, "×"))));
+    this.points.replaceChildren(
+      ...points.map((point, index) =>
+        h(
+          "li",
+          {},
+          h(
+            "button",
+            {
+              type: "button",
+              class: "quiet",
+              onclick: () => this.lab.ask("waypoints.go", { index }),
+            },
+            point.name,
+          ),
+          h(
+            "button",
+            {
+              type: "button",
+              class: "quiet",
+              "aria-label": `Forget ${point.name}`,
+              onclick: () => this.lab.ask("waypoints.remove", { index }),
+            },
+            "×",
+          ),
+        ),
+      ),
+    );
     this.goals();
   }
 
@@ -57,7 +171,9 @@ export class MotionPanel {
 
   goals() {
     const before = this.goal.value;
-    const options = (this.arm?.configurations ?? []).filter((name) => name !== "random").map((name) => [`named ${name}`, name]);
+    const options = (this.arm?.configurations ?? [])
+      .filter((name) => name !== "random")
+      .map((name) => [`named ${name}`, name]);
     if (this.target?.reached) options.push(["target", "the target"]);
     (this.waypoints ?? []).forEach((point, k) => options.push([`waypoint ${k}`, point.name]));
     if ((this.waypoints ?? []).length > 1) options.push(["waypoints", "through all waypoints"]);
@@ -70,15 +186,18 @@ export class MotionPanel {
   fit() {
     const through = [...this.goal.options].find((option) => option.value === "waypoints");
     if (through) through.disabled = !["quintic", "least-time"].includes(this.kind.value);
-    if (through?.disabled && this.goal.value === "waypoints") this.goal.value = this.goal.options[0].value;
+    if (through?.disabled && this.goal.value === "waypoints")
+      this.goal.value = this.goal.options[0].value;
     this.circle.hidden = this.kind.value !== "circle";
     this.goal.closest("label").hidden = !this.circle.hidden;
     this.duration.disabled = this.kind.value === "least-time";
   }
 
   async plan() {
-    const text = this.duration.disabled ? "" : this.duration.value.trim(), duration = text === "" ? null : typed(text);
-    if (text !== "" && !(duration > 0)) return this.lab.complain(`duration ${text}: expected a positive number of seconds`);
+    const text = this.duration.disabled ? "" : this.duration.value.trim(),
+      duration = text === "" ? null : typed(text);
+    if (text !== "" && !(duration > 0))
+      return this.lab.complain(`duration ${text}: expected a positive number of seconds`);
     await this.lab.settled();
     const goal = this.chosen();
     if (goal) this.lab.ask("motion.plan", { kind: this.kind.value, goal, duration });
@@ -88,20 +207,36 @@ export class MotionPanel {
     const value = this.goal.value;
     if (this.kind.value === "circle") return this.chosenCircle();
     if (value === "waypoints") return { waypoints: true };
-    if (value === "target") return this.kind.value === "line" ? { T: this.target.T } : { q: this.target.branches.find((branch) => branch.chosen).q };
+    if (value === "target")
+      return this.kind.value === "line"
+        ? { T: this.target.T }
+        : { q: this.target.branches.find((branch) => branch.chosen).q };
     if (value.startsWith("waypoint ")) return { q: this.waypoints[Number(value.slice(9))].q };
     return { q: this.arm.named[value.slice(6)] };
   }
 
   // Lengths are in the unit of the page; null where one is not a number.
   chosenCircle() {
-    const { scale } = UNITS[this.lab.units.length], { plane, radius, centre } = this, circle = plane.value ? { plane: plane.value } : {};
-    const numbers = centre.value.trim().split(/[\s;]+/).filter(Boolean).map(typed), r = radius.value.trim() === "" ? null : typed(radius.value);
+    const { scale } = UNITS[this.lab.units.length],
+      { plane, radius, centre } = this,
+      circle = plane.value ? { plane: plane.value } : {};
+    const numbers = centre.value
+        .trim()
+        .split(/[\s;]+/)
+        .filter(Boolean)
+        .map(typed),
+      r = radius.value.trim() === "" ? null : typed(radius.value);
     if (numbers.length) {
-      if (numbers.length !== 3 || numbers.includes(null)) return void this.lab.complain(`centre ${centre.value.slice(0, 40)}: expected three numbers with spaces between them`);
+      if (numbers.length !== 3 || numbers.includes(null))
+        return void this.lab.complain(
+          `centre ${centre.value.slice(0, 40)}: expected three numbers with spaces between them`,
+        );
       return { ...circle, centre: numbers.map((x) => x / scale) };
     }
-    if (radius.value.trim() !== "" && !(r > 0)) return void this.lab.complain(`radius ${radius.value.slice(0, 40)}: expected a positive number`);
+    if (radius.value.trim() !== "" && !(r > 0))
+      return void this.lab.complain(
+        `radius ${radius.value.slice(0, 40)}: expected a positive number`,
+      );
     return r === null ? circle : { ...circle, radius: r / scale };
   }
 
@@ -126,8 +261,15 @@ export class MotionPanel {
     const [file] = this.file.files;
     if (!file) return;
     if (file.size > LARGEST_FILE) this.file.value = "";
-    if (file.size > LARGEST_FILE) return this.lab.complain(`${file.name} has ${file.size} bytes; expected at most ${LARGEST_FILE}`);
-    await this.lab.ask("motion.file", { name: file.name, content: await base64Of(file), degrees: this.degrees.checked });
+    if (file.size > LARGEST_FILE)
+      return this.lab.complain(
+        `${file.name} has ${file.size} bytes; expected at most ${LARGEST_FILE}`,
+      );
+    await this.lab.ask("motion.file", {
+      name: file.name,
+      content: await base64Of(file),
+      degrees: this.degrees.checked,
+    });
     this.file.value = "";
   }
 
@@ -138,7 +280,11 @@ export class MotionPanel {
 
   take_job(job) {
     this.cancel.hidden = !job?.running;
-    this.job.textContent = job ? (job.error ? `${job.title}: ${job.error}` : `${job.title}: ${job.progress || "begun"}`) : "";
+    this.job.textContent = job
+      ? job.error
+        ? `${job.title}: ${job.error}`
+        : `${job.title}: ${job.progress || "begun"}`
+      : "";
     this.job.classList.toggle("bad", Boolean(job?.error));
   }
 
@@ -149,7 +295,14 @@ export class MotionPanel {
     if (!motion) return this.lab.dock.release(this.curves);
     const still = this.lab.state.control?.running ? "not played: a controller moves the arm" : null;
     const touching = motion.contacts && touchingText(motion.contacts.find(Boolean));
-    this.facts.textContent = [`${motion.kind}, ${fixed(motion.duration, 3)} s`, motion.excess, touching, still].filter(Boolean).join("; ");
+    this.facts.textContent = [
+      `${motion.kind}, ${fixed(motion.duration, 3)} s`,
+      motion.excess,
+      touching,
+      still,
+    ]
+      .filter(Boolean)
+      .join("; ");
     this.facts.classList.toggle("bad", Boolean(motion.excess || touching));
     this.curves.draw(motion, this.arm.joints);
     if (!this.lab.state.control?.running) this.lab.dock.show(this.curves);

@@ -14,9 +14,7 @@ import { WorkspacePanel } from "./workspace.js";
 
 // In groups: an assignment, to move the arm, its model, its simulation, and to learn.
 export const PANELS = [
-  [
-    ["task", "Task", TaskPanel],
-  ],
+  [["task", "Task", TaskPanel]],
   [
     ["joints", "Joints", JointPanel],
     ["tool", "Tool", ToolPanel],
@@ -27,9 +25,7 @@ export const PANELS = [
     ["dynamics", "Dynamics", DynamicsPanel],
     ["workspace", "Workspace", WorkspacePanel],
   ],
-  [
-    ["control", "Control", ControlPanel],
-  ],
+  [["control", "Control", ControlPanel]],
   [
     ["transforms", "Transforms", TransformsPanel],
     ["submit", "Answers", SubmitPanel],

@@ -14,7 +14,13 @@ function load() {
   if (globalThis.uPlot) return Promise.resolve(globalThis.uPlot); // a page without Python has it inside
   loading ??= new Promise((resolve, reject) => {
     document.head.append(h("link", { rel: "stylesheet", href: "lab/uplot.css" }));
-    document.head.append(h("script", { src: "lab/uplot.js", onload: () => resolve(globalThis.uPlot), onerror: reject }));
+    document.head.append(
+      h("script", {
+        src: "lab/uplot.js",
+        onload: () => resolve(globalThis.uPlot),
+        onerror: reject,
+      }),
+    );
   });
   return loading;
 }
@@ -27,10 +33,33 @@ export class Plot {
     this.seek = seek;
     this.hidden = new Set(); // curves that are not drawn
     this.area = h("div", { class: "plot" });
-    this.csv = h("button", { type: "button", class: "quiet", title: `Save ${title} as CSV`, onclick: () => this.saveCsv() }, "CSV");
-    this.png = h("button", { type: "button", class: "quiet", title: `Save ${title} as PNG`, onclick: () => this.savePng() }, "PNG");
+    this.csv = h(
+      "button",
+      {
+        type: "button",
+        class: "quiet",
+        title: `Save ${title} as CSV`,
+        onclick: () => this.saveCsv(),
+      },
+      "CSV",
+    );
+    this.png = h(
+      "button",
+      {
+        type: "button",
+        class: "quiet",
+        title: `Save ${title} as PNG`,
+        onclick: () => this.savePng(),
+      },
+      "PNG",
+    );
     this.caption = h("span", {}, `${title} [${unit}]`);
-    this.root = h("figure", {}, h("figcaption", {}, this.caption, h("span", {}, this.csv, this.png)), this.area);
+    this.root = h(
+      "figure",
+      {},
+      h("figcaption", {}, this.caption, h("span", {}, this.csv, this.png)),
+      this.area,
+    );
     this.plot = null;
     new ResizeObserver(() => this.resize()).observe(this.area);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.again());
@@ -68,18 +97,44 @@ export class Plot {
     if (!this.names) return; // cleared meanwhile
     const style = getComputedStyle(document.documentElement);
     const value = (name) => style.getPropertyValue(name).trim();
-    const axis = { stroke: value("--faint"), grid: { stroke: value("--line"), width: 1 }, ticks: { show: false }, font: "11px system-ui" };
-    const curve = (label, k, dash) => ({ label, stroke: CURVES[k % CURVES.length], width: dash ? 1.2 : 1.7, dash, show: !this.hidden.has(k), points: { show: false } });
-    const series = this.labels().map((label, i) => curve(label, i % this.names.length, i >= this.names.length ? [6, 4] : undefined));
-    this.plot = new uPlot({
-      ...this.size(),
-      scales: { x: { time: false } },
-      series: [{ label: "t [s]" }, ...series],
-      axes: [{ ...axis, size: 26 }, { ...axis, size: 46, space: 22 }],
-      legend: { show: false },
-      cursor: { points: { size: 6 }, y: false, drag: { x: false, y: false }, sync: { key: SYNC } },
-      hooks: { draw: [(plot) => this.drawLimits(plot)] },
-    }, this.shownData, this.area);
+    const axis = {
+      stroke: value("--faint"),
+      grid: { stroke: value("--line"), width: 1 },
+      ticks: { show: false },
+      font: "11px system-ui",
+    };
+    const curve = (label, k, dash) => ({
+      label,
+      stroke: CURVES[k % CURVES.length],
+      width: dash ? 1.2 : 1.7,
+      dash,
+      show: !this.hidden.has(k),
+      points: { show: false },
+    });
+    const series = this.labels().map((label, i) =>
+      curve(label, i % this.names.length, i >= this.names.length ? [6, 4] : undefined),
+    );
+    this.plot = new uPlot(
+      {
+        ...this.size(),
+        scales: { x: { time: false } },
+        series: [{ label: "t [s]" }, ...series],
+        axes: [
+          { ...axis, size: 26 },
+          { ...axis, size: 46, space: 22 },
+        ],
+        legend: { show: false },
+        cursor: {
+          points: { size: 6 },
+          y: false,
+          drag: { x: false, y: false },
+          sync: { key: SYNC },
+        },
+        hooks: { draw: [(plot) => this.drawLimits(plot)] },
+      },
+      this.shownData,
+      this.area,
+    );
     if (this.seek) this.follow(this.plot);
   }
 
@@ -90,7 +145,10 @@ export class Plot {
   }
 
   size() {
-    return { width: Math.max(LEAST.width, this.area.clientWidth), height: Math.max(LEAST.height, this.area.clientHeight) };
+    return {
+      width: Math.max(LEAST.width, this.area.clientWidth),
+      height: Math.max(LEAST.height, this.area.clientHeight),
+    };
   }
 
   // The scene goes to the time that a person points at.
@@ -107,7 +165,9 @@ export class Plot {
   hide(hidden) {
     this.hidden = hidden;
     const n = this.names?.length;
-    this.plot?.series.forEach((_, i) => i > 0 && this.plot.setSeries(i, { show: !hidden.has((i - 1) % n) }));
+    this.plot?.series.forEach(
+      (_, i) => i > 0 && this.plot.setSeries(i, { show: !hidden.has((i - 1) % n) }),
+    );
   }
 
   drawLimits(plot) {
@@ -132,7 +192,8 @@ export class Plot {
 
   // Mark a time by the line that a pointer has.
   mark(time) {
-    if (this.plot && this.area.clientWidth > 0) this.plot.setCursor({ left: this.plot.valToPos(time, "x"), top: 10 }, false);
+    if (this.plot && this.area.clientWidth > 0)
+      this.plot.setCursor({ left: this.plot.valToPos(time, "x"), top: 10 }, false);
   }
 
   resize() {
@@ -143,7 +204,13 @@ export class Plot {
     if (!this.shownData) return;
     const [times, ...curves] = this.shownData;
     const lines = [["t [s]", ...this.labels().map((name) => `"${name} [${this.unit}]"`)].join(",")];
-    times.forEach((t, i) => lines.push([t, ...curves.map((curve) => curve[i])].map((x) => String(Number(x.toPrecision(DIGITS)))).join(",")));
+    times.forEach((t, i) =>
+      lines.push(
+        [t, ...curves.map((curve) => curve[i])]
+          .map((x) => String(Number(x.toPrecision(DIGITS))))
+          .join(","),
+      ),
+    );
     save(`${this.title}.csv`, lines.join("\n") + "\n", "text/csv");
   }
 
@@ -151,13 +218,18 @@ export class Plot {
   savePng() {
     const curves = this.area.querySelector("canvas");
     if (!curves || !this.names) return;
-    const style = getComputedStyle(document.documentElement), value = (name) => style.getPropertyValue(name).trim();
-    const scale = curves.width / curves.clientWidth, line = 18 * scale, picture = document.createElement("canvas");
+    const style = getComputedStyle(document.documentElement),
+      value = (name) => style.getPropertyValue(name).trim();
+    const scale = curves.width / curves.clientWidth,
+      line = 18 * scale,
+      picture = document.createElement("canvas");
     picture.width = curves.width;
-    const paint = picture.getContext("2d"), font = `${12 * scale}px system-ui, sans-serif`;
+    const paint = picture.getContext("2d"),
+      font = `${12 * scale}px system-ui, sans-serif`;
     paint.font = font;
     const places = [];
-    let x = 8 * scale, row = 1;
+    let x = 8 * scale,
+      row = 1;
     for (const name of this.names) {
       const width = paint.measureText(name).width + 30 * scale;
       if (x + width > picture.width && x > 8 * scale) [x, row] = [8 * scale, row + 1];
@@ -186,5 +258,25 @@ export class Plot {
 
 // Names of curves with their colors; a click hides a curve, and shows it again.
 export function legend(names, hidden, toggle) {
-  return h("ul", { class: "legend" }, names.map((name, k) => h("li", {}, h("button", { type: "button", "aria-pressed": String(!hidden.has(k)), title: `Show or hide ${name}`, onclick: () => toggle(k) }, h("i", { style: `background:${CURVES[k % CURVES.length]}` }), name))));
+  return h(
+    "ul",
+    { class: "legend" },
+    names.map((name, k) =>
+      h(
+        "li",
+        {},
+        h(
+          "button",
+          {
+            type: "button",
+            "aria-pressed": String(!hidden.has(k)),
+            title: `Show or hide ${name}`,
+            onclick: () => toggle(k),
+          },
+          h("i", { style: `background:${CURVES[k % CURVES.length]}` }),
+          name,
+        ),
+      ),
+    ),
+  );
 }

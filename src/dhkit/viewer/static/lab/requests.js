@@ -1,7 +1,14 @@
 // Requests to Python. Of those that a drag repeats one is under way, and behind it waits only the latest (of each joint), so
 // that nothing queues; others, such as steps and edits, are all sent, and answered in order.
 
-const REPEATED = new Set(["joints.set", "dynamics.read", "workspace.read", "tool.read", "tool.target", "motion.show"]);
+const REPEATED = new Set([
+  "joints.set",
+  "dynamics.read",
+  "workspace.read",
+  "tool.read",
+  "tool.target",
+  "motion.show",
+]);
 
 export class Requests {
   constructor(connection, failed) {
@@ -15,8 +22,10 @@ export class Requests {
   // A promise of the answer's data; a request that a later one has replaced gives null.
   ask(name, data = {}) {
     return new Promise((resolve) => {
-      const request = { name, data, resolve }, key = `${name} ${data.joint ?? ""}`;
-      const busy = REPEATED.has(name) && [...this.open.values()].some((other) => other.name === name);
+      const request = { name, data, resolve },
+        key = `${name} ${data.joint ?? ""}`;
+      const busy =
+        REPEATED.has(name) && [...this.open.values()].some((other) => other.name === name);
       if (!busy) return this.send(request);
       this.waiting.get(key)?.resolve(null);
       this.waiting.set(key, request);
@@ -26,7 +35,8 @@ export class Requests {
   send(request) {
     const id = ++this.count;
     this.open.set(id, request);
-    if (!this.connection.send({ type: "request", id, name: request.name, data: request.data })) this.take({ id, error: "not connected to Python" });
+    if (!this.connection.send({ type: "request", id, name: request.name, data: request.data }))
+      this.take({ id, error: "not connected to Python" });
   }
 
   take({ id, data, error }) {

@@ -3,20 +3,55 @@
 import { h } from "./dom.js";
 import { formula } from "./formula.js";
 
-const KINDS = [["lines", "Equations, one a line: M11 = …"], ["latex", "LaTeX"], ["python", "Python (as text)"], ["matlab", "MATLAB (as text)"], ["sheet", "Answer sheet (TOML)"]];
+const KINDS = [
+  ["lines", "Equations, one a line: M11 = …"],
+  ["latex", "LaTeX"],
+  ["python", "Python (as text)"],
+  ["matlab", "MATLAB (as text)"],
+  ["sheet", "Answer sheet (TOML)"],
+];
 const EXAMPLE = "M11 = ...\ng2 = ...";
 
 export class SubmitPanel {
   constructor(lab, root) {
     this.lab = lab;
-    this.kind = h("select", { "aria-label": "How the answer is written" }, KINDS.map(([value, text]) => h("option", { value }, text)));
-    this.text = h("textarea", { rows: 9, "aria-label": "Answer", placeholder: EXAMPLE, spellcheck: "false", maxLength: 60000 });
-    this.send = h("button", { type: "button", class: "main", onclick: () => lab.ask("submit.grade", { kind: this.kind.value, text: this.text.value }) }, "Judge");
-    this.cancel = h("button", { type: "button", hidden: true, onclick: () => lab.ask("submit.cancel") }, "Cancel");
+    this.kind = h(
+      "select",
+      { "aria-label": "How the answer is written" },
+      KINDS.map(([value, text]) => h("option", { value }, text)),
+    );
+    this.text = h("textarea", {
+      rows: 9,
+      "aria-label": "Answer",
+      placeholder: EXAMPLE,
+      spellcheck: "false",
+      maxLength: 60000,
+    });
+    this.send = h(
+      "button",
+      {
+        type: "button",
+        class: "main",
+        onclick: () => lab.ask("submit.grade", { kind: this.kind.value, text: this.text.value }),
+      },
+      "Judge",
+    );
+    this.cancel = h(
+      "button",
+      { type: "button", hidden: true, onclick: () => lab.ask("submit.cancel") },
+      "Cancel",
+    );
     this.parameters = h("p", { class: "hint" });
     this.note = h("p", { class: "note", role: "status" });
     this.report = h("div", { class: "report" });
-    root.append(this.kind, this.text, this.parameters, h("div", { class: "buttons" }, this.send, this.cancel), this.note, this.report);
+    root.append(
+      this.kind,
+      this.text,
+      this.parameters,
+      h("div", { class: "buttons" }, this.send, this.cancel),
+      this.note,
+      this.report,
+    );
   }
 
   take_arm(arm) {
@@ -28,16 +63,42 @@ export class SubmitPanel {
   take_verdict(verdict) {
     this.cancel.hidden = !verdict?.running;
     this.send.disabled = Boolean(verdict?.running);
-    this.note.textContent = !verdict ? "" : verdict.running ? "judging …" : verdict.error ?? `${verdict.verdict}${verdict.missing.length ? `; missing: ${verdict.missing.slice(0, 6).join(", ")}${verdict.missing.length > 6 ? ` and ${verdict.missing.length - 6} more` : ""}` : ""}`;
-    this.note.classList.toggle("bad", Boolean(verdict && !verdict.running && (verdict.error || verdict.verdict !== "correct")));
+    this.note.textContent = !verdict
+      ? ""
+      : verdict.running
+        ? "judging …"
+        : (verdict.error ??
+          `${verdict.verdict}${verdict.missing.length ? `; missing: ${verdict.missing.slice(0, 6).join(", ")}${verdict.missing.length > 6 ? ` and ${verdict.missing.length - 6} more` : ""}` : ""}`);
+    this.note.classList.toggle(
+      "bad",
+      Boolean(verdict && !verdict.running && (verdict.error || verdict.verdict !== "correct")),
+    );
     if (!verdict || verdict.running || verdict.error) return this.report.replaceChildren();
-    const found = verdict.diagnosis.map(({ place, sentence }) => h("p", { class: "diagnosis" }, h("b", {}, `${place}: `), sentence));
+    const found = verdict.diagnosis.map(({ place, sentence }) =>
+      h("p", { class: "diagnosis" }, h("b", {}, `${place}: `), sentence),
+    );
     const notes = verdict.notes.map((text) => h("p", { class: "hint" }, text));
-    this.report.replaceChildren(...found, ...verdict.entries.map((entry) => this.entry(entry)), ...notes);
+    this.report.replaceChildren(
+      ...found,
+      ...verdict.entries.map((entry) => this.entry(entry)),
+      ...notes,
+    );
   }
 
   entry({ name, verdict, passes, read, text, statement, difference, difference_text, witness }) {
-    const shown = (mathml, otherwise) => h("div", { class: "wide" }, formula(mathml) ?? h("code", {}, otherwise ?? ""));
-    return h("article", { class: passes ? "right" : "wrong" }, h("h3", {}, `${name}: ${verdict}`), h("small", {}, "read as"), shown(read, text), statement ? h("small", {}, statement) : null, difference_text ? [h("small", {}, "answer less the truth"), shown(difference, difference_text)] : null, witness ? h("small", {}, witness) : null);
+    const shown = (mathml, otherwise) =>
+      h("div", { class: "wide" }, formula(mathml) ?? h("code", {}, otherwise ?? ""));
+    return h(
+      "article",
+      { class: passes ? "right" : "wrong" },
+      h("h3", {}, `${name}: ${verdict}`),
+      h("small", {}, "read as"),
+      shown(read, text),
+      statement ? h("small", {}, statement) : null,
+      difference_text
+        ? [h("small", {}, "answer less the truth"), shown(difference, difference_text)]
+        : null,
+      witness ? h("small", {}, witness) : null,
+    );
   }
 }

@@ -14,19 +14,47 @@ export class TaskPanel {
     this.bar = h("progress", { "aria-label": "Points" });
     this.note = h("p", { class: "hint", hidden: true });
     this.list = h("div", { class: "tasks" });
-    this.reset = h("button", { type: "button", title: "Forget which goals were reached", onclick: () => lab.ask("task.reset") }, "Reset");
-    root.append(this.title, this.points, this.bar, this.note, this.list, h("div", { class: "buttons" }, this.reset));
+    this.reset = h(
+      "button",
+      {
+        type: "button",
+        title: "Forget which goals were reached",
+        onclick: () => lab.ask("task.reset"),
+      },
+      "Reset",
+    );
+    root.append(
+      this.title,
+      this.points,
+      this.bar,
+      this.note,
+      this.list,
+      h("div", { class: "buttons" }, this.reset),
+    );
   }
 
   take_task(task) {
     this.lab.showTab("task", Boolean(task));
-    for (const { name } of this.lab.panels) if (name !== "task") this.lab.showTab(name, !task?.panels || task.panels.includes(name), "task");
+    for (const { name } of this.lab.panels)
+      if (name !== "task")
+        this.lab.showTab(name, !task?.panels || task.panels.includes(name), "task");
     if (!task) return;
-    const key = JSON.stringify([task.title, task.steps.map((step) => [step.title, step.text, step.panel, step.goals.map((goal) => goal.text)])]);
+    const key = JSON.stringify([
+      task.title,
+      task.steps.map((step) => [
+        step.title,
+        step.text,
+        step.panel,
+        step.goals.map((goal) => goal.text),
+      ]),
+    ]);
     if (key !== this.key) this.build(task, key);
-    const goals = task.steps.flatMap((step) => step.goals), met = goals.filter((goal) => goal.met).length;
+    const goals = task.steps.flatMap((step) => step.goals),
+      met = goals.filter((goal) => goal.met).length;
     this.title.textContent = task.title;
-    this.points.textContent = goals.length ? `${number(task.points)} of ${number(task.most)} points, ${met} of ${goals.length} goals` : "";
+    this.points.textContent = goals.length
+      ? `${number(task.points)} of ${number(task.most)} points, ${met} of ${goals.length} goals`
+      : "";
     this.bar.hidden = !task.most;
     this.bar.max = task.most || 1;
     this.bar.value = task.points;
@@ -51,15 +79,49 @@ export class TaskPanel {
   step({ title, text, panel, goals }, k) {
     const count = h("small");
     const marks = goals.map((goal) => this.goal(goal));
-    const paragraphs = text.split(/\n[ \t]*\n/).map((one) => one.trim()).filter(Boolean).map((one) => h("p", {}, one));
-    const open = panel && h("div", { class: "buttons" }, h("button", { type: "button", onclick: () => this.lab.openPanel(panel) }, `Open panel ${this.lab.panelTitle(panel)}`));
-    const root = h("details", {}, h("summary", {}, h("span", {}, `${k + 1}. ${title}`), count), paragraphs, open, goals.length ? h("ul", { class: "goals" }, marks.map((mark) => mark.root)) : null);
+    const paragraphs = text
+      .split(/\n[ \t]*\n/)
+      .map((one) => one.trim())
+      .filter(Boolean)
+      .map((one) => h("p", {}, one));
+    const open =
+      panel &&
+      h(
+        "div",
+        { class: "buttons" },
+        h(
+          "button",
+          { type: "button", onclick: () => this.lab.openPanel(panel) },
+          `Open panel ${this.lab.panelTitle(panel)}`,
+        ),
+      );
+    const root = h(
+      "details",
+      {},
+      h("summary", {}, h("span", {}, `${k + 1}. ${title}`), count),
+      paragraphs,
+      open,
+      goals.length
+        ? h(
+            "ul",
+            { class: "goals" },
+            marks.map((mark) => mark.root),
+          )
+        : null,
+    );
     return { root, count, marks };
   }
 
   goal({ text, points }) {
-    const sign = h("span", { class: "sign", "aria-hidden": "true" }), word = h("span", { class: "word" });
-    const root = h("li", {}, sign, h("span", {}, text, points === 1 ? null : h("small", {}, ` (${number(points)} points)`)), word);
+    const sign = h("span", { class: "sign", "aria-hidden": "true" }),
+      word = h("span", { class: "word" });
+    const root = h(
+      "li",
+      {},
+      sign,
+      h("span", {}, text, points === 1 ? null : h("small", {}, ` (${number(points)} points)`)),
+      word,
+    );
     return { root, sign, word, met: null };
   }
 
@@ -72,7 +134,9 @@ export class TaskPanel {
       mark.word.textContent = met ? "done" : "open";
       mark.root.classList.toggle("met", met);
     });
-    count.textContent = goals.length ? `${goals.filter((goal) => goal.met).length} of ${goals.length}` : "";
+    count.textContent = goals.length
+      ? `${goals.filter((goal) => goal.met).length} of ${goals.length}`
+      : "";
   }
 }
 

@@ -18,7 +18,8 @@ export class OfflineDesk {
     Object.assign(this, { page, data, failed });
     this.answers = {
       "joints.set": ({ q }) => this.show(q),
-      "joints.named": ({ name }) => this.show(Object.hasOwn(data.arm.named, name) ? data.arm.named[name] : this.random()),
+      "joints.named": ({ name }) =>
+        this.show(Object.hasOwn(data.arm.named, name) ? data.arm.named[name] : this.random()),
       "tool.order": ({ order }) => this.choose(order),
       "tool.read": ({ q }) => this.tool(q),
       "table.edit": (edit) => this.edit(edit),
@@ -78,16 +79,29 @@ export class OfflineDesk {
   }
 
   tellState() {
-    const { q } = this, { joints } = this.data.arm;
-    const outside = q.flatMap((x, i) => ((joints[i].lower ?? -Infinity) <= x && x <= (joints[i].upper ?? Infinity) ? [] : [i]));
+    const { q } = this,
+      { joints } = this.data.arm;
+    const outside = q.flatMap((x, i) =>
+      (joints[i].lower ?? -Infinity) <= x && x <= (joints[i].upper ?? Infinity) ? [] : [i],
+    );
     this.tell("joints", { q, within: !outside.length, outside, nearest: null });
     this.tell("tool", this.tool(q));
   }
 
   tool(q) {
-    const frames = this.kinematics.frames(q), T = frames[frames.length - 1], { order } = this, angles = euler(T, order);
+    const frames = this.kinematics.frames(q),
+      T = frames[frames.length - 1],
+      { order } = this,
+      angles = euler(T, order);
     const middle = order[0] === order[2] ? Math.sin(angles[1]) : Math.cos(angles[1]);
-    return { T, xyz: [T[3], T[7], T[11]], euler: angles, order, unique: Math.abs(middle) > UNIQUE, singular: null };
+    return {
+      T,
+      xyz: [T[3], T[7], T[11]],
+      euler: angles,
+      order,
+      unique: Math.abs(middle) > UNIQUE,
+      singular: null,
+    };
   }
 
   choose(order) {
@@ -97,7 +111,8 @@ export class OfflineDesk {
 
   random() {
     return this.data.arm.joints.map(({ lower, upper, unit }) => {
-      const low = lower ?? -FREE[unit], high = upper ?? FREE[unit];
+      const low = lower ?? -FREE[unit],
+        high = upper ?? FREE[unit];
       return low + Math.random() * (high - low);
     });
   }
@@ -105,7 +120,8 @@ export class OfflineDesk {
   // The table
 
   edit({ row, column, text }) {
-    const texts = this.now.texts.map((entries) => [...entries]), errors = [];
+    const texts = this.now.texts.map((entries) => [...entries]),
+      errors = [];
     texts[row][COLUMNS.indexOf(column)] = normalized(text);
     const rows = this.now.rows.map((last, i) => {
       const numbers = { ...last };
@@ -121,13 +137,24 @@ export class OfflineDesk {
       return numbers;
     });
     const { now } = this;
-    this.take({ ...now, texts, errors, rows: errors.length ? now.rows : rows, good: errors.length ? now.good : texts });
-    return { error: errors.find((error) => error.row === row && error.column === column)?.error ?? null };
+    this.take({
+      ...now,
+      texts,
+      errors,
+      rows: errors.length ? now.rows : rows,
+      good: errors.length ? now.good : texts,
+    });
+    return {
+      error: errors.find((error) => error.row === row && error.column === column)?.error ?? null,
+    };
   }
 
   // Whoever types the first numbers again has the first arm again.
   take(given) {
-    const { first } = this, same = given.convention === first.convention && given.rows.every((row, i) => COLUMNS.every((name) => row[name] === first.rows[i][name]));
+    const { first } = this,
+      same =
+        given.convention === first.convention &&
+        given.rows.every((row, i) => COLUMNS.every((name) => row[name] === first.rows[i][name]));
     const table = same ? { ...given, rows: first.rows } : given;
     this.before = [...this.before.slice(1 - MOST_STEPS), this.now];
     this.after = [];
@@ -144,11 +171,18 @@ export class OfflineDesk {
     const same = table.rows === this.now.rows && table.convention === this.now.convention;
     this.now = table;
     if (!same) {
-      const { stage } = this.page, { edited } = this;
+      const { stage } = this.page,
+        { edited } = this;
       this.kinematics = new Kinematics(table);
-      stage.redraw(edited ? solids(this.kinematics, stage.size, THREE) : null, edited ? this.kinematics.labels() : this.data.labels);
+      stage.redraw(
+        edited ? solids(this.kinematics, stage.size, THREE) : null,
+        edited ? this.kinematics.labels() : this.data.labels,
+      );
       stage.leaveArm(); // ghosts and paths were those of the table before
-      this.tell("arm", { ...this.data.arm, family: edited ? "edited on this page" : this.data.arm.family });
+      this.tell("arm", {
+        ...this.data.arm,
+        family: edited ? "edited on this page" : this.data.arm.family,
+      });
       this.show(this.q);
     }
     this.tellTable();
@@ -161,14 +195,32 @@ export class OfflineDesk {
 
   tellTable() {
     const { now, first } = this;
-    const rows = now.texts.map((texts, i) => ({ joint: this.data.arm.joints[i].name, kind: now.rows[i].kind, ...Object.fromEntries(COLUMNS.map((name, k) => [name, texts[k]])) }));
-    const changed = JSON.stringify(now.texts) !== JSON.stringify(first.texts) || now.convention !== first.convention;
+    const rows = now.texts.map((texts, i) => ({
+      joint: this.data.arm.joints[i].name,
+      kind: now.rows[i].kind,
+      ...Object.fromEntries(COLUMNS.map((name, k) => [name, texts[k]])),
+    }));
+    const changed =
+      JSON.stringify(now.texts) !== JSON.stringify(first.texts) ||
+      now.convention !== first.convention;
     const values = now.rows.map((row) => COLUMNS.map((name) => row[name]));
-    this.tell("table", { convention: now.convention, rows, values, errors: now.errors, undo: this.before.length > 0, redo: this.after.length > 0, changed, note: this.edited ? "drawn from the table; limits are those of the arm as it was written" : null });
+    this.tell("table", {
+      convention: now.convention,
+      rows,
+      values,
+      errors: now.errors,
+      undo: this.before.length > 0,
+      redo: this.after.length > 0,
+      changed,
+      note: this.edited
+        ? "drawn from the table; limits are those of the arm as it was written"
+        : null,
+    });
   }
 
   steps(row) {
-    const { kinematics, q } = this, T = kinematics.frames(q)[row];
+    const { kinematics, q } = this,
+      T = kinematics.frames(q)[row];
     let A = null;
     const steps = [{ title: `frame ${row}`, T }];
     for (const { title, T: moved } of kinematics.steps(row, q[row])) {
@@ -181,25 +233,39 @@ export class OfflineDesk {
   // Motions
 
   play(index) {
-    const motion = this.data.motions[index], { times, q, reference } = motion;
+    const motion = this.data.motions[index],
+      { times, q, reference } = motion;
     const drawn = (rows) => packed(rows.map((row) => this.kinematics.frames(row)));
     this.motion = motion;
     this.tell("motion", { ...motion, index });
     const joints = this.q.length;
-    this.page.takeAnimation({ joints, nodes: joints + 2, times: new Float64Array(times), q: new Float32Array(q.flat()), transforms: drawn(q), flag: true, ghost: reference && { transforms: drawn(reference), tint: REFERENCE } });
+    this.page.takeAnimation({
+      joints,
+      nodes: joints + 2,
+      times: new Float64Array(times),
+      q: new Float32Array(q.flat()),
+      transforms: drawn(q),
+      flag: true,
+      ghost: reference && { transforms: drawn(reference), tint: REFERENCE },
+    });
   }
 
   motionAt(time) {
     if (!this.motion) return this.q;
-    const { times, q } = this.motion, at = (time / times[times.length - 1]) * (times.length - 1);
-    const k = Math.min(times.length - 2, Math.floor(at)), share = at - k;
+    const { times, q } = this.motion,
+      at = (time / times[times.length - 1]) * (times.length - 1);
+    const k = Math.min(times.length - 2, Math.floor(at)),
+      share = at - k;
     return q[k].map((x, i) => (1 - share) * x + share * q[k + 1][i]);
   }
 }
 
 // Frames of states as the page draws them: the upper three rows of each.
 function packed(states) {
-  const nodes = states[0].length, numbers = new Float32Array(12 * nodes * states.length);
-  states.forEach((frames, k) => frames.forEach((T, i) => numbers.set(T.slice(0, 12), 12 * (k * nodes + i))));
+  const nodes = states[0].length,
+    numbers = new Float32Array(12 * nodes * states.length);
+  states.forEach((frames, k) =>
+    frames.forEach((T, i) => numbers.set(T.slice(0, 12), 12 * (k * nodes + i))),
+  );
   return numbers;
 }

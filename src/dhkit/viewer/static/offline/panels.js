@@ -7,15 +7,11 @@ import { AboutPanel } from "./about.js";
 import { RecordedPanel } from "./recorded.js";
 
 export const PANELS = [
-  [
-    ["about", "About", AboutPanel],
-  ],
+  [["about", "About", AboutPanel]],
   [
     ["joints", "Joints", JointPanel],
     ["tool", "Tool", ToolPanel],
     ["recorded", "Motions", RecordedPanel],
   ],
-  [
-    ["table", "DH table", TablePanel],
-  ],
+  [["table", "DH table", TablePanel]],
 ];

@@ -14,7 +14,16 @@ export class RecordedPanel {
 
   take_recorded(motions) {
     this.lab.showTab("recorded", motions.length > 0);
-    this.list.replaceChildren(...motions.map((motion, index) => h("button", { type: "button", "aria-pressed": "false", onclick: () => this.play(index) }, h("span", {}, motion.name), h("small", {}, `${fixed(motion.duration, 2)} s`))));
+    this.list.replaceChildren(
+      ...motions.map((motion, index) =>
+        h(
+          "button",
+          { type: "button", "aria-pressed": "false", onclick: () => this.play(index) },
+          h("span", {}, motion.name),
+          h("small", {}, `${fixed(motion.duration, 2)} s`),
+        ),
+      ),
+    );
   }
 
   play(index) {
@@ -25,8 +34,18 @@ export class RecordedPanel {
 
   take_motion(motion) {
     this.motion = motion;
-    [...this.list.children].forEach((button, k) => button.setAttribute("aria-pressed", String(motion?.index === k)));
-    this.facts.textContent = motion ? [motion.excess, motion.step ? `long: drawn by a sample every ${fixed(motion.step, 2)} s` : null, motion.reference ? "the grey arm is what was asked for" : null].filter(Boolean).join("; ") : "A motion plays when it is chosen; sliders end it.";
+    [...this.list.children].forEach((button, k) =>
+      button.setAttribute("aria-pressed", String(motion?.index === k)),
+    );
+    this.facts.textContent = motion
+      ? [
+          motion.excess,
+          motion.step ? `long: drawn by a sample every ${fixed(motion.step, 2)} s` : null,
+          motion.reference ? "the grey arm is what was asked for" : null,
+        ]
+          .filter(Boolean)
+          .join("; ")
+      : "A motion plays when it is chosen; sliders end it.";
     this.facts.classList.toggle("bad", Boolean(motion?.excess));
     if (!motion) return this.lab.dock.release(this.curves);
     this.curves.draw(motion, this.lab.state.arm.joints);
