@@ -145,6 +145,9 @@ class Adaptive:
         # Both poles are real:  lambda = w (z - sqrt(z^2 - 1)) and kd / m = w (z + sqrt(z^2 - 1)), with product w^2.
         apart = np.sqrt(z * z - 1)
         kd = m * w * (z + apart)
+
+        # The closed loop is M ds/dt + C s + K_D s = -Y (p - p*). While p changes slowly, s = -K_D^-1 Y (p - p*), and so
+        #     d(p - p*)/dt = Gamma Y^T s = -Gamma <Y^T K_D^-1 Y> (p - p*) = -a (p - p*).
         Gamma = positive(adaptation, "adaptation") * _inverse_excitation(description, kd)
         return cls(description, w * (z - apart), kd, Gamma, estimate=estimate, masses=masses)
 
@@ -158,7 +161,8 @@ class Adaptive:
         """Return the torques, shape (n,), N m and N, and store the estimate's rate for the next call."""
         Y, known, s = self._terms(q, qd, setpoint)
 
-        # With s = qd_r - qd the estimate's rate is Gamma Y^T s; it is integrated by the trapezoidal rule.
+        # dp/dt = Gamma Y^T s, integrated from call k - 1 to call k by the trapezoidal rule:
+        #     p_k = p_(k-1) + (t_k - t_(k-1)) / 2 (rate_(k-1) + rate_k).
         rate = self.adaptation @ (Y.T @ s)
         if self._time is not None:
             self.estimate = self.estimate + (t - self._time) / 2 * (self._rate + rate)
@@ -198,6 +202,7 @@ class Adaptive:
 
     def _reference(self, q: Array, qd: Array, setpoint: Setpoint) -> tuple[Array, Array]:
         """Return qd_r and s."""
+        # qd_r = qd_d + Lambda e and s = qd_r - qd, with e = q_d - q.
         qd_r = setpoint.qd + self.decay * (setpoint.q - q)
         return qd_r, qd_r - qd
 
@@ -205,19 +210,26 @@ class Adaptive:
         """Return Y in base parameters, the torques that do not depend on the estimate, and s."""
         qd_r, s = self._reference(q, qd, setpoint)
         qdd_r = setpoint.qdd + self.decay * (setpoint.qd - qd)
+
+        # tau = Y p + (B qdd_r + K_D s). Only independent columns of Y are kept: base parameters multiply these.
         Y = velocity_regressor(self.description, q, qd, qd_r, qdd_r)[:, self._columns]
-        return Y, self.description.numbers.drive_inertia @ qdd_r + self.kd * s, s
+        known = self.description.numbers.drive_inertia @ qdd_r + self.kd * s
+        return Y, known, s
 
 
 def _inverse_excitation(description: Description, kd: Array) -> Array:
     """Return <Y^T K_D^-1 Y>^-1 over random motions, shape (m, m)."""
     q, qd, qdd = random_motions(description, RANDOM_STATES)
     Y = velocity_regressor(description, q, qd, qd, qdd)[..., list(parameter_grouping(description).columns)]
-    rows = (Y / np.sqrt(kd)[:, None]).reshape(-1, Y.shape[-1]) / np.sqrt(len(q))
-    # By QR with columns of unit length: forming the square first would square the condition number.
-    size = np.linalg.norm(rows, axis=0)
-    inverse = np.linalg.inv(np.linalg.qr(rows / size, mode="r")) / size[:, None]
-    product: Array = inverse @ inverse.T
+
+    # The rows of K_D^(-1/2) Y of all N states, over sqrt(N), make a matrix A with A^T A = <Y^T K_D^-1 Y>.
+    A = (Y / np.sqrt(kd)[:, None]).reshape(-1, Y.shape[-1]) / np.sqrt(len(q))
+
+    # A = Q R D, with D = diag(column lengths), so that (A^T A)^-1 = X X^T with X = D^-1 R^-1. Forming A^T A first
+    # would square the condition number.
+    D = np.linalg.norm(A, axis=0)
+    X = np.linalg.inv(np.linalg.qr(A / D, mode="r")) / D[:, None]
+    product: Array = X @ X.T
     return (product + product.T) / 2
 
 

@@ -161,6 +161,7 @@ class BatchRun:
                 break
             if closed is not None:
                 states = later
+            # The closed step is the first of the period; in the others its torques are held.
             for _ in range(0 if closed is None else 1, self.substeps):
                 # New arrays each time: a controller may keep those that it was given.
                 later = _empty_like(states)

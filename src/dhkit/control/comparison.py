@@ -150,6 +150,7 @@ class Comparison:
 
 def _row(result: SimulationResult, degrees: bool) -> tuple[str, ...]:
     scale = np.where(result.description.numbers.prismatic | (not degrees), 1.0, 180 / np.pi)
+    # Largest |tau_i| / limit_i over all joints; a joint without limit has the share 0.
     effort = result.description.numbers.effort
     share = 100 * float((np.abs(result.tau).max(axis=0) / effort).max())
     errors = [float((scale * np.abs(x)).max()) for x in (result.peak_error, result.rms_error, result.final_error)]

@@ -156,6 +156,7 @@ def _beyond_between(plant: Plant, state: State, later: State) -> float | None:
 
 def _crossing(measure: Measure, at: Callable[[float], State], begin: float, end: float) -> float:
     """Return the time at which a measure that is negative at ``end`` becomes negative."""
+    # The measure may be 0 at ``begin``, which brackets no root: a time soon after it, where it is positive, does.
     for fraction in FRACTIONS:
         inside = begin + (end - begin) * fraction
         value = measure(at(inside))
@@ -169,6 +170,8 @@ def _crossing(measure: Measure, at: Callable[[float], State], begin: float, end:
 
 def _possible_events(plant: Plant, integrator: Integrator, state: State, phase: Phase) -> list[Event]:
     """Return the possible events of a contact: joints that come to rest, hit a stop, or break away."""
+    # Measures, positive until the event: s_i qd_i of a joint that moves in the direction s_i, the room q_i - lower_i
+    # and upper_i - q_i before stops, and the distance of holding torques from their bounds.
     found: list[Event] = []
     contact = phase.contact
     lower, upper = plant.limits
@@ -202,6 +205,8 @@ def _margin(plant: Plant, integrator: Integrator, state: State, phase: Phase) ->
         tau = integrator.torque(state)
         f = plant.holding_torques(state.q, state.qd, tau, phase.contact, phase.pushes)[holds]
         margin = np.minimum(most[holds] - f, f - least[holds]).min()
+
+        # A torque that is at its bound but for rounding holds: otherwise breakaways could follow without end.
         rounding = EXCEEDED * max(1.0, float(np.abs(f).max()))
         return float(margin) + rounding
 
@@ -235,5 +240,7 @@ def _after_impact(plant: Plant, joint: int, limit: float, state: State) -> State
     # Joints that leave a stop slower than that are at rest there: the contact decides for all together which leave.
     is_at_stop = (q == lower) | (q == upper)
     qd = np.where(is_at_stop & (np.abs(qd) < SLOWEST_REBOUND), 0.0, qd)
+
+    # (qd^T M qd - qd'^T M qd') / 2, which the energy audit counts as lost.
     loss = before - plant.kinetic_energy(q, qd)
     return replace(state, q=q, qd=qd, impact_loss=state.impact_loss + loss)

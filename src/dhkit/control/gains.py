@@ -27,6 +27,7 @@ def gain(value: ArrayLike, name: str, n: int | None = None) -> Array:
         Not numbers.
     """
     array = number_array(value, name, "a number, or one for each joint")
+    # A column (B, 1) has one gain for all joints of each run.
     if array.ndim == 2 and array.shape[1] == 1 and n is not None:
         array = np.repeat(array, n, axis=1)
     if array.ndim > 2 or (n is not None and array.ndim and array.shape[-1] != n):
@@ -91,6 +92,7 @@ def effective_inertia(description: Description, q: ArrayLike | None = None) -> A
     q
         Joint values, shape (n,), rad and m; the average over random configurations inside the limits unless given.
     """
+    # M_ii is the torque for a unit acceleration of joint i while the other joints do not accelerate.
     M = mass_matrix(description, random_motions(description, RANDOM_CONFIGURATIONS).q if q is None else q)
     diagonal: Array = np.diagonal(M, axis1=-2, axis2=-1).reshape(-1, description.n).mean(axis=0)
     return diagonal
@@ -110,7 +112,12 @@ def pid_gains(bandwidth: ArrayLike, damping: ArrayLike, integral: float) -> tupl
     a = integral
     if not (np.isfinite(a) and a >= 0):
         raise ValueError(f"integral is {integral!r}; expected a number, 0 or more")
-    return w * w * (1 + 2 * z * a), a * w**3, w * (2 * z + a)
+
+    # (s + a w) (s^2 + 2 z w s + w^2) = s^3 + k_d s^2 + k_p s + k_i
+    k_p = w * w * (1 + 2 * z * a)
+    k_i = a * w**3
+    k_d = w * (2 * z + a)
+    return k_p, k_i, k_d
 
 
 def gains_text(**gains: Array) -> str:

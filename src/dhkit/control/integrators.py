@@ -215,6 +215,8 @@ class DormandPrince:
         # A setpoint that jumps at the end keeps its earlier value until then.
         latest = float(np.nextafter(end, state.t))
 
+        # y = (q, qd, controller's states, works), where the works grow by powers:
+        #     dW_drives/dt = qd . tau,    dW_friction/dt = qd . r(qd),    dW_pushes/dt = qd . J^T w.
         def rates(t: float, y: Array) -> Array:
             q = y[:n]
             qd = y[n : 2 * n]
@@ -252,6 +254,8 @@ class DormandPrince:
             raise SimulationError(f"no step from {begin:g} s on meets the tolerance of {self.tolerance:g}")
         self._length = solver.h_abs
 
+        # Every step adds 1, its length h takes off usual_rate h. The excess is not below 0: long steps earlier do not
+        # excuse short ones later.
         usual = self._usual_rate * (solver.t - begin)
         self._excess = max(0.0, self._excess + 1.0 - usual)
         if not self._excess:
@@ -342,5 +346,6 @@ def _hold(phase: Phase, before: Array, q: Array, qd: Array) -> None:
 
 
 def _weighted(powers: Sequence[float]) -> float:
+    # The weights of the four stages, as for the state: (p_1 + 2 p_2 + 2 p_3 + p_4) / 6.
     first, second, third, fourth = powers
     return (first + 2 * second + 2 * third + fourth) / 6

@@ -100,6 +100,8 @@ class PID:
         """
         description = description_of(robot)
         m = effective_inertia(description, q)
+
+        # A joint of constant inertia m has m d^3e/dt^3 + kd d^2e/dt^2 + kp de/dt + ki e = 0: gains scale with m.
         kp, ki, kd = pid_gains(bandwidth, damping, integral)
         return cls(m * kp, m * ki, m * kd, derivative=derivative, cutoff=cutoff, limit=description.numbers.effort)
 
@@ -120,12 +122,17 @@ class PID:
         rate = (setpoint.qd if self.derivative == "error" else 0.0) - qd
         filtered = rate if self.cutoff is None else state[n:]
         tau = self._torques(error, state[:n], filtered)
+
         # The integral action fades out over the last hundredth of the torque limit: switched off at once, as in the
-        # sampled controller, it would chatter at the limit.
+        # sampled controller, it would chatter at the limit. Where the error reduces the torque, it grows in full:
+        #     d(integral)/dt = e min(max((limit - |tau|) / (BAND limit), 0), 1).
         left = (self.limit - np.abs(tau)) / np.where(np.isfinite(self.limit), BAND * self.limit, 1.0)
         growth = np.where(tau * error < 0, error, error * np.clip(left, 0.0, 1.0))
-        change = growth if self.cutoff is None else np.concatenate([growth, self.cutoff * (rate - filtered)])
-        return tau, change
+        if self.cutoff is None:
+            return tau, growth
+
+        # The filter 1 / (s / cutoff + 1): d(filtered)/dt = cutoff (rate - filtered).
+        return tau, np.concatenate([growth, self.cutoff * (rate - filtered)])
 
     def __call__(self, t: float, q: Array, qd: Array, setpoint: Setpoint) -> Array:
         """Return the torques, shape (n,) or (B, n), N m and N."""
@@ -135,11 +142,16 @@ class PID:
         self._time = t
         rate = (setpoint.qd if self.derivative == "error" else 0.0) - qd
         if self.cutoff is not None:
-            share = 1.0 if self._rate is None else 1 - np.exp(-self.cutoff * step)
-            rate = rate if self._rate is None else self._rate + share * (rate - self._rate)
+            # The filter's exact response after h seconds of a constant rate r:
+            #     y_k = y_(k-1) + (1 - exp(-cutoff h)) (r - y_(k-1)),    y_0 = r.
+            if self._rate is not None:
+                share = 1 - np.exp(-self.cutoff * step)
+                rate = self._rate + share * (rate - self._rate)
             self._rate = rate
         tau = self._torques(error, self._integral, rate)
-        # The integral changes where the drive is below its limit, or where the error reduces the torque.
+
+        # Conditional integration: integral_k = integral_(k-1) + h e_k, used from the next call on, where the drive is
+        # below its limit or where the error reduces the torque.
         grows = (np.abs(tau) < self.limit) | (tau * error < 0)
         self._integral = self._integral + np.where(grows, error * step, 0.0)
         return tau

@@ -52,6 +52,9 @@ def linearize(description: Description, q: ArrayLike, qd: ArrayLike | None = Non
     require_inertia(description)
     n = description.n
     state = joint_vector(description, q), np.zeros(n) if qd is None else joint_vector(description, qd, "qd")
+
+    # qdd = f(q, qd, tau) = M^-1 (tau - C qd - g), so that with x = (q, qd) and u = tau - tau_0, tau_0 = C qd + g there,
+    #     A = [0, 1; df/dq, df/dqd],    B = [0; df/dtau] = [0; M^-1].
     tau = bias(description, *state)
     by_q, by_qd, by_tau = (np.array(x) for x in _derivatives(description)(*state, tau))
     A = np.block([[np.zeros((n, n)), np.eye(n)], [by_q, by_qd]])
@@ -99,18 +102,24 @@ class LQR:
         self.description = description_of(robot)
         n = self.description.n
         self.A, self.B = linearize(self.description, q)
+
+        # Q_ii = 1 / dx_i^2 and R_ii = 1 / dtau_i^2. A torque on joint i alone accelerates it by (M^-1)_ii tau_i, and
+        # M^-1 is the lower half of B.
         deviations = np.repeat([ERROR, RATE], n)
         torques = np.minimum(self.description.numbers.effort, ACCELERATION / np.diagonal(self.B[n:]))
         self.Q = _weights(Q, 1 / deviations**2, "Q")
         self.R = _weights(R, 1 / torques**2, "R")
         if np.linalg.eigvalsh(self.Q).min() < 0 or np.linalg.eigvalsh(self.R).min() <= 0:
             raise ValueError("Q is to be positive semidefinite, and R positive definite")
+
         # P solves A^T P + P A - P B R^-1 B^T P + Q = 0, and K = R^-1 B^T P.
         try:
             self.P = solve_continuous_are(self.A, self.B, self.Q, self.R)
         except np.linalg.LinAlgError as error:
             raise ValueError(f"Q and R give no regulator: {error}") from None
         self.K = np.linalg.solve(self.R, self.B.T @ self.P)
+
+        # dx/dt = (A - B K) x. A state that a semidefinite Q does not weight may be left with the eigenvalue 0.
         slowest = float(np.linalg.eigvals(self.A - self.B @ self.K).real.max())
         if slowest >= 0:
             raise ValueError(

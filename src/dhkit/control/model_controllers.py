@@ -139,6 +139,8 @@ class FeedForward(PDGravity):
 
 
 def _computed_torque(table: InertialTable, s: Symbols, gains: casadi.SX) -> casadi.SX:
+    # M a + C qd + g with a = qdd_d + kd de/dt + kp e is the inverse dynamics at the acceleration a. The right model
+    # gives qdd = a, which is d^2e/dt^2 + kd de/dt + kp e = 0.
     return recursive_inverse_dynamics(table, s.q, s.qd, s.setpoint_qdd + _correction(s, gains))
 
 
@@ -147,6 +149,7 @@ def _pd_gravity(table: InertialTable, s: Symbols, gains: casadi.SX) -> casadi.SX
 
 
 def _feed_forward(table: InertialTable, s: Symbols, gains: casadi.SX) -> casadi.SX:
+    # ID(q_d, qd_d, qdd_d) = M(q_d) qdd_d + C(q_d, qd_d) qd_d + g(q_d) does not depend on the measured state.
     ahead = recursive_inverse_dynamics(table, s.setpoint_q, s.setpoint_qd, s.setpoint_qdd)
     return ahead + _correction(s, gains)
 
@@ -209,4 +212,5 @@ class FrictionCompensation:
         return repr_line(type(self).__name__, self.description.name, f"{self.friction}, around {name_of(self.inner)}")
 
     def _friction(self, setpoint: Setpoint) -> Array:
+        # tau = tau_inner + r(qd_d), with r the torque of viscous and dry friction.
         return friction_torque(self.description, setpoint.qd, self.friction)

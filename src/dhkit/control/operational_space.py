@@ -120,7 +120,9 @@ class OperationalSpace:
         """Return the torques, shape (n,), N m and N."""
         description = self.description
         scale = self._joint_scale
-        # Displacements of prismatic joints are divided by the reach as well, so that singular values have no unit.
+
+        # In joint coordinates x, q = D x with D = diag(reach if prismatic, else 1), singular values have no unit. The
+        # Jacobian becomes J D, the mass matrix D M D, accelerations D^-1 a_0 and torques D tau.
         J_full = jacobian(description, q)
         J = self._scaled(J_full)
         M = mass_matrix(description, q) * np.outer(scale, scale)
@@ -147,7 +149,8 @@ class OperationalSpace:
         lacking = np.maximum(self.threshold**2 - sigma**2, 0.0)
         Lambda_inverse[np.diag_indices(rank)] += lacking * np.diagonal(mobility)
 
-        # tau = J^T Lambda (a - J a_0) + M a_0 + C qd + g, which equals J^T Lambda a + N^T M a_0 + C qd + g.
+        # tau = J^T Lambda (a - J a_0) + M a_0 + C qd + g, which equals J^T Lambda a + N^T M a_0 + C qd + g. The force
+        # Lambda (a - J a_0) is taken in the coordinates of U, where J is S V^T.
         force = np.linalg.solve(Lambda_inverse, U.T @ a - sigma * (Vt @ a_0))
         tau: Array = (Vt.T @ (sigma * force) + M @ a_0) / scale + bias(description, q, qd)
         return tau
@@ -167,6 +170,7 @@ class OperationalSpace:
         ValueError
             The tool cannot be moved in any of them.
         """
+        # The rank is the same at almost all configurations, and smaller at singular ones: the largest one counts.
         q = random_motions(self.description, PROBES).q
         sigma = np.linalg.svd(self._scaled(jacobian(self.description, q)), compute_uv=False)
         largest = float(sigma.max())
@@ -183,6 +187,7 @@ def pose_error(T: Array, goal: Array) -> Array:
     """
     from scipy.spatial.transform import Rotation
 
+    # exp([turn]x) R = R_goal: the rotation from R to R_goal in world axes.
     turn = Rotation.from_matrix(goal[:3, :3] @ T[:3, :3].T).as_rotvec()
     return np.concatenate([goal[:3, 3] - T[:3, 3], turn])
 

@@ -143,6 +143,7 @@ class Plant:
 
     def holding_bounds(self, q: Array) -> tuple[Array, Array]:
         """Return the bounds of the torques that hold joints at rest, shape (n,) each, N m and N; infinite at stops."""
+        # A resisting torque f > 0 acts against positive rates: a lower stop bears any f < 0, an upper stop any f > 0.
         lower, upper = self.limits
         coulomb = np.where(self.has_stiction[:, None], self.description.numbers.coulomb, 0.0)
         least = np.where(q <= lower, -np.inf, coulomb[:, 1])
@@ -173,6 +174,9 @@ class Plant:
             return np.zeros(self.n)
         if not self.has_stiction.any():
             return friction_torque(self.description, qd, self.friction)
+
+        # r_i = viscous_i qd_i + coulomb_i in the direction of motion. The dry friction of holding joints is not part of
+        # it: it follows from the contact.
         numbers = self.description.numbers
         dry = np.zeros(self.n)
         forwards = directions > 0
@@ -205,6 +209,8 @@ class Plant:
             return Contact(directions, at_rest)
 
         drive = tau + self.push_torques(pushes, q) - self.resistance(qd, directions) - bias(self.description, q, qd)
+
+        # The joints R accelerate by w = b - A f_R, with A = (M^-1)_RR and b = (M^-1 drive)_R.
         M_inverse = np.linalg.inv(mass_matrix(self.description, q)).astype(float)
         block = M_inverse[np.ix_(at_rest, at_rest)]
         unresisted = (M_inverse @ drive)[at_rest]
@@ -352,6 +358,7 @@ def bounded_forces(A: Array, b: Array, lower: Array, upper: Array) -> tuple[Arra
         if not len(violated):
             return f, side
 
+        # Exchanging all violated indices takes few rounds but may cycle; exchanging one, always the last, cannot.
         if len(violated) < fewest_violations:
             fewest_violations = len(violated)
             patience = MAX_STALLED_ROUNDS

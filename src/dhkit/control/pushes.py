@@ -61,10 +61,15 @@ class Push:
         frame = forward_kinematics(description, q) if self.link is None else T[self.link]
         place = frame[:3, :3] @ point + frame[:3, 3]
         moved = n if self.link is None else self.link
+
+        # tau = J^T w for the wrench w of the force f at p and the moment m, with the axis z_i through o_i of joint i:
+        #     revolute:  tau_i = z_i . ((p - o_i) x f + m),    prismatic:  tau_i = z_i . f.
+        # Joints after the pushed link do not move it, and feel nothing.
         tau = np.zeros(n)
         for i, axes in enumerate(carrying(description.convention, list(T))[:moved]):
-            turned = force if description.numbers.prismatic[i] else np.cross(place - axes[:3, 3], force) + moment
-            tau[i] = axes[:3, 2] @ turned
+            z = axes[:3, 2]
+            lever = place - axes[:3, 3]
+            tau[i] = z @ (force if description.numbers.prismatic[i] else np.cross(lever, force) + moment)
         return tau
 
     __repr__ = value_line

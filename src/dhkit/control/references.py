@@ -42,6 +42,7 @@ class Setpoint:
     @cached_property
     def acceleration(self) -> Array:
         """The tool's acceleration, shape (6,): the time derivative of ``twist``, m/s^2 and rad/s^2."""
+        # d/dt (J qd) = J qdd + dJ/dt qd
         at_rest: Array = jacobian(self.description, self.q) @ self.qdd
         return at_rest + jacobian_dot(self.description, self.q, self.qd) @ self.qd
 
@@ -122,6 +123,7 @@ class Sine:
 
     def sampled(self, t: Array) -> Samples:
         """Return joint values, rates and accelerations at times (N,), shape (N, n) each."""
+        # q = c + A sin(w t + phi),    qd = A w cos(w t + phi),    qdd = -A w^2 sin(w t + phi),    w = 2 pi frequency.
         centre = np.asarray(self.centre)
         rate = 2 * np.pi * np.broadcast_to(np.asarray(self.frequency), centre.shape)
         amplitude = np.broadcast_to(np.asarray(self.amplitude), centre.shape)

@@ -148,6 +148,8 @@ class SimulationResult:
 
         Computed from both the sine and the cosine of the angle, which is accurate for small angles.
         """
+        # R = T^T T_reference turns by phi about a unit vector u. Its skew entries are 2 sin(phi) u, and its trace is
+        # 1 + 2 cos(phi).
         R = np.swapaxes(self.T[:, :3, :3], 1, 2) @ self.reference_T[:, :3, :3]
         skew = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
         angle: Array = np.arctan2(np.linalg.norm(skew, axis=1), np.trace(R, axis1=1, axis2=2) - 1)

@@ -105,6 +105,8 @@ class Run(ABC):
                 state = advance(plant, integrator, state, stops[0], phase)
                 for until in stops[1:]:
                     state = advance(plant, integrator, state, until)
+                # Integral of |tau_i qd_i| over the row, for torques that are held and rates that keep their sign: the
+                # audit's error is relative to it.
                 self.turnover += float(np.abs(tau * (state.q - last.q)).sum())
                 if progress is not None and k % PROGRESS_EVERY == PROGRESS_EVERY - 1:
                     progress(k + 1, steps)

@@ -88,10 +88,14 @@ class Measuring:
         sensors = self._sensors
         noise = np.asarray(sensors.noise)
         measured = q + noise * self._random.standard_normal(q.shape) if noise.any() else q.copy()
+
+        # An encoder counts steps: q_measured = round(q / resolution) resolution.
         counts = np.asarray(sensors.resolution)
         if counts.any():
             size = np.where(counts > 0, counts, 1.0)
             measured = np.where(counts > 0, np.round(measured / size) * size, measured)
+
+        # The difference over a period, (q_k - q_(k-1)) / period, or 0 at the first sample, which has none before it.
         if sensors.differences:
             rate = np.zeros_like(q) if self._before is None else (measured - self._before) / self._period
         else:

@@ -116,6 +116,7 @@ class StepKernel:
 
     def with_length(self, h: float) -> StepKernel:
         """Return the step under constant torques with another length h, s."""
+        # The length is the first shared input of a step without a law, see _plant.
         shared = self.shared.copy()
         shared[0] = h
         return replace(self, shared=shared)

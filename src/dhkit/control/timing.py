@@ -58,6 +58,7 @@ def row_times(reference: float | None, duration: float | None, rate: float) -> A
         raise ValueError(f"{span:g} s are less than half a period at {rate:g} Hz; expected a period at least")
     if steps > MAX_STEPS:
         raise ValueError(f"{span:g} s at {rate:g} Hz are {span * rate:.3g} steps; expected at most {MAX_STEPS:,}")
+    # k / rate, and not k times a rounded period, so that rounding errors do not grow with k.
     return np.arange(steps + 1) / rate
 
 
@@ -94,6 +95,7 @@ def substeps(stiffness: float, period: float, asked: int = 1) -> int:
     ValueError
         More than ``MAX_SUBSTEPS`` and more than ``asked``.
     """
+    # N steps of h = period / N with stiffness h <= STEPS_OF_STIFFNESS; 1e9 stands for a stiffness without bound.
     needed = max(asked, ceil(min(stiffness * period / STEPS_OF_STIFFNESS, 1e9)))
     if needed > max(asked, MAX_SUBSTEPS):
         raise ValueError(

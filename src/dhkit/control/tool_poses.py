@@ -109,6 +109,7 @@ class ToolPoses:
         q = np.zeros((len(t), len(self._first))) + self._first
         qd = np.zeros_like(q)
         qdd = np.zeros_like(q)
+        # Each motion writes all rows from its beginning on, at its end where it is over, and the next overwrites those.
         for k, motion in enumerate(self._motions):
             rows = np.flatnonzero(t >= self._knots[k])
             within = np.minimum(t[rows] - self._knots[k], motion.duration)

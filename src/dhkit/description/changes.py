@@ -195,6 +195,10 @@ def _link_ends(description: Description) -> list[tuple[Vector, Vector]]:
     """Return where each link's rod begins and ends, in the link's own frame, m."""
     if (far := description.numbers.link_ends) is not None:
         return [(_exact_vector(begin), _exact_vector(end)) for begin, end in zip(*far, strict=True)][1:]
+
+    # Frame i of the modified convention is at the beginning of link i, and frame i + 1, at A_(i+1) (0, 0, 0) in it, at
+    # its end. Frame i of the standard convention is at the end, and frame i - 1, at A_i^-1 (0, 0, 0) in it, at the
+    # beginning.
     rows = [fixed_row(joint, description.convention) for joint in description.joints]
     tool = _origin(pose_of(description.tool.placement))
     if description.convention is Convention.MODIFIED:

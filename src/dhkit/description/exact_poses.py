@@ -49,6 +49,7 @@ def translation(x: Expression = ZERO, y: Expression = ZERO, z: Expression = ZERO
 def pose_of(placement: Placement, values: Mapping[str, Expression] | None = None) -> ExactPose:
     """Return the transform of an origin, m, and fixed-axis angles, rad, with parameters replaced by ``values``."""
     known = values or {}
+    # T(x, y, z) Rz(yaw) Ry(pitch) Rx(roll)
     x, y, z = (substitute(entry, known) for entry in placement.xyz)
     roll, pitch, yaw = (exact_angle(substitute(entry, known)) for entry in placement.rpy)
     T: ExactPose = translation(x, y, z) @ rotation_z(yaw) @ _plane_rotation(2, 0, pitch) @ rotation_x(roll)
@@ -61,10 +62,14 @@ def placement_of(T: ExactPose) -> Placement:
     The angles are exact where they are rational parts of a turn or hold parameters. Otherwise all three are computed
     in floats, one from the other: near gimbal lock the errors of three separate angles would add up.
     """
+    # R = Rz(yaw) Ry(pitch) Rx(roll) has, with c and s for cosines and sines,
+    #     first column: (c_pitch c_yaw, c_pitch s_yaw, -s_pitch),
+    #     last row:     (-s_pitch, c_pitch s_roll, c_pitch c_roll).
     R = T[:3, :3]
     level = R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0]
     if level.is_zero:
-        # At +-90 degrees of pitch, roll and yaw rotate about one axis: yaw is chosen 0.
+        # At +-90 degrees of pitch, roll and yaw rotate about one axis: yaw is chosen 0, and the second row of R is then
+        # (0, c_roll, -s_roll).
         roll = arc_tangent(-R[1, 2], R[1, 1])
         yaw = ZERO
     else:
@@ -98,6 +103,7 @@ def fixed_row(joint: Joint, convention: Convention, q: Expression = ZERO) -> Exa
     A product of elementary exact transforms, derived independently of the closed form in floats of
     :func:`dhkit.description.link_transforms` and of the origins of :mod:`dhkit.model.urdf`.
     """
+    # Standard: Rz(theta) Tz(d) Tx(a) Rx(alpha); modified: Tx(a) Rx(alpha) Rz(theta) Tz(d).
     theta, d = (joint.theta + q, joint.d) if joint.is_revolute else (joint.theta, joint.d + q)
     along_z = rotation_z(theta) @ translation(z=d)
     along_x = translation(x=joint.a) @ rotation_x(joint.alpha)

@@ -132,11 +132,17 @@ def link_transforms(description: Description, q: ArrayLike) -> Array:
     q = joint_array(description, q)
     missing = ~np.all(np.isfinite(q), axis=-1)
     q = np.where(missing[..., None], np.nan, q)
+
+    # A_i = Rz(theta) Tz(d) Tx(a) Rx(alpha) in the standard convention, Tx(a) Rx(alpha) Rz(theta) Tz(d) in the modified
+    # one; q is added to theta of a revolute joint, to d of a prismatic one.
     angle = np.where(numbers.prismatic, 0.0, q)
     offset = np.where(numbers.prismatic, q, 0.0)
     cos_q = np.cos(angle)
     sin_q = np.sin(angle)
-    # The table's own theta enters by the addition theorem, so that an offset of 90 degrees is exact.
+
+    # The table's own theta enters by the addition theorem, so that an offset of 90 degrees is exact:
+    #     cos(q + theta) = cos(q) cos(theta) - sin(q) sin(theta),
+    #     sin(q + theta) = sin(q) cos(theta) + cos(q) sin(theta).
     cos_theta = cos_q * numbers.cos_theta - sin_q * numbers.sin_theta
     sin_theta = sin_q * numbers.cos_theta + cos_q * numbers.sin_theta
     cos_alpha = numbers.cos_alpha
@@ -189,6 +195,7 @@ def world_to_frames(description: Description, q: ArrayLike) -> Array:
     q
         Joint values, shape (..., n), rad and m.
     """
+    # T_0 = base,  T_i = T_(i-1) A_i
     A = link_transforms(description, q)
     frames = np.empty((*A.shape[:-3], description.n + 1, 4, 4))
     frames[..., 0, :, :] = description.numbers.T_world_base

@@ -249,6 +249,7 @@ def _lock_one(
 
 def _join_base(chain: _ArmParts, row: ExactPose) -> _ArmParts:
     """Make frame 1 the new frame 0."""
+    # T_world_1 = T_world_0 A_1; what is fixed to frame 0 moves into frame 1 by A_1^-1.
     T_new_old = inverse(row)
     placement = placement_of(pose_of(chain.base.placement) @ row)
     shapes = _joined_shapes(_moved_shapes(chain.base.shapes, T_new_old), chain.joints[0].shapes)
@@ -258,6 +259,7 @@ def _join_base(chain: _ArmParts, row: ExactPose) -> _ArmParts:
 
 def _join_tool(chain: _ArmParts, row: ExactPose) -> _ArmParts:
     """Make the last link part of the one before, and its row part of the tool's placement."""
+    # T_(n-1)_tool = A_n T_n_tool; what is fixed to frame n moves into frame n - 1 by A_n.
     *others, before, last = chain.joints
     *other_bodies, own_bodies, last_bodies = chain.bodies
     tool = Tool(placement_of(row @ pose_of(chain.tool.placement)), chain.tool.shapes)
@@ -388,7 +390,8 @@ def _nonparallel_axes_row(Y: ExactPose, number: Callable[[Expression], float]) -
     delta = (x * sin_beta - y * cos_beta) / sin_alpha
     a = x * cos_beta + y * sin_beta
 
-    # Row z of Y is (sin(alpha) sin(gamma), sin(alpha) cos(gamma), cos(alpha)).
+    # Row z of Y is (sin(alpha) sin(gamma), sin(alpha) cos(gamma), cos(alpha)); times the sign of
+    # sin(alpha), the first two have the arc tangent gamma.
     sign = -1 if number(sin_alpha) < 0 else 1
     gamma = arc_tangent(Y[2, 0] * sign, Y[2, 1] * sign)
     return _Row(beta, z - delta * w, a, arc_tangent(sin_alpha, w), gamma, delta)

@@ -102,6 +102,7 @@ class Numbers:
         Mass, kg, first moments m c, kg m, and second moments xx, yy, zz, xy, yz, xz, kg m^2; NaN where a link has no
         body.
         """
+        # J = I + m (c^2 1 - c c^T): from the centre of mass to the frame's origin (Steiner).
         m = self.mass[:, None]
         c = self.com
         square = np.sum(c * c, axis=-1)[:, None, None] * np.eye(3)
@@ -162,6 +163,7 @@ class Numbers:
             inertia=np.array(inertia),
             armature=array(drive.armature if drive else 0.0 for drive in drives),
             coupling=_coupling_matrix(description, array),
+            # qd_motor = gear qd and tau = gear tau_motor: gear^2 B; |gear| Tc in the joint's directions.
             viscous=gear**2 * array(drive.viscous if drive else 0.0 for drive in drives),
             coulomb=np.abs(gear)[:, None] * np.array([array(x.coulomb) if x else np.zeros(2) for x in drives]),
             base_body=_body_arrays(description.base.body, array, 0.0),

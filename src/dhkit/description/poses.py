@@ -130,6 +130,7 @@ def check_pose(T: ArrayLike, name: str = "T") -> Array:
     array = number_array(T, name, "(..., 4, 4)")
     if array.shape[-2:] != (4, 4):
         raise ValueError(f"{name} has shape {array.shape}; expected (..., 4, 4)")
+    # R^T R = 1, det(R) = +1 and the last row (0, 0, 0, 1). NaN compares as false, and passes.
     R = array[..., :3, :3]
     defect = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2))
     bottom = np.abs(array[..., 3, :] - (0, 0, 0, 1)).max(axis=-1)
@@ -245,7 +246,9 @@ def _to_euler(R: Array, order: str) -> Array:
         middle = np.arctan2(parity * R[..., i, k], level)
     locked = level == 0.0
     first = np.where(locked, np.arctan2(parity * R[..., o, j], R[..., j, j]), first)
-    # Row j of R_i(-p) R depends on the third angle alone, however near gimbal lock is.
+
+    # Row j of R_i(-p) R = R_j(q) R_k(r) is that of R_k(r): (R_ji, R_jj) = (e sin r, cos r) for k = o, (R_jj, R_jo) =
+    # (cos r, -e sin r) for k = i. It depends on the third angle alone, however near gimbal lock is.
     c = np.cos(first)
     s = np.sin(first)
     row = c[..., None] * R[..., j, :] + parity * s[..., None] * R[..., o, :]

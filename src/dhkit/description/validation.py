@@ -183,6 +183,8 @@ def _check_couplings(description: RobotData, value: _Value) -> Iterator[str]:
             raise DescriptionError(f"{where}: joints {i} and {j} have a coupling already")
         pairs.add((i, j))
         inertia = value(f"{where}: inertia", coupling.inertia)
+        # A rotor of inertia J that turns by G qd_j + k qd_i has b = J G k, and adds J k^2 and J G^2 to the diagonal:
+        # b^2 = (J k^2) (J G^2), each at most the armature of its joint.
         if inertia**2 > armature[i - 1] * armature[j - 1]:
             yield (
                 f"{where}: {inertia:g} is more than the root of the two joints' gear^2 rotor_inertia, "
@@ -203,6 +205,7 @@ def _check_body(body: Body, where: str, value: _Value) -> Iterator[str]:
         if not body.unphysical:
             raise DescriptionError(message)
         yield message
+    # I_1 + I_2 - I_3 = 2 integral of x_3^2 dm >= 0 in principal axes.
     elif largest > lowest + middle + tolerance:
         yield (
             f"{where}: no body has principal moments {lowest:.4g}, {middle:.4g}, {largest:.4g} kg m^2 "

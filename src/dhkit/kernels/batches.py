@@ -47,6 +47,7 @@ def fill(
     if not result.size:
         return result
     rows = [state[None] for state in states] if not batch else [_rows(state, batch) for state in states]
+    # A kernel writes the first results before it has read the last inputs.
     if out is not None and any(np.may_share_memory(out, row) for row in rows):
         rows = [row.copy() for row in rows]
     kernel(parameters, rows, [result.reshape(len(rows[0]), -1)], threads)

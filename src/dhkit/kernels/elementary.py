@@ -48,12 +48,16 @@ def sincos(x: Vector) -> tuple[Vector, Vector]:
     The absolute error is at most 2.3e-16 up to ``EXACT_RANGE``, and 2 units in the last place of results above 1e-5;
     beyond it, and of what is not finite, they are NaN.
     """
+    # x = k pi/2 + r + tail with the integer k nearest to x / (pi/2) and pi/2 = P_1 + P_2 + P_3:
+    #     r = x - k P_1 - k P_2, rounded,    tail = its rounding error - k P_3.
+    # Without the tail the result would lose half a unit in the last place.
     k = (x * _TWO_OVER_PI + _ROUND_TO_INTEGER) - _ROUND_TO_INTEGER
-    # The remainder is r + tail; without the tail the result would lose half a unit in the last place.
     t = x - k * _HALF_PI_1
     second = k * _HALF_PI_2
     r = select(absolute(x) <= EXACT_RANGE, t - second, nan)
     tail = ((t - r) - second) - k * _HALF_PI_3
+
+    # sin(r + tail) = sin(r) + tail cos(r) to first order, with sin(r) = r + r z p(z), z = r^2, and cos(r) = 1 - z / 2.
     z = r * r
     half = 0.5 * z
     p = z * 1.58969099521155010221e-10 - 2.50507602534068634195e-08
@@ -62,6 +66,9 @@ def sincos(x: Vector) -> tuple[Vector, Vector]:
     p = p * z + 8.33333333332248946124e-03
     p = p * z - 1.66666666666666324348e-01
     sine = r + (r * (z * p) + tail * (1.0 - half))
+
+    # cos(r + tail) = cos(r) - tail sin(r) to first order, with cos(r) = 1 - z / 2 + z^2 p(z) and sin(r) = r. The
+    # rounding error of 1 - z / 2 is (1 - near_one) - half, and is added again.
     p = z * -1.13596475577881948265e-11 + 2.08757232129817482790e-09
     p = p * z - 2.75573143513906633035e-07
     p = p * z + 2.48015872894767294178e-05
@@ -69,7 +76,10 @@ def sincos(x: Vector) -> tuple[Vector, Vector]:
     p = p * z + 4.16666666666666019037e-02
     near_one = 1.0 - half
     cosine = near_one + ((((1.0 - near_one) - half) + (z * z) * p) - r * tail)
-    # The quadrant: k/4 minus its nearest integer is 0, 1/4, ±1/2 or -1/4 for k = 0, 1, 2, 3 modulo 4.
+
+    # For k = 0, 1, 2, 3 modulo 4, with s = sin(r + tail) and c = cos(r + tail),
+    #     sin(x) = s, c, -s, -c,    cos(x) = c, -s, -c, s;
+    # k/4 minus its nearest integer is 0, 1/4, ±1/2, -1/4.
     quarter = k * 0.25
     quadrant = quarter - ((quarter + _ROUND_TO_INTEGER) - _ROUND_TO_INTEGER)
     opposite = absolute(quadrant) > 0.375
@@ -89,11 +99,14 @@ def atan2(y: Any, x: Any, select: Select = select, absolute: Absolute = absolute
     steep = height > width
     longer = select(steep, height, width)
     shorter = select(steep, width, height)
-    # Above tan(pi/8) take the angle's difference from pi/4, so that the polynomial's argument is at most tan(pi/8).
+
+    # atan(a) = pi/4 + atan((a - 1) / (a + 1)), taken for a > tan(pi/8): the polynomial's argument is at most tan(pi/8).
     wide = shorter > _TAN_EIGHTH_PI * longer
     numerator = select(wide, shorter - longer, shorter)
     denominator = select(wide, shorter + longer, longer)
     t = select(denominator > 0.0, numerator / denominator, 0.0)
+
+    # atan(t) = t - t z p(z) with z = t^2.
     z = t * t
     p = z * 1.62858201153657823623e-02 - 3.65315727442169155270e-02
     p = p * z + 4.97687799461593236017e-02
@@ -107,6 +120,8 @@ def atan2(y: Any, x: Any, select: Select = select, absolute: Absolute = absolute
     p = p * z + 3.33333333333329318027e-01
     angle = t - t * (z * p)
     angle = select(wide, _QUARTER_PI + angle, angle)
+
+    # From the first octant to the quadrant, atan(h / w) = pi/2 - atan(w / h), then by mirroring in both axes.
     angle = select(steep, _HALF_PI - angle, angle)
     angle = select(x < 0.0, _PI - angle, angle)
     angle = select(y < 0.0, -angle, angle)

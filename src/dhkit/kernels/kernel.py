@@ -93,6 +93,7 @@ class Kernel:
         def work(rows: slice) -> None:
             function(parameters, [x[rows] for x in inputs], [y[rows] for y in outputs])
 
+        # Share k has the rows floor(N k / shares) to floor(N (k + 1) / shares) - 1: sizes differ by one at most.
         edges = [count * k // shares for k in range(shares + 1)]
         all_in_threads(work, [slice(begin, end) for begin, end in pairwise(edges)])
 

@@ -220,6 +220,7 @@ def _array(k: int, name: str) -> Iterator[str]:
 
 def _address(body: Body, row: int) -> str:
     """Return the address of the current vector in a row."""
+    # work[row BLOCK + item], of doubles: the items of a row are neighbours.
     start = body.define(f"getelementptr double, ptr %work, i64 {row * BLOCK}")
     return body.define(f"getelementptr double, ptr {start}, i64 %item")
 
@@ -252,6 +253,7 @@ def _copied(label: str, before: str, array: str, size: int, row: int, kind: str,
     yield f"  %{label}_offset = mul i64 %{label}_item, {size}"
     yield f"  %{label}_entries = getelementptr {kind}, ptr {array}, i64 %{label}_offset"
     yield f"  %{label}_column = getelementptr double, ptr %work, i64 %{label}_i"
+    # array[(start + i) size + k] <-> work[(row + k) BLOCK + i] for item i of the block and entry k: a transposition.
     for k in range(size):
         outer = f"%{label}_outer{k}"
         inner = f"%{label}_inner{k}"

@@ -57,6 +57,7 @@ class Stages(threading.local):
 def aligned(size: int, alignment: int) -> Array:
     """Return an array of ``size`` doubles, shape (size,), whose address is a multiple of ``alignment`` bytes."""
     array = np.empty(size + alignment // 8)
+    # NumPy's addresses are multiples of 8: a whole number of doubles leads to the next multiple of ``alignment``.
     skipped = -address(array) % alignment // 8
     return array[skipped : skipped + size]
 

@@ -128,6 +128,8 @@ def _reported_body(report: ReportedMass, meshes: Sequence[TriangleMesh], T_frame
     """Return the body of a report in a link's DH frame, with warnings about unlikely numbers."""
     body = report.properties.moved(T_frame_world)
     notes = [f"body from the report of {report.part[:60]!r}, {report.source}", *report.notes]
+
+    # I_1 + I_2 - I_3 = 2 integral of x_3^2 dm >= 0 in principal axes.
     moments = np.linalg.eigvalsh(body.inertia)
     if moments[0] + moments[1] < (1 - _MOMENT_TOLERANCE) * moments[2]:
         listed = ", ".join(f"{moment:.3g}" for moment in moments)

@@ -87,6 +87,7 @@ def _closed_surface(mesh: TriangleMesh, *notes: str) -> Surface:
 def _without_duplicates(mesh: TriangleMesh, *, with_orientation: bool) -> tuple[TriangleMesh, tuple[str, ...]]:
     """Return a mesh with one triangle for each set of vertices, or for each set and orientation, and a note."""
     if with_orientation:
+        # A cyclic shift puts the smallest vertex first and keeps the orientation.
         start = np.argmin(mesh.faces, axis=1)
         rows = np.take_along_axis(mesh.faces, (start[:, None] + np.arange(3)) % 3, axis=1)
     else:
@@ -109,6 +110,7 @@ def is_closed(mesh: TriangleMesh) -> bool:
     """
     if not len(mesh.faces):
         return False
+    # The directed edge from vertex i to j of V has the key i V + j.
     edges = _edges(mesh.faces).astype(np.uint64)
     count = np.uint64(len(mesh.vertices))
     forward = edges[:, 0] * count + edges[:, 1]
@@ -162,6 +164,7 @@ def _consistently_oriented(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     they pass it in opposite directions. A piece of the surface that can be oriented is then two components, and the one
     with the larger area of unchanged triangles is kept, so that the inner shell of a hollow link stays an inner shell.
     """
+    # Sorted by their vertices, edges between the same two vertices are neighbours.
     m = len(mesh.faces)
     edges = _edges(mesh.faces)
     low = edges.min(axis=1)
@@ -173,7 +176,9 @@ def _consistently_oriented(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     first = order[pairs]
     second = order[pairs + 1]
     is_alike = (edges[first, 0] == edges[second, 0]).astype(np.int64)
-    # Triangles f and g share an edge.
+
+    # Triangles f and g share an edge; edge e is one of triangle e modulo m. Node f is triangle f as it is, f + m the
+    # same turned: if both pass the edge alike, f is joined to g + m and f + m to g; otherwise f to g, f + m to g + m.
     f = first % m
     g = second % m
     labels = component_labels(
@@ -183,6 +188,8 @@ def _consistently_oriented(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     turned = labels[m:]
     if np.any(kept == turned):  # one-sided, like a Moebius strip
         return mesh, 0
+
+    # Of the two components of a piece the one with the larger area of triangles as they are is kept; areas are doubled.
     area = np.linalg.norm(np.cross(*np.moveaxis(np.diff(mesh.corners, axis=1), 1, 0)), axis=1)
     weight = np.bincount(kept, area, minlength=labels.max() + 1)
     is_turned = weight[turned] > weight[kept]
@@ -192,6 +199,7 @@ def _consistently_oriented(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
 
 def _capped(mesh: TriangleMesh) -> tuple[TriangleMesh, float]:
     """Return a mesh with a fan of triangles over each hole, and the fans' share of the area; itself for large holes."""
+    # Where edge i -> j, key i V + j, is passed more often than j -> i, key j V + i, the difference is missing.
     edges = _edges(mesh.faces)
     count = len(mesh.vertices)
     keys, times = np.unique(edges[:, 0] * count + edges[:, 1], return_counts=True)
@@ -201,6 +209,8 @@ def _capped(mesh: TriangleMesh) -> tuple[TriangleMesh, float]:
     rim = np.repeat(keys, np.maximum(missing, 0))  # edges that are passed more often than their reversed ones
     start = rim // count
     end = rim % count
+
+    # A hole is a connected piece of the rim. Its fan about the mean of its vertices passes each rim edge backwards.
     labels = component_labels(start, end, count)
     holes, hole = np.unique(labels[start], return_inverse=True)
     sizes = np.bincount(hole, minlength=len(holes))

@@ -216,6 +216,7 @@ def _transform(element: _Element) -> Array:
     elif element.tag == "scale":
         T[:3, :3] = np.diag(numbers)
     elif np.any(numbers[:3]):
+        # Rodrigues' formula for the unit vector u: R = 1 + sin(angle) [u]x + (1 - cos(angle)) [u]x^2.
         x, y, z = numbers[:3] / np.linalg.norm(numbers[:3])
         cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         angle = np.radians(numbers[3])

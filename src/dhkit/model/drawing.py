@@ -122,7 +122,9 @@ def _links(description: Description) -> list[_Link]:
     rows = np.stack([numbers.a, numbers.cos_alpha, numbers.sin_alpha], axis=1).tolist()
     d = [0.0, *numbers.d.tolist()]
     straight = (0.0, 1.0, 0.0)
-    # A row's a and alpha describe the end of its own link, in the modified convention that of the link before.
+    # A row's a and alpha describe the end of its own link, in the modified convention that of the link before. The
+    # frame of a standard link stands at its end, with its corner at (Tx(a) Rx(alpha))^-1 = Tx(-a) Rx(-alpha); that of a
+    # modified link at its corner, with its end at Tx(a) Rx(alpha).
     if description.convention is Convention.STANDARD:
         return [
             _Link(x, a, _normal_pose(-a, c, -s), _IDENTITY) for x, (a, c, s) in zip(d, [straight, *rows], strict=True)
@@ -315,6 +317,7 @@ def _size(value: float) -> Expression:
 
 
 def _normal_pose(a: float, cos_alpha: float, sin_alpha: float) -> Array:
+    # Tx(a) Rx(alpha)
     return np.array([[1, 0, 0, a], [0, cos_alpha, -sin_alpha, 0], [0, sin_alpha, cos_alpha, 0], [0, 0, 0, 1.0]])
 
 

@@ -39,10 +39,12 @@ class MassProperties:
 
     def moved(self, T: ArrayLike) -> MassProperties:
         """Return the properties in another frame; T, shape (4, 4), m, takes points of their own frame to it."""
+        # c' = R c + p,  I' = R I R^T, without a Steiner term: I is about the centre of mass, which moves with the body.
         matrix = np.asarray(T, dtype=float)
         R = matrix[:3, :3]
-        tensor = R @ self.inertia @ R.T  # about the centre of mass, which moves with the body: no Steiner term
-        return MassProperties(self.mass, R @ self.com + matrix[:3, 3], (tensor + tensor.T) / 2)
+        com = R @ self.com + matrix[:3, 3]
+        tensor = R @ self.inertia @ R.T
+        return MassProperties(self.mass, com, (tensor + tensor.T) / 2)
 
     def body(self, name: str = "") -> Body:
         """Return the properties as a body of a description, in the same frame."""
@@ -161,6 +163,8 @@ def convex_hull(mesh: TriangleMesh) -> TriangleMesh:
         hull = ConvexHull(mesh.vertices)
     except QhullError:
         raise ModelError("the mesh encloses no volume: its vertices lie in a plane or on a line") from None
+
+    # Qhull's triangles have no common orientation: those with (b - a) x (c - a) against the outward normal are turned.
     faces = np.asarray(hull.simplices, dtype=np.intp)
     a, b, c = np.moveaxis(mesh.vertices[faces], 1, 0)
     outward_normals = hull.equations[:, :3]

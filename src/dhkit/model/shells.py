@@ -102,6 +102,7 @@ class Shells:
 
     def shared(self) -> tuple[float, int]:
         """Return the volume that counts more than once, and the number of cavities that reach out of the material."""
+        # Boxes meet if low_j < high_k and low_k < high_j in all three coordinates.
         low, high = self._bounds
         near = np.asarray(((low[:, None] < high[None]) & (low[None] < high[:, None])).all(axis=2))
         sizes = np.diff(self._ends)
@@ -109,6 +110,8 @@ class Shells:
             return 0.0, 0
         twice = 0.0
         reaching = 0
+
+        # The largest first: each shell is intersected with the larger ones that it may lie in, so each pair once.
         solids = dict[int, "Manifold | None"]()
         order = np.argsort(-np.abs(self.volume), kind="stable")
         for place, k in enumerate(order):

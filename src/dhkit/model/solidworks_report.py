@@ -136,6 +136,8 @@ class _ReportReader:
         tiny = np.finfo(float).tiny
         rounding = float(half.max() / max(np.abs(listed).max(), tiny))
         warnings += self._rounding_warning("moments", rounding, " of the largest", blocks[_Block.CENTRE])
+
+        # The mean square distance from the centre of mass is k^2 = integral of r^2 dm / m = (Lxx + Lyy + Lzz) / (2 m).
         gyration = np.sqrt(max(float(np.trace(listed)), tiny) / (2 * mass))
         rounding = centre.com_half / gyration
         warnings += self._rounding_warning("centre of mass", rounding, " of its radius of gyration", mass_line)

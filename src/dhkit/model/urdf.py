@@ -166,6 +166,8 @@ def _frame_origin(description: Description, i: int) -> Origin:
     n = description.numbers
     if description.convention is Convention.MODIFIED:
         return Origin(np.zeros(3), (0.0, 0.0, n.theta[k]))
+
+    # Rz(theta) Tz(d) Tx(a) Rx(alpha) is at (a cos(theta), a sin(theta), d) and has the rotation Rz(theta) Rx(alpha).
     along_x = np.array([n.a[k] * n.cos_theta[k], n.a[k] * n.sin_theta[k], n.d[k]])
     return Origin(along_x, (n.alpha[k], 0.0, n.theta[k]))
 
@@ -181,6 +183,8 @@ def _frame_matrix(description: Description, i: int) -> Array:
     if description.convention is Convention.MODIFIED:
         ca = 1.0
         sa = 0.0
+
+    # Rz(theta) Rx(alpha), alpha = 0 in the modified convention.
     T = np.eye(4)
     T[:3, :3] = [[ct, -st * ca, st * sa], [st, ct * ca, -ct * sa], [0.0, sa, ca]]
     T[:3, 3] = _frame_origin(description, i).xyz
@@ -193,7 +197,10 @@ def _joint_origin(description: Description, i: int) -> Origin:
     n = description.numbers
     if description.convention is Convention.STANDARD:
         return _frame_origin(description, i - 1) if k else Origin(np.zeros(3))
-    # Frame i - 1 is rotated by the theta of its own row against the link.
+
+    # Frame i - 1 is rotated by the theta of its own row against the link, so that the origin is
+    #     Rz(theta_(i-1)) Tx(a) Rx(alpha) Tz(d), with a, alpha and d of row i,
+    # which is at Rz(theta_(i-1)) (a, -d sin(alpha), d cos(alpha)) and has the rotation Rz(theta_(i-1)) Rx(alpha).
     ct, st, theta = (n.cos_theta[k - 1], n.sin_theta[k - 1], n.theta[k - 1]) if k else (1, 0, 0)
     x = n.a[k]
     y = -n.d[k] * n.sin_alpha[k]

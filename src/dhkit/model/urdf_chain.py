@@ -371,6 +371,7 @@ def tip_in_base(chain: Chain, q: Array) -> Array:
     """Return the tip in the base at joint values q (n,), rad and m, as a product of the URDF's transforms, (4, 4)."""
     from scipy.spatial.transform import Rotation
 
+    # T_base_tip is the product over the joints of T_parent_joint and their motion, Rot(axis, q) or Trans(q axis).
     values = dict(zip(chain.names, q, strict=True))
     T = np.eye(4)
     for joint in chain.tree.joints_to(chain.tip, chain.base) or ():
@@ -402,6 +403,9 @@ def chain_model(chain: Chain) -> PinocchioModel:
         raise ModelError(f"{chain.path}: Pinocchio refuses the URDF: {' '.join(str(error).split())[:200]}") from None
     if list(model.names[1:]) != list(chain.names):
         raise ModelError(f"{chain.path}: joints {', '.join(model.names[1:])}; expected {', '.join(chain.names)}")
+
+    # The model's world is the root. Joint 1 and all frames before it are placed in it, and so is gravity:
+    # T_base_x = T_base_root T_root_x and g_base = R_base_root g_root.
     root_in_base = pin.SE3(chain.T_base_root)
     model.jointPlacements[1] = root_in_base * model.jointPlacements[1]
     for frame in model.frames:

@@ -242,6 +242,7 @@ class _Follower:
         s = pieces.breaks[:-1, None] + np.diff(pieces.breaks)[:, None] * shares
         q = pieces.at(s - pieces.breaks[:-1, None]).reshape(-1, self.newton.description.n)
         error = self.newton.error(q, self.tool.poses(s.ravel()).reshape(-1, 16))
+        # Newton's errors have positions over the reach: back to m.
         error[:, :3] *= self.newton.length
         norms = np.maximum(np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1))
         return np.asarray(norms.reshape(s.shape).max(axis=1))

@@ -212,6 +212,8 @@ class Pieces:
 
 def _halves(b: Array) -> tuple[Array, Array]:
     """Return the Bernstein coefficients (K, p+1, m) of both halves of pieces, by de Casteljau's algorithm."""
+    # b_i^(r) = (b_i^(r-1) + b_(i+1)^(r-1)) / 2. The left half has the coefficients b_0^(0), b_0^(1) ... b_0^(p), the
+    # right half b_0^(p) ... b_(p-1)^(1), b_p^(0): the first and the last of each round.
     left = [b[:, 0]]
     right = [b[:, -1]]
     while b.shape[1] > 1:

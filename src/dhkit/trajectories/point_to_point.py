@@ -172,7 +172,9 @@ def _unit(duration: float | None, ends: tuple[ArrayLike | None, ...]) -> float:
 
 def _blended(description: Description, q0: Array, q1: Array, blend: float) -> Trajectory:
     """Return the motion over one second with blends of ``blend`` seconds."""
-    # Acceleration v / b for b seconds, velocity v, acceleration -v / b for b seconds: v (1 - b) = q1 - q0
+    # Acceleration v / b for b seconds, velocity v, acceleration -v / b for b seconds: v (1 - b) = q1 - q0. With u the
+    # time since the beginning of each piece,
+    #     q = q0 + v / (2 b) u^2,    q = q0 + v b / 2 + v u,    q = q1 - v b / 2 + v u - v / (2 b) u^2.
     v = (q1 - q0) / (1 - blend)
     zero = np.zeros_like(v)
     speed_up = np.stack([q0, zero, v / (2 * blend)])

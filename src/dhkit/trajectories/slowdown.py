@@ -311,6 +311,8 @@ def _by_torques(trajectories: Sequence[Trajectory], limits: Limits, torques: Tor
 
         np.minimum.at(smallest_room, samples.owner, room.min(axis=1))
         samples = samples.around(_tightest(samples.owner, room, len(trajectories)), points)
+
+    # 1 / c^2 <= room
     return np.asarray(1 / np.sqrt(smallest_room))
 
 

@@ -69,6 +69,7 @@ def spline(
 
 def _spaced(q: Array, limits: Limits) -> Array:
     """Return times of points (m, n), from 0, shape (m,)."""
+    # The interval between two points lasts as long as its slowest joint needs: max_i |q_i(k+1) - q_i(k)| / velocity_i.
     ways = np.abs(np.diff(q, axis=0))
     seconds = (ways / np.where(np.isfinite(limits.velocity), limits.velocity, 1.0)).max(axis=1)
     if (seconds == 0).any():

@@ -53,6 +53,8 @@ def timed(shape: Trajectory, duration: float | None, limits: Limits | None, torq
         if c == 0:
             raise ValueError("the motion ends where it begins; expected a duration")
         return shape.slowed(c)
+
+    # The motion in the given time is duration / shape.duration times as slow as the shape, and may not be less than c.
     if c * shape.duration > duration * (1 + _DURATION_SLACK):
         raise PlanningError(
             f"{duration:.6g} s are too short: the limits allow the motion in {c * shape.duration:.6g} s"

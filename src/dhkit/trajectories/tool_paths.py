@@ -40,6 +40,7 @@ class ToolLine:
 
     def poses(self, s: Array) -> Array:
         """Return poses, shape (N, 4, 4)."""
+        # p(s) = p_0 + s way,  R(s) = exp(s [turn]x) R_0
         return _poses(self.T0[:3, 3] + s[:, None] * self.way, s[:, None] * self.turn, self.T0)
 
     def twists(self, s: Array) -> Array:
@@ -71,6 +72,7 @@ class ToolCircle:
 
     def poses(self, s: Array) -> Array:
         """Return poses, shape (N, 4, 4)."""
+        # p(s) = centre + exp(s [turn]x) (p_0 - centre)
         turn = s[:, None] * self.turn
         tool_turn = turn if self.turning else 0.0 * turn
         return _poses(self.centre + self._radii(s), tool_turn, self.T0)

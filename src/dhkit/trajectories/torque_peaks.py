@@ -79,6 +79,9 @@ def torque_peaks(
     cells = trajectory.pieces.divided(-(-_CELLS // intervals))
     width = np.diff(cells.breaks)
     count = len(width)
+
+    # Torques are functions of q, qd and qdd: their fourth derivatives have derivatives of q up to the sixth. That of
+    # viscous friction B qd is B times the fifth derivative of q.
     motion = np.stack([np.abs(cells.differentiated(m).bernstein).max(axis=1) for m in range(ORDER + 3)])
     fourth = torque_derivative_bounds(description, motion)
     if friction is not None:
@@ -142,6 +145,7 @@ def torque_peaks(
 
 def _least_speeds(cells: Pieces) -> Array:
     """Return lower bounds of the speed of each joint in each cell, shape (C, n), rad/s and m/s."""
+    # A rate between b_min and b_max has at least the speed max(b_min, -b_max, 0).
     rates = cells.derivative.bernstein
     return np.asarray(np.maximum(np.maximum(rates.min(axis=1), -rates.max(axis=1)), 0.0))
 

@@ -218,6 +218,8 @@ class Trajectory:
         """
         if not isinstance(c, Real) or not 1 / _MAX_SLOWDOWN <= c <= _MAX_SLOWDOWN:
             raise ValueError(f"c is {c!r}; expected a positive number")
+
+        # sum of c_j (t / c)^j = sum of (c_j / c^j) t^j
         powers = np.arange(self.coefficients.shape[1])[:, None]
         return self._moved(self.breaks * c, self.coefficients / float(c) ** powers)
 

@@ -255,6 +255,7 @@ def _extended(axes: Axes, i: int, path: Path) -> list[Path]:
     x = np.array([normal.x for normal in normals])
     start = np.array([normal.start for normal in normals])
 
+    # d = (start - end of the previous normal) . z, and theta is the angle from its x to the next one about z.
     d = (start - previous.end) @ z
     theta = angle_about(z, previous.x, x)
     a = np.array([normal.length for normal in normals])

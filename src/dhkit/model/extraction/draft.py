@@ -79,7 +79,8 @@ class Rounding:
         xyz, (yaw, pitch, roll) = pose_parts(T, order="ZYX")
         last_decimal = 0.0 if self.decimals is None else 10.0**-self.decimals
         if np.hypot(T[0, 0], T[1, 0]) < max(_MAX_LOCKED_COSINE, last_decimal):
-            # At gimbal lock, rounding errors alone would decide how roll and yaw share the angle.
+            # At gimbal lock, rounding errors alone would decide how roll and yaw share the angle. With yaw 0 the second
+            # row of R = Ry(pitch) Rx(roll) is (0, cos(roll), -sin(roll)).
             roll = np.arctan2(-T[1, 2], T[1, 1])
             yaw = 0.0
         r, p, y = (self.angle(float(value)) for value in (roll, pitch, yaw))
@@ -175,6 +176,7 @@ class Draft:
             inertial = chain.tree.links[link].inertial
             if inertial is None:
                 continue
+            # c_k = R c + p,  I_k = R I R^T
             T = to_frame @ chain.zero_poses[link]
             com = T[:3, :3] @ inertial.com + T[:3, 3]
             parts.append((inertial.mass, com, T[:3, :3] @ inertial.inertia @ T[:3, :3].T))

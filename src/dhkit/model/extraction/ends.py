@@ -74,6 +74,10 @@ def first_row(convention: Convention, normal: Normal, z: Array) -> Choice:
     T = frame(normal.x, z, normal.start)
     R = T[:3, :3]
     t = T[:3, 3]
+
+    # The base's rotation R Rz(-theta) has the first column c R_x - s R_y and the second s R_x + c R_y, with c and s of
+    # theta. Its yaw is 0 if entry y of the first is 0, its pitch if entry z of the first is, its roll if entry z of the
+    # second is.
     thetas = [0.0]
     thetas += _and_opposite(np.arctan2(R[1, 0], R[1, 1]))  # the base's yaw is 0
     thetas += _and_opposite(np.arctan2(R[2, 0], R[2, 1]))  # its pitch
@@ -90,6 +94,8 @@ def first_row(convention: Convention, normal: Normal, z: Array) -> Choice:
         k = int(np.argmin(turns))
         j = int(np.argmin(lengths))
         return float(turns[k] + lengths[j]), EndRow(theta=float(angles[k]), d=float(shifts[j]))
+
+    # In the normal's axes the base's x axis is (c, -s, 0): it is parallel to the part of t across z.
     across = R.T @ t
     thetas += _and_opposite(-np.arctan2(across[1], across[0]))  # the base's x axis points at the first axis
     return min(_modified_starts(R, t, z, thetas), key=itemgetter(0))
@@ -164,6 +170,9 @@ def _standard_ends(R: Array, t: Array, with_theta: bool) -> Iterator[Choice]:
         back = _rotations(2, np.array([-theta]))[0]
         P = back @ R
         p = back @ t
+
+        # Rows y and z of Rx(-alpha) P are c P_y + s P_z and c P_z - s P_y, with c and s of alpha: the yaw is 0 if entry
+        # x of row y is 0, the pitch if entry x of row z is, the roll if entry y of row z is.
         angles = [0.0]
         angles += _and_opposite(np.arctan2(-P[1, 0], P[2, 0]))  # the tool's yaw is 0
         angles += _and_opposite(np.arctan2(P[2, 0], P[1, 0]))  # its pitch
