@@ -2,7 +2,7 @@
 
 from dhkit.planning.obstacles.capsules import LinkBody, LinkCapsule, link_capsules, link_name, world_axes
 from dhkit.planning.obstacles.clearance import Distances, distance, not_checked, pair_distances, smallest_distances
-from dhkit.planning.obstacles.contact import NearestLinks, may_touch, nearest_links
+from dhkit.planning.obstacles.contact import NearestLinks, NearestObstacle, may_touch, nearest_links, nearest_obstacle
 from dhkit.planning.obstacles.pairs import CheckedPairs, LinkPairs, Pair, checked_pairs, link_pairs, standing
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, check_obstacles
 from dhkit.planning.obstacles.separation import Gaps, PlaneRow, Separation
@@ -17,6 +17,7 @@ __all__ = [
     "LinkCapsule",
     "LinkPairs",
     "NearestLinks",
+    "NearestObstacle",
     "Obstacle",
     "Pair",
     "PlaneRow",
@@ -30,6 +31,7 @@ __all__ = [
     "link_pairs",
     "may_touch",
     "nearest_links",
+    "nearest_obstacle",
     "not_checked",
     "pair_distances",
     "shape_distances",

@@ -1,4 +1,4 @@
-"""The two links of an arm that are nearest to each other, by their shapes, with the points where they are nearest."""
+"""The nearest two links of an arm, and the nearest link and obstacle, by their shapes, with their nearest points."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from dhkit.description import Array, Description, joint_vector, takes_robot, world_to_frames
 from dhkit.planning.obstacles.capsules import LinkBody, link_capsules, world_axes
-from dhkit.planning.obstacles.pairs import link_pairs
-from dhkit.planning.obstacles.solids import nearest_of_bodies, segment_distances
+from dhkit.planning.obstacles.pairs import capsules_beside, ends_above, link_pairs
+from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, Solids, check_obstacles
+from dhkit.planning.obstacles.solids import axis_bounds, nearest_of_bodies, nearest_to_obstacle, segment_distances
 
 
 class NearestLinks(NamedTuple):
@@ -64,6 +65,79 @@ def nearest_links(description: Description, q: ArrayLike) -> NearestLinks | None
     return nearest
 
 
+class NearestObstacle(NamedTuple):
+    """The link and the obstacle that are nearest to each other, or penetrate each other deepest."""
+
+    link: LinkBody
+    obstacle: Obstacle | Floor
+    distance: float
+    """Signed distance of the link's shapes from the obstacle, m; a mesh counts as its convex hull."""
+    points: Array
+    """The nearest points of the link and of the obstacle, shape (2, 3), m, world."""
+
+
+@takes_robot
+def nearest_obstacle(description: Description, q: ArrayLike, obstacles: Scene) -> NearestObstacle | None:
+    """Return the link and the obstacle nearest to each other in one state; None if there are none.
+
+    The links are those of which planning checks some part against an obstacle: not the base, and not a foot that stands
+    in a table. As in :func:`nearest_links`, they are measured in the order of the lower bounds by their capsules.
+
+    Parameters
+    ----------
+    q
+        Joint values, shape (n,), rad and m.
+    obstacles
+        Obstacles, of which at most one is a floor.
+
+    Raises
+    ------
+    ModelError
+        coal is not installed, or a mesh cannot be read.
+
+    Examples
+    --------
+    >>> from dhkit.description import library_robot
+    >>> ball = Obstacle.sphere(0.1, (0.4, 0.2, 0.9), name="ball")
+    >>> found = nearest_obstacle(library_robot("puma560"), [0, 0, 0, 0, 0, 0], [ball])
+    >>> found.link.name, found.obstacle.name
+    ('link 3', 'ball')
+    """
+    q = joint_vector(description, q)
+    frames = world_to_frames(description, q)
+    axes = world_axes(description, q[None])[0]
+    bounds: list[tuple[float, LinkBody, Obstacle | Floor]] = []
+    for obstacle in check_obstacles(obstacles):
+        of_bodies = _bounds_beside(description, axes, obstacle)
+        bounds += [(bound, body, obstacle) for body, bound in of_bodies.items()]
+    nearest: NearestObstacle | None = None
+    for bound, body, obstacle in sorted(bounds, key=lambda entry: entry[0]):
+        if nearest is not None and bound >= nearest.distance:
+            break
+        enough = np.inf if nearest is None else nearest.distance
+        found = nearest_to_obstacle(description, frames, body, obstacle, enough)
+        if found is not None and found[0] < enough:
+            nearest = NearestObstacle(body, obstacle, *found)
+    return nearest
+
+
+def _bounds_beside(description: Description, axes: Array, obstacle: Obstacle | Floor) -> dict[LinkBody, float]:
+    """Return lower bounds of the distances of bodies from an obstacle, m: those of all their capsules with ``axes``."""
+    capsules = link_capsules(description)
+    if isinstance(obstacle, Floor):
+        checked = {capsules[i].body for i, _ in ends_above(description, obstacle.height)}
+        lowest = axes[:, :, 2].min(axis=1) - obstacle.height
+    else:
+        checked = {capsules[i].body for i in capsules_beside(description, obstacle)}
+        lowest = axis_bounds(Solids.of([obstacle] * len(capsules)), axes)[0]
+    bounds: dict[LinkBody, float] = {}
+    for capsule, axis_distance in zip(capsules, lowest.tolist(), strict=True):
+        body = capsule.body
+        if body in checked:
+            bounds[body] = min(bounds.get(body, np.inf), axis_distance - capsule.radius)
+    return bounds
+
+
 def may_touch(description: Description, q: ArrayLike) -> tuple[LinkBody, LinkBody] | None:
     """Return the two links whose capsules penetrate each other deepest, if any do: the links themselves may touch.
 
@@ -83,6 +157,8 @@ def may_touch(description: Description, q: ArrayLike) -> tuple[LinkBody, LinkBod
         return None
     i, j = np.array(pairs).T
     radii = np.array([capsule.radius for capsule in capsules])
+
+    # Capsules are as far apart as their axes less both radii.
     gaps = segment_distances(axes[i], axes[j]) - radii[i] - radii[j]
     worst = int(np.argmin(gaps))
     return (capsules[i[worst]].body, capsules[j[worst]].body) if gaps[worst] < 0 else None

@@ -6,11 +6,11 @@ and of the shapes of links whose capsules are too wide for them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from dhkit.description import Array, Box, Capsule, Cylinder, Description, Sphere
 from dhkit.errors import ModelError
 from dhkit.model.shapes import MeshVersions, Part, link_parts, mesh_versions
 from dhkit.planning.obstacles.capsules import LinkBody, convex_hull
-from dhkit.planning.obstacles.scene import Obstacle, Solids, rotations_onto
+from dhkit.planning.obstacles.scene import Floor, Obstacle, Solids, rotations_onto
 
 if TYPE_CHECKING:
     CoalModule: TypeAlias = Any
@@ -91,6 +91,8 @@ def nearest_points(first: Array, second: Array) -> tuple[Array, Array]:
     e = _dot(d2, d2)
     f = _dot(d2, r)
 
+    # s of the lines, the best t for that s, and the best s for that t: s changes only where t was clamped. For parallel
+    # lines, a e = b^2, any s serves, and 0 is taken.
     s = np.clip(_quotient(b * f - c * e, a * e - b * b), 0.0, 1.0)
     t = np.clip(_quotient(b * s + f, e), 0.0, 1.0)
     s = np.clip(_quotient(b * t - c, a), 0.0, 1.0)
@@ -184,8 +186,9 @@ def _box_bounds(solids: Solids, axes: Array) -> Bounds:
     signed = np.linalg.norm(np.maximum(e, 0.0), axis=-1) + np.minimum(e.max(axis=-1), 0.0)
     upper = signed.min(axis=-1)
 
-    # No point of the segment is farther than half a step from a sampled point. A segment that is partly inside is
-    # bounded only by the ball around its middle, since it may have to move its own length to get out.
+    # No point of a segment of length l is farther than half a step from one of N sampled points: the distance is at
+    # least min_k d_k - l / (2 (N - 1)). A segment that is partly inside is bounded only by the ball around its middle,
+    # d_middle - l / 2, since it may have to move its own length to get out.
     length = np.linalg.norm(ends[..., 1, :] - ends[..., 0, :], axis=-1)
     outside = upper - length / (2 * (POINTS - 1))
     lower = np.where(outside > 0, outside, signed[..., POINTS // 2] - length / 2)
@@ -395,20 +398,83 @@ def nearest_of_bodies(
     ModelError
         coal is not installed, or a mesh cannot be read.
     """
-    solids = _solids(description, mesh_versions(description))
+    first, second = (_placed_solids(description, frames, body) for body in bodies)
+    return _nearest_of_solids(first, second, enough)
+
+
+def nearest_to_obstacle(
+    description: Description, frames: Array, body: LinkBody, obstacle: Obstacle | Floor, enough: float = np.inf
+) -> tuple[float, Array] | None:
+    """Return the signed distance between the shapes of a body and an obstacle, m, and where they are nearest.
+
+    Parameters
+    ----------
+    frames, enough
+        As for :func:`nearest_of_bodies`.
+    body
+        The body.
+    obstacle
+        The obstacle.
+
+    Returns
+    -------
+    tuple or None
+        Distance, and points of the body and the obstacle, as from :func:`nearest_of_bodies`.
+
+    Raises
+    ------
+    ModelError
+        coal is not installed, or a mesh cannot be read.
+    """
+    solid = (
+        _PlacedSolid(_floor_solid(obstacle), np.eye(4)) if isinstance(obstacle, Floor) else _obstacle_solid(obstacle)
+    )
+    return _nearest_of_solids(_placed_solids(description, frames, body), [solid], enough)
+
+
+class _PlacedSolid(NamedTuple):
+    solid: _Solid
+    T_world_solid: Array
+    """Shape (4, 4), m."""
+
+
+def _placed_solids(description: Description, frames: Array, body: LinkBody) -> list[_PlacedSolid]:
+    """Return the solids of a body in the world; frames are those of :func:`nearest_of_bodies`."""
+    solids = _solids(description, mesh_versions(description)).get(body, ())
+    return [_PlacedSolid(solid, frames[body.link] @ solid.T_link_solid) for solid in solids]
+
+
+def _obstacle_solid(obstacle: Obstacle | Floor) -> _PlacedSolid:
+    if isinstance(obstacle, Floor):
+        return _PlacedSolid(_floor_solid(obstacle), np.eye(4))
+    return _PlacedSolid(_primitive(obstacle.geometry, np.eye(4)), obstacle.T_world_obstacle)
+
+
+def _floor_solid(floor: Floor) -> _Solid:
+    """Return the half space below a floor, whose support function is finite straight up alone: h(z) = height."""
+
+    def extent(n: Array) -> Array:
+        is_up = n[..., 2] >= 1 - SHORT
+        return np.where(is_up, floor.height, np.inf)
+
+    return _Solid(coal_module().Halfspace(np.array([0.0, 0.0, 1.0]), floor.height), np.eye(4), extent)
+
+
+def _nearest_of_solids(
+    first: Sequence[_PlacedSolid], second: Sequence[_PlacedSolid], enough: float
+) -> tuple[float, Array] | None:
+    """Return the smallest distance of two groups of solids, and the points, as :func:`nearest_of_bodies`."""
     coal = coal_module()
     request = distance_request()
     result = coal.DistanceResult()
     nearest: tuple[float, Array] | None = None
-    for first, second in product(*(solids.get(body, ()) for body in bodies)):
-        T1 = frames[bodies[0].link] @ first.T_link_solid
-        T2 = frames[bodies[1].link] @ second.T_link_solid
+    for (one, T1), (other, T2) in product(first, second):
         least = enough if nearest is None else nearest[0]
-        if _separation(first, T1[None], second, T2[None])[0] >= least:
+        if _separation(one, T1[None], other, T2[None])[0] >= least:
             continue
         pose1 = _transform(coal, T1)
         pose2 = _transform(coal, T2)
-        gap = signed_distance(coal, first.shape, pose1, second.shape, pose2, request, result)
+        gap = signed_distance(coal, one.shape, pose1, other.shape, pose2, request, result)
         if gap < least:
             nearest = gap, np.stack([result.getNearestPoint1(), result.getNearestPoint2()])
     return nearest
@@ -462,35 +528,39 @@ def _solids(description: Description, meshes: MeshVersions) -> dict[LinkBody, tu
 
 
 def _solid(part: Part) -> _Solid:
-    """Return the solid of a part, with its support function h(n) = max n . x over its points x.
-
-    With n = (n_x, n_y, n_z), radius r and half length l along z, or half edges e:
-
-        sphere r,    capsule r + l |n_z|,    cylinder r hypot(n_x, n_y) + l |n_z|,    box sum e_i |n_i|,
-
-    and the largest n . x of the corners for a mesh.
-    """
-    coal = coal_module()
+    """Return the solid of a part; the support function of a mesh is the largest n . x of its corners x."""
     T = part.T_link_part
-    match part.geometry:
-        case Sphere():
-            r = float(part.geometry.radius)
-            return _Solid(coal.Sphere(r), T, lambda n: np.full(n.shape[:-1], r))
-        case Capsule():
-            r = float(part.geometry.radius)
-            half = float(part.geometry.length) / 2
-            return _Solid(coal.Capsule(r, 2 * half), T, lambda n: r + half * np.abs(n[..., 2]))
-        case Cylinder():
-            r = float(part.geometry.radius)
-            half = float(part.geometry.length) / 2
-            shape = coal.Cylinder(r, 2 * half)
-            return _Solid(shape, T, lambda n: r * np.hypot(n[..., 0], n[..., 1]) + half * np.abs(n[..., 2]))
-        case Box():
-            edges = np.array([float(edge) for edge in part.geometry.size])
-            return _Solid(coal.Box(*edges.tolist()), T, lambda n: np.abs(n) @ (edges / 2))
+    if isinstance(part.geometry, Sphere | Capsule | Cylinder | Box):
+        return _primitive(part.geometry, T)
+    coal = coal_module()
     corners, faces = convex_hull(part)
     hull = coal.Convex(_vectors(corners), _triangles(faces))
     return _Solid(hull, T, lambda n: np.max(n @ corners.T, axis=-1))
+
+
+def _primitive(geometry: Sphere | Capsule | Cylinder | Box, T: Array) -> _Solid:
+    """Return a solid at a pose in its link's frame, with its support function h(n) = max n . x over its points x.
+
+    With n = (n_x, n_y, n_z), radius r and half length l along z, or half edges e:
+
+        sphere r,    capsule r + l |n_z|,    cylinder r hypot(n_x, n_y) + l |n_z|,    box sum e_i |n_i|.
+    """
+    coal = coal_module()
+    match geometry:
+        case Sphere():
+            r = float(geometry.radius)
+            return _Solid(coal.Sphere(r), T, lambda n: np.full(n.shape[:-1], r))
+        case Capsule():
+            r = float(geometry.radius)
+            half = float(geometry.length) / 2
+            return _Solid(coal.Capsule(r, 2 * half), T, lambda n: r + half * np.abs(n[..., 2]))
+        case Cylinder():
+            r = float(geometry.radius)
+            half = float(geometry.length) / 2
+            shape = coal.Cylinder(r, 2 * half)
+            return _Solid(shape, T, lambda n: r * np.hypot(n[..., 0], n[..., 1]) + half * np.abs(n[..., 2]))
+    edges = np.array([float(edge) for edge in geometry.size])
+    return _Solid(coal.Box(*edges.tolist()), T, lambda n: np.abs(n) @ (edges / 2))
 
 
 def _vectors(corners: Array) -> Any:
