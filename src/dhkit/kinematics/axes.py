@@ -93,6 +93,8 @@ class Axes:
         a = self.direction(i)
         b = self.direction(j)
         normal = np.cross(a, b)
+
+        # |a x b| is the sine of the angle between the axes.
         square = normal @ normal
         if square <= self.tolerance**2:
             return None

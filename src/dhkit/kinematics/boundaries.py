@@ -88,20 +88,24 @@ def _turned_ring(description: Description, point: str) -> tuple[Boundary, ...]:
     ring = _Ring(a1, least, most)
 
     def world(section: Array) -> Array:
+        # p = origin + x e_x + u e_u + v e_v, with the plane's axes e_x, e_u and e_v as rows of R, and v = offset.
         across = np.full((len(section), 1), side.offset)
         return np.asarray(plane.origin + np.hstack([section * (sign, 1.0), across]) @ plane.R)
 
     def around(radius: float) -> Array:
+        # A circle about axis 1, along e_u: p = origin + radius (cos(t) e_x + sin(t) e_v).
         turns = _unit_circle()
         return np.asarray(plane.origin + radius * (turns[:, :1] * plane.R[0] + turns[:, 1:] * plane.R[2]))
 
     nowhere = np.empty((0, 3))
     found = []
     if np.isfinite(most):
+        # The farthest point of the ring is at x = a1 + most in a plane that passes axis 1 at the distance offset.
         found.append(Boundary("outer", point, world(ring.outer), around(float(np.hypot(a1 + most, side.offset)))))
     inner = ring.inner
     if np.isfinite(inner).any() and least > _MIN_RADIUS * side.size:
         found.append(Boundary("inner", point, world(inner), nowhere))
+    # Only where the ring reaches x = 0 does the point come as near to axis 1 as the plane does.
     if side.offset and np.isfinite(most) and most > a1:
         found.append(Boundary("shoulder", point, world(ring.edge), around(abs(side.offset))))
     return tuple(found)
@@ -128,6 +132,8 @@ class _Ring:
         """The boundary of the hole that neither ring covers, shape (k, 2), m, pieces separated by NaN."""
         if not self.a1:
             return self._circle(0.0, self.least)
+
+        # The hole's boundary: both inner circles, and the mirror image's outer circle where it crosses the ring's hole.
         pieces = [
             self._uncovered(self._circle(self.a1, self.least), -self.a1),
             self._uncovered(self._circle(-self.a1, self.least), self.a1),
@@ -153,6 +159,8 @@ class _Ring:
         """Return the part of a circle that has x >= 0, shape (k, 2)."""
         if radius <= -centre or not radius:
             return np.empty((0, 2))
+
+        # x = centre + radius cos(t) >= 0 for |t| <= arccos(-centre / radius); the whole circle if centre >= radius.
         half = np.arccos(max(-1.0, -centre / radius))
         angles = np.linspace(-half, half, _CIRCLE_SEGMENTS + 1)
         return np.stack([centre + radius * np.cos(angles), radius * np.sin(angles)], axis=1)
@@ -170,6 +178,8 @@ def _ring(description: Description, fit: Fit) -> tuple[Boundary, ...]:
     p = fit.parameters
     T_plane_world = np.asarray(p["T_plane_world"])
     R = T_plane_world[:, :3]
+
+    # The plane's coordinates of a world point p are R p + t; those of its origin are 0 at p = -R^T t.
     origin = -T_plane_world[:, :3].T @ T_plane_world[:, 3]
     heights = float(np.asarray(p["height"])) + _rises(description, fit)
 

@@ -134,6 +134,7 @@ def _distinct(q: Array, owner: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp
     kept = np.ones(len(q), dtype=bool)
     order = np.argsort(owner, kind="stable")
     for places in np.split(order, np.flatnonzero(np.diff(owner[order])) + 1):
+        # arg e^(i d) is the difference d of two angles the short way round, in (-pi, pi].
         turns = np.abs(np.angle(np.exp(1j * (q[places, None] - q[places])))).max(axis=-1)
         kept[places] = ~np.any(np.tril(turns < _SAME_SOLUTION, k=-1), axis=1)
     return q[kept], owner[kept]

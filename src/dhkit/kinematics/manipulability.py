@@ -106,6 +106,7 @@ def isotropy(description: Description, q: ArrayLike, motion: Motion = "translati
         return 0.0 * sigma[..., 0]
     largest = sigma[..., 0]
     smallest = sigma[..., rank - 1]
+    # A flat ellipsoid has the isotropy 0, and so has a Jacobian of zeros, where the quotient would be 0 / 0.
     flat = smallest <= _FLATNESS * largest
     return np.divide(np.where(flat, 0.0, smallest), np.where(flat, 1.0, largest))
 
@@ -175,8 +176,14 @@ def velocity_ellipsoid(description: Description, q: ArrayLike, motion: Motion = 
     if motion not in ("translational", "rotational"):
         raise ValueError(f"motion is {motion!r}; expected 'translational' or 'rotational'")
     J, missing = _known(_rows(description, q, motion))
+
+    # With J = U diag(sigma) V^T the unit sphere of joint rates is mapped onto the ellipsoid with half axes sigma_i u_i.
     U, sigma, _ = np.linalg.svd(J)
-    U[..., 2] *= np.linalg.det(U)[..., None]  # right-handed
+
+    # The sign of a half axis is free: u_3 takes the one that makes U right-handed, det U = 1.
+    U[..., 2] *= np.linalg.det(U)[..., None]
+
+    # An arm with one or two joints has fewer than three singular values: the other half axes are 0.
     lengths = np.zeros((*U.shape[:-2], 3))
     lengths[..., : sigma.shape[-1]] = np.where(sigma <= _FLATNESS * sigma[..., :1], 0.0, sigma)
     for array in (U, lengths):
@@ -195,11 +202,12 @@ def force_ellipsoid(description: Description, q: ArrayLike, motion: Motion = "tr
     velocity = velocity_ellipsoid(description, q, motion)
     with np.errstate(divide="ignore"):
         lengths = 1.0 / velocity.lengths[..., ::-1]
-    axes = velocity.axes[..., ::-1] * (
-        1.0,
-        -1.0,
-        1.0,
-    )  # the order is reversed, and one axis with it to stay right-handed
+
+    # The torques are tau = J^T f, so that |tau|^2 = f^T J J^T f = sum_i (sigma_i u_i . f)^2: half axes u_i / sigma_i.
+    # The longest is that of the smallest sigma_i. Reversing three columns changes the sign of det U, and reversing the
+    # direction of one of them changes it back.
+    signs = (1.0, -1.0, 1.0)
+    axes = velocity.axes[..., ::-1] * signs
     return Ellipsoid(velocity.center, axes, lengths)
 
 
@@ -225,8 +233,12 @@ def _volume(J: Array, rank: int) -> Array:
     n = len(columns)
     if rank == 0:
         return 0.0 * J[..., 0, 0]
+
+    # One singular value: sigma_1^2 = |J|_F^2.
     if rank == 1:
         return np.asarray(np.linalg.norm(J, axis=(-2, -1)))
+
+    # The minors of columns a, b, c: the entries of a x b for 2 x 2, and (a x b) . c for 3 x 3.
     squares = np.zeros(J.shape[:-2])
     for i, j in combinations(range(n), 2):
         normal = np.cross(columns[i], columns[j])

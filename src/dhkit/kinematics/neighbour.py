@@ -128,6 +128,8 @@ def _refined_branches(
     q = np.full(starts.shape, np.nan)
     q[has_start] = _refined(description, starts[has_start], goals[has_start])
 
+    # Newton's method may end at the solution of another branch, or nowhere: such starts are followed in small steps.
+    # Of starts that still end at one solution the nearest keeps it.
     lost = has_start & (np.isnan(q).any(axis=-1) | _are_twins(description, starts, q))
     q[lost] = _followed(description, starts[lost], goals[lost])
     q[_are_twins(description, starts, q)] = np.nan
@@ -237,6 +239,7 @@ def _are_twins(description: Description, starts: Array, q: Array) -> NDArray[np.
 
 def _largest_difference(description: Description, a: Array, b: Array) -> Array:
     """Return the largest difference of joint values (..., n): angles the short way round, lengths over the reach."""
+    # |d - 2 pi round(d / (2 pi))| <= pi is an angle the short way round.
     difference = a - b
     prismatic = description.numbers.prismatic
     whole_turns = np.where(prismatic, 0.0, math.tau * np.rint(difference / math.tau))

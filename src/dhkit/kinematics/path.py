@@ -124,6 +124,7 @@ def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits
     q0 = joint_vector(description, q0, "q0")
     solutions = inverse_kinematics(description, poses, seed=q0)
     usable = solutions.allowed if limits else solutions.valid
+    # pi/4 rad, or for a prismatic joint pi/4 (reach / (2 pi)): an eighth of the reach.
     jump = _MAX_STEP * np.where(description.numbers.prismatic, description.reach / 2 / np.pi, 1.0)
     q = np.full((len(poses), description.n), np.nan)
     places = np.full(len(poses), -1)
@@ -143,6 +144,8 @@ def follow_path(description: Description, T: ArrayLike, q0: ArrayLike, *, limits
             lost.append(k)
             continue
         places[k], q[k] = chosen
+
+        # After a lost pose joints may have moved by more than a step, which is not a jump.
         if k and lost[-1:] != [k - 1] and np.any(np.abs(q[k] - at) > jump):
             switches.append(k)
         at = q[k]
@@ -170,6 +173,8 @@ def _nearest_branch(
 
 
 def _near_singular(description: Description, q: Array, motion: Motion) -> tuple[int, ...]:
+    # Without units: velocities over the reach L, diag(1/L, 1) J. Of its singular values those beyond the number of
+    # freedoms are always 0, so that the last one that counts is the smallest.
     J = jacobian(description, np.nan_to_num(q))
     J[:, :3] /= description.reach or 1.0
     J = J if motion == "whole" else J[:, :3]

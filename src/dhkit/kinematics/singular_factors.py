@@ -44,6 +44,7 @@ class AngleFactor:
     @property
     def values(self) -> tuple[float, ...]:
         """The joint's two singular positions, rad, in (-pi, pi]: at angle 0, then at pi."""
+        # sense q + zero = 0 or pi, and 1 / sense = sense.
         return _wrap_angle(-self.sense * self.zero), _wrap_angle(self.sense * (np.pi - self.zero))
 
     def words(self, point: str) -> str:
@@ -122,6 +123,8 @@ class Link:
         """Return the terms of its x with numbers of at least ``least``: number, and function of q."""
         names = "".join(f" {'+' if s > 0 else '-'} q{k + 3}" for k, s in enumerate(self.senses))
         angle = f"(q2{names})" if names else " q2"
+
+        # Re(c e^(i angle)) = Re(c) cos(angle) - Im(c) sin(angle).
         slide = "" if self.slide is None else f"q{self.slide + 1} "
         parts = [(self.c.real, f"{slide}cos{angle}"), (-self.c.imag, f"{slide}sin{angle}")]
         return [(number, text) for number, text in parts if abs(number) > least]
@@ -146,7 +149,9 @@ class ShoulderFactor:
 
     def measure(self, q: Array) -> Array:
         """Return abs(x) over the reach, shape (...), at joint positions (..., n), rad and m."""
-        return np.asarray(np.abs(self.a1 + (np.exp(1j * q[..., 1]) * self._arm(q)).real) / self.size)
+        # x = a1 + Re(e^(i q2) A), where A is the sum of the links at q2 = 0.
+        x = self.a1 + (np.exp(1j * q[..., 1]) * self._arm(q)).real
+        return np.asarray(np.abs(x) / self.size)
 
     def radii(self, lower: Array, upper: Array) -> tuple[float, float]:
         """Return the least and largest distance of the point from axis 2, m, with joint limits (n,), rad and m."""
@@ -154,6 +159,8 @@ class ShoulderFactor:
         slides = [(link.c, link.slide) for link in self.links if link.slide is not None]
         if not slides:
             return link_radii([abs(c) for c in fixed])
+
+        # The vector from axis 2 is fixed + direction q with |direction| = 1: its length is |fixed / direction + q|.
         ((direction, joint),) = slides
         start = sum(fixed) / direction
         return slide_radii(start.real, start.imag, float(lower[joint]), float(upper[joint]))
@@ -185,6 +192,8 @@ class ShoulderFactor:
 
     def moved_onto_singularity(self, q: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
         """Return joint values q (k, n), rad and m, with joint 2 moved to x = 0, inside limits if possible; else NaN."""
+        # a1 + Re(e^(i q2) A) = a1 + |A| cos(q2 + arg A) = 0, so that q2 = +-arccos(-a1 / |A|) - arg A. The arccosine is
+        # NaN where the links are too short, |A| < |a1|. With a1 = 0 it is pi / 2 for every A, 0 included.
         arm = self._arm(q)
         length = np.abs(arm)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -205,11 +214,13 @@ Factor: TypeAlias = AngleFactor | SlideFactor | ShoulderFactor
 
 def link_radii(lengths: Sequence[float]) -> tuple[float, float]:
     """Return the least and largest distance, m, that links of these lengths, m, reach in a plane."""
+    # The others, folded back, shorten the longest one: L_max - (sum L - L_max), or 0 if they are longer together.
     return max(0.0, 2 * max(lengths) - sum(lengths)), sum(lengths)
 
 
 def slide_radii(start: float, lift: float, lower: float, upper: float) -> tuple[float, float]:
     """Return the least and largest of abs(start + q + i lift) for q inside limits; all in m."""
+    # |start + q + i lift|^2 = (start + q)^2 + lift^2: least where |start + q| is, which may be 0 inside the limits.
     ends = (start + lower, start + upper)
     near = 0.0 if ends[0] <= 0 <= ends[1] else min(abs(end) for end in ends)
     return float(np.hypot(near, lift)), float(np.hypot(max(abs(end) for end in ends), lift))
@@ -228,6 +239,7 @@ def _product(number: float, name: str) -> str:
 
 def _wrap_angle(angle: float) -> float:
     """Return an angle in (-pi, pi]."""
+    # x - ceil(x - 1/2) is in (-1/2, 1/2], for x = angle / (2 pi) turns.
     turned = float(angle - math.tau * np.ceil(angle / math.tau - 0.5))
     return turned + 0.0
 
@@ -235,5 +247,7 @@ def _wrap_angle(angle: float) -> float:
 def _wind_into_limits(angles: Array, lower: float, upper: float) -> Array:
     """Return angles with whole turns added to lie inside limits, or reduced to (-pi, pi] where none do."""
     near = angles - math.tau * np.ceil(angles / math.tau - 0.5)
+
+    # The smallest angle near + 2 pi k >= lower.
     first = near + math.tau * np.ceil((lower - near) / math.tau)
     return np.where((near < lower) | (near > upper), np.where(first <= upper, first, near), near)

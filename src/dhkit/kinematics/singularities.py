@@ -106,6 +106,9 @@ def singularities(description: Description) -> Singularities:
             " singular_values find them numerically"
         )
     factors, point, task = build(found.fit)
+
+    # The rows of a task are in the plane's axes x, u and v, those of the result in the tool's, at zero joint positions:
+    # task diag(R, R) with R = R_plane_world R_world_tool, for the velocity and the angular velocity.
     rotation = world_to_tool(description, np.zeros(description.n))[:3, :3]
     rows = task @ np.kron(np.eye(2), _parameters(found.fit)["T_plane_world"][:, :3] @ rotation)
     rows.flags.writeable = False
@@ -234,6 +237,7 @@ def _room(description: Description) -> Array:
 
 
 # Factors from the parameters of the families in closed_form. A task is given in the axes x, u, v of the arm's plane.
+# x is the distance of the point from axis 1 along that plane, elbow and wrist are the angles of the two AngleFactors.
 
 _Parts: TypeAlias = tuple[tuple[Factor, ...], str, Array]
 _WHOLE = np.eye(6)
@@ -245,11 +249,13 @@ _TURNING_TOO = np.eye(6)[[0, 1, 2, 5]]
 
 
 def _elbow_wrist(fit: Fit) -> _Parts:
+    # abs(det J) = abs(x) L2 L3 abs(sin(elbow)) abs(sin(wrist))
     p = _parameters(fit)
     return (_side(p, _links(p)), _elbow(p), _wrist(p, "axes 4 and 6 coincide")), "the wrist centre", _WHOLE
 
 
 def _slide_wrist(fit: Fit) -> _Parts:
+    # abs(det J) = abs(x) abs(start + q3) abs(sin(wrist)), with x = a1 + Re(e^(i q2) boom (q3 + start + i lift)).
     p = _parameters(fit)
     boom = complex(*p["boom"])
     length = complex(p["start"], p["lift"])
@@ -258,17 +264,20 @@ def _slide_wrist(fit: Fit) -> _Parts:
 
 
 def _three_parallel(fit: Fit) -> _Parts:
+    # The product of the arms with a spherical wrist, where x has a third link: the lever from axis 4 to the point.
     p = _parameters(fit)
     factors = _side(p, (*_links(p), _lever(p))), _elbow(p), _wrist(p, "axis 6 is parallel to axes 2, 3 and 4")
     return factors, "the point where axes 5 and 6 meet", _WHOLE
 
 
 def _yaw_two(fit: Fit) -> _Parts:
+    # abs(det J) = abs(x) L2 L3 abs(sin(elbow)) for the velocity alone.
     p = _parameters(fit)
     return (_side(p, _links(p)), _elbow(p)), "the tool", _VELOCITY
 
 
 def _yaw_three(fit: Fit) -> _Parts:
+    # The same product with the turn about v as a fourth coordinate; the lever is a third link in x.
     p = _parameters(fit)
     return (_side(p, (*_links(p), _lever(p))), _elbow(p)), "the tool", _TURNING_TOO
 
@@ -277,11 +286,15 @@ def _parallel_chain(fit: Fit) -> _Parts:
     p = _parameters(fit)
     kinds = fit.structure
     second = [i for i, letter in enumerate(kinds) if letter == "R"][1]
+
+    # abs(det J) = L2 L3 abs(sin(elbow)) for the velocity in the plane, along v too if a joint slides, and the turn
+    # about v with three revolute joints.
     rows = [0, 1, *([2] if "P" in kinds else []), *([5] if kinds.count("R") == 3 else [])]
     return (_elbow(p, second, float(p["senses"][second])),), "the tool", np.eye(6)[rows]
 
 
 def _polar(fit: Fit) -> _Parts:
+    # abs(det J) = abs(start + q2) for the velocity in the plane.
     return (_slide(_parameters(fit), 1),), "the tool", np.eye(6)[:2]
 
 

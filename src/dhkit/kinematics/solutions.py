@@ -310,6 +310,8 @@ class IKSolutions:
             return []
         if self.prismatic[i] or not (np.isfinite(lower) and np.isfinite(upper)):
             return [value] if lower - LIMIT_SLACK <= value <= upper + LIMIT_SLACK or np.isinf(upper - lower) else []
+
+        # All whole k with lower <= value + 2 pi k <= upper.
         first = int(np.ceil((lower - LIMIT_SLACK - value) / math.tau))
         last = int(np.floor((upper + LIMIT_SLACK - value) / math.tau))
         return [value + math.tau * k for k in range(first, last + 1)]

@@ -278,6 +278,7 @@ def occupancy(points: Array, edge: float | None = None, flat: float = 0.0) -> Gr
     if np.prod(np.ceil(wanted)) > _MOST_CELLS:
         least = float(np.prod(spans) / _MOST_CELLS) ** (1 / len(spans))
         raise ValueError(f"edge {edge:g} m makes more than {_MOST_CELLS} cells; expected about {least:.2g} m or more")
+    # A span that is a whole number of edges but for rounding does not get another cell.
     shape = tuple(max(1, int(np.ceil(cells * (1 - 1e-12)))) for cells in wanted)
     # The box's middle is the grid's, so that no border cell is a sliver by rounding.
     corner = low + spans / 2 - edge * np.array(shape) / 2
@@ -285,8 +286,11 @@ def occupancy(points: Array, edge: float | None = None, flat: float = 0.0) -> Gr
     for start in range(0, len(places), CHUNK):
         cells = ((places[start : start + CHUNK] - corner) / edge).astype(np.intp)
         np.add.at(counts, tuple(np.clip(cells, 0, np.array(shape) - 1).T), 1)
-    across = points.mean(axis=0)
-    origin = corner @ axes + across - (across @ axes.T) @ axes
+
+    # With the axes as rows of A, the corner c in the grid and the mean m of the points: A^T c + (1 - A^T A) m, where
+    # the second term is the grid's offset across its own axes.
+    mean = points.mean(axis=0)
+    origin = corner @ axes + mean - (mean @ axes.T) @ axes
     return Grid(origin, axes, edge, counts)
 
 
@@ -325,6 +329,8 @@ def _ranges(description: Description) -> tuple[Array, Array, tuple[str, ...]]:
 
 def _hull_axes(points: Array, flat: float) -> Array:
     """Return axes of the space, plane, line or point that points lie in, shape (d, 3): the world's where they do."""
+    # Principal axes: eigenvectors of sum_k (x_k - mean)(x_k - mean)^T, the one of the largest eigenvalue first. They
+    # replace the world's only where the points lie in an oblique plane or line.
     axes = np.eye(3)[np.ptp(points, axis=0) > flat]
     places = (points - points.mean(axis=0)) @ axes.T
     principal = np.linalg.eigh(places.T @ places)[1].T[::-1] @ axes
@@ -334,6 +340,7 @@ def _hull_axes(points: Array, flat: float) -> Array:
 
 def _fitting_edge(spans: Array, count: int) -> float:
     """Return the edge of cells of which a box has one for every so many points."""
+    # Cells of edge e in d dimensions with PER_CELL points each: count / PER_CELL = prod(spans) / e^d.
     edge = float(np.prod(spans) * PER_CELL / count) ** (1 / len(spans))
     longest = float(spans.max())
     return float(np.clip(edge, longest / _FINEST, longest))
@@ -341,6 +348,7 @@ def _fitting_edge(spans: Array, count: int) -> float:
 
 def _without_border(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return the cells whose neighbours, diagonal ones included, are all marked; beyond the grid none is."""
+    # The minimum over a cube of 3^d cells is that along one axis of those along the others.
     for axis in range(cells.ndim):
         width = [(int(axis == k), int(axis == k)) for k in range(cells.ndim)]
         padded = np.moveaxis(np.pad(cells, width), axis, 0)

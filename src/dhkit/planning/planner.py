@@ -7,7 +7,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, Unpack
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -65,6 +65,13 @@ DURATION_TOLERANCE = 1e-3
 """Relative excess of the fastest motion over a given duration from which an error calls the duration too short."""
 DEFAULT_DURATION_FACTOR = 2.0
 """Factor over the duration of the fastest cubics that gives the default duration of objectives without time."""
+
+
+class _TaskMotion(NamedTuple):
+    """The best motion of a route, with the task whose clearance it keeps."""
+
+    task: Task
+    motion: PlannedMotion
 
 
 class Planner:
@@ -322,12 +329,13 @@ class Planner:
         progress: ProgressCall | None,
     ) -> tuple[Task, PlannedMotion, tuple[BranchReport, ...]]:
         """Return the best motion of all routes with its task, and the branches' reports; count the work."""
-        best: tuple[Task, PlannedMotion] | None = None
+        best: _TaskMotion | None = None
         failure: PlanningError | None = None
         reports = list[BranchReport]()
         chosen = -1
         for number, route in enumerate(routes):
-            hopeless = best is not None and self.objective.only_time and route.bound >= best[1].trajectory.duration
+            # Every motion of the route lasts at least ``bound``; for least time that decides.
+            hopeless = best is not None and self.objective.only_time and route.bound >= best.motion.trajectory.duration
             if hopeless or (best is not None and work.is_over):
                 reports.append(BranchReport(route.label, route.bound, solved=False))
                 continue
@@ -343,8 +351,8 @@ class Planner:
                 reports.append(BranchReport(route.label, float("inf"), solved=True, reason=str(error)))
                 continue
             reports.append(BranchReport(route.label, found.trajectory.duration, solved=True))
-            if best is None or found.cost < best[1].cost:
-                best = (task, found)
+            if best is None or found.cost < best.motion.cost:
+                best = _TaskMotion(task, found)
                 chosen = number
         if best is None:
             if failure is None or len(routes) == 1:

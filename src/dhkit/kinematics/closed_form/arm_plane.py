@@ -155,6 +155,9 @@ def ordered_shoulders(p: Mapping[str, SX], position: Vector, pose: PoseSymbols) 
     Without lateral offset there is no left and right; the shoulder in front then comes first.
     """
     front, back = _shoulders(position, p["offset"], pose.scale, p["reach"], pose.free_1)
+
+    # Seen with u up, the left of a direction along x is u x (u x v) = -v. The plane, at v = offset, thus passes on the
+    # right of the arm in front where offset > 0, and on the left of the one at the back, which points along -x.
     back_is_left = sign(p["up"][1]) * p["offset"] > 0
 
     def selected(a: Shoulder, b: Shoulder) -> Shoulder:

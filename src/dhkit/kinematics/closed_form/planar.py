@@ -152,6 +152,8 @@ def polar_fit(axes: Axes) -> Fit | None:
     origin = axes.point(1)
     tool = R @ (axes.T_world_tool[:3, 3] - origin)
     along = R @ axes.direction(2)
+
+    # As complex numbers x + i u the tool is at boom (start + i lift), with |boom| = 1.
     return Fit(
         geometry="a slide at right angles to a revolute axis",
         parameters={
@@ -256,6 +258,7 @@ def slider_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
 
 def _across(v: Array) -> Array:
     """Return rows x, u, v of a right-handed frame, shape (3, 3), with x close to the world's x or y axis."""
+    # x is a coordinate axis h less its part along v, h - (h . v) v; h is not nearly parallel to v.
     helper = np.eye(3)[0] if abs(v[0]) < 0.9 else np.eye(3)[1]
     x = helper - (helper @ v) * v
     x /= np.linalg.norm(x)

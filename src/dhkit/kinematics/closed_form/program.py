@@ -137,5 +137,7 @@ def _inside(x: Any, begin: Any, width: Any, is_prismatic: bool) -> Any:
     """
     if is_prismatic:
         return ca.logic_and(x >= begin, x - begin <= width)
-    turns = x * (1.0 / math.tau) - begin  # multiplied, for a division costs as much as an arc tangent
+    # For some whole k, 0 <= x / (2 pi) - begin + k <= width: the smallest such number that is not negative is the
+    # fractional part. Multiplied by 1 / (2 pi), for a division costs as much as an arc tangent.
+    turns = x * (1.0 / math.tau) - begin
     return turns - ca.floor(turns) <= width

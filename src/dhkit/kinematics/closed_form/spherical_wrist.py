@@ -91,6 +91,8 @@ def elbow_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
     T = pose.seen(p["T_plane_world"], p["T_tool_wrist"])
     branches = []
     for shoulder in ordered_shoulders(p, T.position, pose):
+        # From axis 2 the wrist's centre is at (x - a1, u) in the plane, and the nearest point that the links reach at
+        # ``nearest``; joint 1 moves that one on a circle about axis 1.
         for elbow in elbows(p, shoulder.x - p["a1"], T.position[1], shoulder.q1, pose.scale):
             region = _Region(
                 q=(angle(shoulder.q1), *elbow.joints),
@@ -117,6 +119,8 @@ def slide_fit(axes: Axes) -> Fit | None:
     wrist = plane.coordinates(centre)
     along = plane.R @ axes.direction(3)
     lever = wrist[:2] - second[:2]
+
+    # As complex numbers x + i u: lever = boom (start + i lift), with |boom| = 1.
     geometry = {
         "a1": second[0],
         "offset": axes.snapped(wrist[2]),
@@ -150,6 +154,8 @@ def slide_formulas(p: Mapping[str, SX], pose: PoseSymbols) -> list[Branch]:
         lift = fabs(p["lift"])
         short = lift - R
         beyond = short > BOUNDARY_SHARE * pose.scale
+
+        # R^2 - lift^2 as a product: the difference of squares would cancel where they are nearly equal.
         square = (R - lift) * (R + lift)
         length = sqrt(positive_part(square))
 

@@ -41,8 +41,11 @@ def wrist_parameters(axes: Axes, plane: ArmPlane, first: Array, centre: Array) -
     T_world_wrist[:3, :3] = np.stack([z6, z5, np.cross(z6, z5)], axis=1)
     T_world_wrist[:3, 3] = centre
 
-    # Angle from the first axis to axis 6 about axis 5, at zero.
+    # Angle from the first axis to axis 6 about axis 5, at zero: cosine first . z6, sine z5 . (first x z6).
     wrist = as_pair(first @ z6, z5 @ np.cross(first, z6))
+
+    # "F" maps the plane's coordinates to the wrist's axes z5 x first, z5 and first. "straight" is twice the angle
+    # "wrist", by which the solution with a flip, q5' = -q5 - 2 wrist, differs from -q5.
     return {
         "T_plane_world": plane.T[:3],
         "T_tool_wrist": (inverse_pose(axes.T_world_tool) @ T_world_wrist)[:3],
@@ -98,6 +101,8 @@ def joints_5_and_6(p: Mapping[str, SX], wrist: Wrist, roll: Pair) -> tuple[tuple
     m = wrist.m
     c, s = roll
 
+    # In the wrist's axes the directions (-m, n, a) are the columns of R = Rz(roll) Ry(q5 + wrist) Rz(q6). The third
+    # column of Rz(-roll) R is (sin(q5 + wrist), 0, cos(q5 + wrist)), and its second row (sin q6, cos q6, 0).
     sine, cosine = unit_pair(c * a[0] + s * a[1], a[2])
     q5 = angle(add_angles((cosine, sine), p["wrist"], -1.0))
     q6 = angle(unit_pair(c * n[1] - s * n[0], s * m[0] - c * m[1]))

@@ -56,6 +56,8 @@ def _require_regular(path: JointPath) -> None:
     """Require a path whose derivative by s is neither near zero nor very large."""
     s, slopes = path.pieces.derivative.inside(REGULAR_POINTS)
     steepness = np.abs(slopes).max(axis=2)
+
+    # The mean of max_i |q'_i| over s, which has the length 1: that in each piece times the length of the piece.
     mean = float(np.sum(steepness.mean(axis=1) * np.diff(path.breaks)))
     if not steepness.min() > MIN_DERIVATIVE_RATIO * mean:
         raise PlanningError(

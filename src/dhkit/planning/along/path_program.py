@@ -265,6 +265,8 @@ class PathProgram(OptimizationProgram[Profile]):
         is_refined = np.any([(share > self.small_step).any(axis=1) for share in more.values()], axis=0)
         if not is_refined.any() or self.intervals + is_refined.sum() > 2 * MAX_INTERVALS:
             return self, margins.raised(more)
+
+        # Halving an interval leaves a quarter of its excess, for which the margin is raised.
         factor = np.where(is_refined, 1 / REFINED, 1.0)[:, None]
         margins = margins.raised({limit: factor * share for limit, share in more.items()})
         middles = ((self.s[1:] + self.s[:-1]) / 2)[is_refined]

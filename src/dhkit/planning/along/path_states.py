@@ -60,6 +60,8 @@ def knots_of(path: JointPath, intervals: int, rough: Array, speeds: Array) -> Ar
     """
     steps = np.diff(rough)
     times = steps / speeds
+
+    # Share of interval k: (1 - EVEN_SHARE) t_k / sum(t) + EVEN_SHARE ds_k, where sum(ds) = 1.
     share = (1 - EVEN_SHARE) * times / max(float(times.sum()), MIN_TIME) + EVEN_SHARE * steps
     covered = np.concatenate([[0.0], np.cumsum(share) / share.sum()])
     x = (1 - np.cos(np.linspace(0.0, np.pi, intervals + 1))) / 2
@@ -156,6 +158,8 @@ class PathStates:
         with np.errstate(divide="ignore", invalid="ignore"):
             joints = ((1 - shares) * limits.velocity / np.abs(self.qs)) ** 2
             most = np.where(np.isnan(joints), np.inf, joints).min(axis=2)
+
+        # An inner knot is the right end of one interval and the left end of the next: the smaller bound counts.
         bounds = np.full(most.shape[1] + 1, np.inf)
         bounds[:-1] = most[0]
         bounds[1:] = np.minimum(bounds[1:], most[1])
@@ -163,6 +167,7 @@ class PathStates:
 
     def even_speeds(self, limits: Limits) -> Array:
         """Return the largest constant speed along the path in each interval, shape (K,), 1/s."""
+        # A constant b has sdd = b' / 2 = 0, so that the largest factor of b = 1 is the largest b = sd^2.
         fastest = self.fastest(limits)
         ones = np.ones(len(fastest))
         most = np.minimum(np.minimum(fastest[:-1], fastest[1:]), self._factors(limits, ones).min(axis=0))
@@ -189,9 +194,12 @@ class PathStates:
             (self.m, self.c, self.g, limits.torque),
             (self.qs, self.qss, 0 * self.q, limits.acceleration),
         ):
+            # u, which is only rounding where it is tiny beside its terms and gravity: it limits nothing there.
             moving = by_sdd * sdd + by_b * b
             parts = np.abs(by_sdd * sdd) + np.abs(by_b * b) + np.abs(at_rest)
             moving[np.abs(moving) < CANCELLED_SHARE * parts] = 0.0
+
+            # No factor keeps a limit that gravity alone reaches (spare <= 0): it is left out.
             spare = limit - np.sign(moving) * at_rest
             with np.errstate(divide="ignore", invalid="ignore"):
                 most = np.where((spare > 0) & (moving != 0), spare / np.abs(moving), np.inf)
@@ -219,7 +227,9 @@ class PathPoint(Point):
         self.path = casadi.SX.sym("path", 7 * n + 6)
         edges = [*range(0, 6 * n + 1, n), 6 * n + 3, 6 * n + 6, 7 * n + 6]
         q, qs, qss, m, c, g, ps, pss, _ = casadi.vertsplit(self.path, edges)
+
         # b = sd^2 is a variable of its own: the programs are written in it.
+        #   qd = q' sd,  qdd = q' sdd + q'' b,  tau = m sdd + c b + g,  v = p' sd,  a = p' sdd + p'' b
         self.q = q
         self.qd = qs * self.speed
         self.qdd = qs * self.sdd + qss * self.b

@@ -66,6 +66,7 @@ class Profile:
     @property
     def times(self) -> Array:
         """Times of the knots, shape (K+1,), s."""
+        # An interval with constant sdd has the mean speed (sd_k + sd_(k+1)) / 2.
         speed = np.sqrt(self.b)
         return np.concatenate([[0.0], np.cumsum(2 * np.diff(self.s) / (speed[1:] + speed[:-1]))])
 
@@ -76,6 +77,7 @@ class Profile:
 
     def lasting(self, duration: float) -> Profile:
         """Return the same profile, slower or faster, with another duration, s."""
+        # A motion that lasts c times as long has sd / c, and b / c^2.
         return Profile(self.s, self.b * (self.duration / duration) ** 2)
 
 
@@ -123,9 +125,12 @@ class TimingProgram(PathProgram[Profile]):
             b = [*b, casadi.SX(0)]
             speed = [*speed, casadi.SX(0)]
 
+        b_begin, b_end = b
+        sd_begin, sd_end = speed
+
         # The time that the interval takes, and sdd = b' / 2.
-        time = 2 * ds / (speed[0] + speed[1])
-        sdd = (b[1] - b[0]) / (2 * ds)
+        time = 2 * ds / (sd_begin + sd_end)
+        sdd = (b_end - b_begin) / (2 * ds)
         kinds = [Rows(RowKind.TIME, "duration of an interval", 1)]
         rows = [time - duration]
 
@@ -137,7 +142,8 @@ class TimingProgram(PathProgram[Profile]):
             rows.append(row)
             rates.append(rate)
             kinds += limits
-        cost = symbols.scale * duration * (self.task.objective.time_weight + (rates[0] + rates[1]) / 2)
+        rate_begin, rate_end = rates
+        cost = symbols.scale * duration * (self.task.objective.time_weight + (rate_begin + rate_end) / 2)
 
         z = casadi.vertcat(duration, *parts, inner)
         return LocalFunction(z, symbols.vector, casadi.vertcat(*rows), cost), tuple(kinds)
@@ -212,6 +218,8 @@ class TimingProgram(PathProgram[Profile]):
 
     def law(self, found: Profile) -> tuple[Array, Array]:
         """Return s(t): its breaks (K+1,), s, and ascending coefficients, shape (K, 3): s + sd t + sdd t^2 / 2."""
+        # sdd = (b_(k+1) - b_k) / (2 ds) as a product: with h_k = 2 ds / (sd_k + sd_(k+1)) of ``times`` the speed at the
+        # end of an interval, sd_k + sdd h_k, is then sd_(k+1) to rounding, however small ds is.
         sd = np.sqrt(found.b)
         sdd = (sd[1:] - sd[:-1]) * (sd[1:] + sd[:-1]) / (2 * np.diff(found.s))
         return found.times, np.stack([found.s[:-1], sd[:-1], sdd / 2], axis=1)
@@ -311,7 +319,8 @@ class SmoothTimingProgram(PathProgram[SmoothProfile]):
             rows += [row, jerk * reciprocals]
             rates.append(rate)
             kinds += [*limits, Rows(RowKind.LIMIT, Limit.JERK.what, n, Limit.JERK, of_joints=True)]
-        cost = symbols.scale * h * (self.task.objective.time_weight + (rates[0] + rates[1]) / 2)
+        rate_begin, rate_end = rates
+        cost = symbols.scale * h * (self.task.objective.time_weight + (rate_begin + rate_end) / 2)
 
         z = casadi.vertcat(h, *parts, *known)
         return LocalFunction(z, symbols.vector, casadi.vertcat(*rows), cost), tuple(kinds)

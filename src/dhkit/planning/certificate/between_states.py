@@ -72,11 +72,12 @@ def smallest_between(
         needed = least[parts.step]
         both = parts.distance_at_begin + parts.distance_at_end
 
-        # A distance that is too small at an end is known already; open are those that may be too small inside.
+        # A distance that is too small at an end is known already; open are those that may be too small inside, by their
+        # bound (d_0 + d_1 - L) / 2.
         near = np.minimum(parts.distance_at_begin, parts.distance_at_end)
         is_open = (near >= needed) & ((both - travel[:, None]) / 2 < needed)
 
-        # A part whose travel is at most this room needs no more states.
+        # A part whose travel L is at most d_0 + d_1 - 2 needed, for each open distance, needs no more states.
         room = np.where(is_open, both - 2 * needed, np.inf).min(axis=1, initial=np.inf)
         is_kept = is_open.any(axis=1) & (travel > smallest_travel)
         if not is_kept.any():

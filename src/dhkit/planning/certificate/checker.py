@@ -373,6 +373,7 @@ class Checker:
         low_kept = 0
         high_kept = 0
         while high - low > SLOW_DOWN_TOLERANCE and e_high < -SLOW_DOWN_TOLERANCE:
+            # The secant through (low, e_low) and (high, e_high) is 0 at c.
             c = high - e_high * (high - low) / (e_high - e_low)
             e = excess(c)
             if e > 0:
@@ -394,6 +395,8 @@ class Checker:
 
 def _with_peaks_between(use: Array, points: int) -> Array:
     """Return values at states, shape (N, k), raised to the peak before the next one of cubics through four states."""
+    # Peak k, of the cubic through states k to k + 3, raises the value at state k + 1. The cubic counts up to the next
+    # state; the first and the last one also count to the ends of the interval.
     values = use.reshape(-1, points, use.shape[1])
     peaks, _ = cubic_peaks(values)
     raised = values.copy()
@@ -468,6 +471,7 @@ def _proved_check(motion: Trajectory, limits: Limits, kind: Limit) -> Check:
 
 def _time_shares(trajectory: Trajectory, states: States) -> Array:
     """Return the share of the duration that each state stands for by the trapezoidal rule, shape (N,)."""
+    # A piece of N states has the weights (1/2, 1, ..., 1, 1/2) / (N - 1), times its share of the duration.
     K = len(trajectory.breaks) - 1
     weights = np.ones(len(states.times) // K)
     weights[[0, -1]] = 0.5

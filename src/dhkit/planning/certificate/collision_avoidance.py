@@ -72,7 +72,8 @@ class ReducedClearance:
     """Distance to keep near the goal, m; likewise."""
 
     def __str__(self) -> str:
-        return f"{1000 * min(self.start, self.goal):.3g} mm between {self.names[0]} and {self.names[1]}"
+        link, other = self.names
+        return f"{1000 * min(self.start, self.goal):.3g} mm between {link} and {other}"
 
 
 @dataclass(frozen=True)

@@ -305,6 +305,7 @@ class PositionLimit(Constraint):
 
     def bounds(self, parameters: Array, shares: Array) -> tuple[Array, Array]:
         """Return the bounds of joint values, shape (P, n) each, rad and m."""
+        # 1 + outside / size <= 1 - share, where outside is lower - q or q - upper.
         return self.limits.lower + shares * self.sizes, self.limits.upper - shares * self.sizes
 
 
@@ -475,6 +476,7 @@ def _share_of_angle(cosine: Any, tolerance: float) -> Any:
 
 
 def _angle_use_text(use: float, tolerance: float) -> str:
+    # The inverse of :func:`_share_of_angle`.
     cosine = 1 - use * (1 - math.cos(tolerance))
     angle = math.acos(max(-1.0, cosine))
     return f"{math.degrees(angle):.4g} deg off, {math.degrees(tolerance):.4g} deg are"

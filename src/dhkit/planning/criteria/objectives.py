@@ -213,6 +213,7 @@ class Energy(Term):
 
     def measured(self, states: States) -> Array:
         """Return the electrical power, shape (N,), W."""
+        # P_i = tau_i qd_i, or its positive part, and in the winding (tau_i / (gear_i k_i))^2.
         power = states.tau * states.qd
         if not self.regenerates:
             power = np.maximum(power, 0.0)

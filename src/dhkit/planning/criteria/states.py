@@ -225,6 +225,8 @@ class States:
         data = model.createData()
         states = zip(self.q, self.qd, self.qdd, strict=True)
         tau = self._gathered([pin.rnea(model, data, *state).copy() for state in states])
+
+        # M of the model has the drives' own inertias on its diagonal; those that couple two joints are added.
         return tau + self.qdd @ self.description.numbers.coupling
 
     def _friction_torque(self, qd: Array) -> Array | float:
@@ -253,6 +255,7 @@ class States:
             pin.forwardKinematics(model, data, *state)
             T[k] = pin.updateFramePlacement(model, data, frame).homogeneous
             velocity[k] = pin.getFrameVelocity(model, data, frame, axes).linear
+            # The classical acceleration is dv/dt of the tool's origin; the spatial one is dv/dt - w x v.
             acceleration[k] = pin.getFrameClassicalAcceleration(model, data, frame, axes).linear
         return T, velocity, acceleration
 

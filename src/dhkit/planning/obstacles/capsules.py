@@ -100,6 +100,7 @@ def refine(balls: Balls) -> Enclosure:
 
 def _candidates(balls: Balls) -> list[Array]:
     """Return rotations whose third columns are candidates for the axis."""
+    # Principal axes: the right singular vectors of the centres about their mean.
     centred = balls.centres - balls.centres.mean(axis=0)
     principal = np.linalg.svd(centred, full_matrices=False)[2] if len(centred) > 2 else np.eye(3)
     axes = [*np.eye(3), *principal]
@@ -230,6 +231,8 @@ def world_axes(description: Description, q: ArrayLike) -> Array:
     capsules = link_capsules(description)
     frames = world_to_frames(description, q)[..., [capsule.link for capsule in capsules], :, :]
     ends = np.array([(capsule.start, capsule.end) for capsule in capsules])
+
+    # R x + p of each end x, as rows x^T R^T + p^T.
     axes: Array = np.matmul(ends, np.swapaxes(frames[..., :3, :3], -1, -2)) + frames[..., None, :3, 3]
     return axes
 

@@ -215,8 +215,10 @@ def _nearer(
     for p, (i, centre) in enumerate(zip(which, solids.centres, strict=True)):
         away[:, p] = np.linalg.norm(axes[:, i].mean(axis=1) - centre, axis=1)
 
-    # A distance is at most that of the middles less the radii, and at least that of the balls around both solids. Pairs
-    # whose least is above the smallest of the most in a state are not the nearest there.
+    # With the distance D of the middles, the radii r, half the length l of the capsule's axis, and the radius R of the
+    # ball around the obstacle, the distance d of a pair is
+    #   D - r_1 - l - R <= d <= D - r_1 - r_2.
+    # Pairs whose lower bound is above the smallest upper bound in a state are not the nearest there.
     bound = np.minimum(least, (away - radii - solids.radii).min(axis=1))
     low = away - radii - half_lengths - solids.bounds
     rows, pairs = np.nonzero(low <= bound[:, None] + EQUAL_BOUNDS)

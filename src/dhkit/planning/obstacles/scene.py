@@ -164,7 +164,9 @@ class Obstacle:
     @cached_property
     def axis(self) -> Array:
         """The ends of a capsule's axis in the world, shape (2, 3), m; twice the centre for a sphere."""
-        along = self.T_world_obstacle[:3, 2] * self.half_sizes[2]
+        # c - l z and c + l z, with the centre c, half the length l and the direction z.
+        _, _, half_length = self.half_sizes
+        along = self.T_world_obstacle[:3, 2] * half_length
         return _frozen(np.stack([self.centre - along, self.centre + along]))
 
 

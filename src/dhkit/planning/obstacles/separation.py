@@ -306,6 +306,7 @@ def _keep(found: Gaps, here: tuple[Indices, Indices], touched: _Nearest, other: 
     r_a = touched.radii[:, None]
     r_b = other.radii[:, None]
 
+    # n = (b - a) / |b - a|,  level = n . a + r_a,  gap = |b - a| - r_a - r_b
     along = b - a
     length = np.sqrt(np.sum(along * along, axis=-1))
     normal = along / np.maximum(length, ZERO)[..., None]
@@ -313,7 +314,8 @@ def _keep(found: Gaps, here: tuple[Indices, Indices], touched: _Nearest, other: 
     level = np.sum(normal * a, axis=-1) + r_a
     gap = length - r_b - r_a
 
-    # Distance of the other body at the first and the last state, the smaller, beyond each state's plane, shape (m, S).
+    # Least n . x - r_b of the other body's ends x at the first and the last state, for the normal of each state, shape
+    # (m, S): less the level it is the distance beyond that state's plane.
     beyond = np.einsum("msi,mkei->mske", normal, ends).min(axis=(2, 3)) - r_b
     best = (np.arange(len(gap)), np.argmax(beyond - level, axis=1))
     found.gap[here] = gap.min(axis=1)

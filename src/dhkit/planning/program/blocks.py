@@ -209,6 +209,8 @@ class BlockProgram:
         x = offset + unit * y
 
         scaled_multipliers = casadi.MX.sym("lam_g", self.rows)
+
+        # lam . h = lam . (g / row_unit): the multipliers of g are those of h over the units of the rows.
         multipliers = scaled_multipliers / row_unit
         weight = casadi.MX.sym("lam_f")
 
@@ -250,6 +252,7 @@ class BlockProgram:
             values = list(results.values())
             return casadi.Function("program", symbols, values, list(arguments), list(results))
 
+        # D df/dx,  R^-1 (dg/dx) D,  D H D  with the Hessian H
         scaled_gradient = casadi.densify(gradient.matrix()) * unit
         scaled_jacobian = jacobian.matrix(1 / row_unit, unit)
         scaled_hessian = hessian.matrix(unit, unit)
@@ -287,7 +290,8 @@ class _Nonzeros:
         columns = np.concatenate(self._columns)
         values = casadi.vertcat(*self._values)
 
-        # The nonzeros in CasADi's order, by columns: place of each value among them.
+        # The nonzeros in CasADi's order, by columns, where entry (i, j) of m rows has the number i + m j: place of each
+        # value among them.
         positions, place = np.unique(columns * self.shape[0] + rows, return_inverse=True)
         i = (positions % self.shape[0]).tolist()
         j = (positions // self.shape[0]).tolist()

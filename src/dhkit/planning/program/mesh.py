@@ -60,6 +60,7 @@ class Curve(Enum):
     @property
     def column_weights(self) -> tuple[float, ...]:
         """Weights of an interval's columns in its change of velocity, as shares of h; their sum is 1."""
+        # (qd_end - qd) / h = int_0^1 qdd dx
         match self:
             case Curve.CONSTANT:
                 return (1.0,)
@@ -71,6 +72,7 @@ class Curve(Enum):
     @property
     def position_weights(self) -> tuple[float, ...]:
         """Weights of an interval's columns in its change of position, as shares of h^2; their sum is 1/2."""
+        # (q_end - q - h qd) / h^2 = int_0^1 (1 - x) qdd dx
         match self:
             case Curve.CONSTANT:
                 return (1 / 2,)
@@ -91,6 +93,7 @@ class Curve(Enum):
 
     def values(self, qdd: Array) -> tuple[Array, Array, Array]:
         """Return the same of all intervals, shape (intervals, n) each, from all columns, shape (columns, n)."""
+        # Column k of interval i is row k + stride i.
         step = self.stride
         end = len(qdd) - 1 if self.is_continuous else len(qdd)
         return self.abc([qdd[k : k + end : step] for k in range(len(self.column_weights))])
@@ -251,7 +254,8 @@ def corrected(curve: Curve, h: Array, ends: Indices, knots: Knots, *, fixed_ends
     A = knots.qdd.copy()
     free = slice(1, -1) if fixed_ends else slice(None)
 
-    # Influence of A on v and q at the ends of the intervals, shape (K, columns) each.
+    # Influence of A on v and q at the ends of the intervals, shape (K, columns) each:
+    #   dv_k = sum_(j<=k) h_j W_j,    dq_k = sum_(j<=k) (h_j dv_(j-1) + h_j^2 U_j).
     dv = np.cumsum(h[:, None] * W, axis=0)
     dv_before = np.vstack([np.zeros(W.shape[1]), dv[:-1]])
     dq = np.cumsum(h[:, None] * dv_before + (h**2)[:, None] * U, axis=0)

@@ -81,6 +81,7 @@ def _leg(arm: LoadedArm, limits: Limits, start: Array, goal: Array) -> float:
     qdd = step * (6 - 12 * x)
     jerk = 12 * np.abs(step)
 
+    # |q'| / T <= v,    |q''| / T^2 <= a,    |q'''| / T^3 <= j
     durations = [
         np.max(np.abs(qd) / limits.velocity),
         np.sqrt(np.max(np.abs(qdd) / limits.acceleration)),
@@ -89,6 +90,8 @@ def _leg(arm: LoadedArm, limits: Limits, start: Array, goal: Array) -> float:
     if np.isfinite(limits.torque).any():
         states = States(arm, times=x[:, 0], q=q, qd=qd, qdd=qdd)
         g = states.gravity_torque
+
+        # |tau - g| / T^2 <= tau_max - |g|, with tau at T = 1.
         room = np.maximum(limits.torque - np.abs(g), MIN_TORQUE_SHARE * limits.torque)
         durations.append(np.sqrt(np.max(np.abs(states.tau - g) / room)))
     return float(max(durations))
@@ -282,9 +285,9 @@ class MotionProgram(OptimizationProgram[Knots]):
         position, limit_values = task.checker.every[Limit.POSITION]
         lower, upper = position.bounds(limit_values, margins.at_knots(Limit.POSITION, n))
         set_bounds(index.q, lower.T, upper.T)
-        if index.middles[0].size:
+        if index.middles.q.size:
             lower, upper = position.bounds(limit_values, margins.of(Limit.POSITION, n))
-            set_bounds(index.middles[0], lower.T, upper.T)
+            set_bounds(index.middles.q, lower.T, upper.T)
         speed = limits.velocity[:, None] * (1 - margins.at_knots(Limit.VELOCITY, n).T)
         set_bounds(index.qd, -speed, speed)
         set_bounds(index.qdd, -limits.acceleration[:, None], limits.acceleration[:, None])

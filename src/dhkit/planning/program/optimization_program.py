@@ -117,6 +117,7 @@ class Margins:
 
     def at_knots(self, limit: int, count: int) -> Array:
         """Return the margins at knots, shape (intervals + 1, count), without unit."""
+        # Knot k lies between the intervals k - 1 and k; the first and the last have one.
         k = np.arange(self.intervals + 1)
         before = np.maximum(k - 1, 0)
         after = np.minimum(k, self.intervals - 1)

@@ -38,6 +38,17 @@ USUAL_DURATIONS = (0.1, 10.0)
 """Range of durations, s, of motions that are planned with the second as the unit of time."""
 
 
+class Middles(NamedTuple):
+    """Indices of the variables at the middles of intervals, shape (n, intervals) each or empty."""
+
+    q: Indices
+    """Joint values."""
+    qd: Indices
+    """Joint rates."""
+    qdd: Indices
+    """Accelerations."""
+
+
 @dataclass(frozen=True, eq=False)
 class Variables:
     """Indices of a program's variables: a row for each joint, a column for each point; empty where there are none."""
@@ -50,8 +61,8 @@ class Variables:
     """Joint rates at the knots, shape (n, intervals + 1)."""
     qdd: Indices
     """Accelerations, shape (n, columns), see :class:`Curve`."""
-    middles: tuple[Indices, Indices, Indices]
-    """Joint values, rates and accelerations at the middles of intervals, shape (n, intervals) each or empty."""
+    middles: Middles
+    """States at the middles of intervals, where they are variables."""
     positive_parts: Indices
     """Positive parts of the objective's quantities at the points of the states, shape (k, P)."""
 
@@ -68,7 +79,7 @@ class Variables:
         ]
         q, qd, qdd, q_middle, qd_middle, qdd_middle = blocks
         none = np.zeros((0, 0), dtype=int)
-        return cls(np.arange(legs), q, qd, qdd, (q_middle, qd_middle, qdd_middle), none)
+        return cls(np.arange(legs), q, qd, qdd, Middles(q_middle, qd_middle, qdd_middle), none)
 
     def with_positive_parts(self, quantities: int, points: int) -> Variables:
         """Return the same with the positive parts of so many quantities at so many points of the states."""
@@ -143,6 +154,7 @@ class StatePoints:
 
         Its weights depend on both durations.
         """
+        # A knot has h/6 of each interval beside it: as its end in the one, and as its beginning in the other.
         K = mesh.intervals
         leg = mesh.leg
         sixth = mesh.shares / 6
@@ -366,7 +378,8 @@ class Problem:
         units.unit[at.durations] = time
         units.unit[at.positive_parts] = rate
         if length < 1.0:
-            for indices in (at.q, at.middles[0]):
+            # Joint values count from the start of a small move, so that they are of order one too.
+            for indices in (at.q, at.middles.q):
                 units.offset[indices] = guess.q[:1].T
         row_units = program.row_units(lambda rows: _unit(rows, length, time, rate))
         return Scaling(units.offset, units.unit, row_units)
@@ -653,7 +666,7 @@ class Problem:
         around_middles = np.stack([k, k], axis=1)
         return Block(
             LocalFunction(self.point.q, casadi.vertcat(*symbols), casadi.vertcat(*(value for _, value in rows))),
-            np.hstack([at.q[:, 1:-1], at.middles[0]]),
+            np.hstack([at.q[:, 1:-1], at.middles.q]),
             np.tile(parameters, 2 * K - 1),
             tuple(kind for kind, _ in rows),
             np.vstack([beside_knots, around_middles]),

@@ -155,6 +155,8 @@ class Solver:
         units = scaling or self._unscaled
         lower_x, upper_x = x_bounds
         lower_g, upper_g = g_bounds
+
+        # Ipopt's variables are y = (x - offset) / unit and its rows h = g / row_unit, see :class:`BlockProgram`.
         lbx = units.scaled(lower_x)
         ubx = units.scaled(upper_x)
         lbg = lower_g / units.row_unit
@@ -166,7 +168,8 @@ class Solver:
             function = self._cold
             if warm is not None:
                 function = self._warm()
-                given |= {"x0": units.scaled(warm.x), "lam_x0": warm.multipliers[0], "lam_g0": warm.multipliers[1]}
+                of_bounds, of_rows = warm.multipliers
+                given |= {"x0": units.scaled(warm.x), "lam_x0": of_bounds, "lam_g0": of_rows}
             found = function(**given)
             raised = self._watch.end()
             stats = function.stats()

@@ -260,6 +260,8 @@ class AvoidingSearch:
         share = np.linspace(0.0, 1.0, LIKE_POINTS)
         of_path = _evenly(path[0], share)
         of_motion = _evenly(motion.q(np.linspace(0.0, motion.duration, 8 * LIKE_POINTS)), share)
+
+        # States (1 - s) path + s motion on the line between two points, for s in ``share``.
         between = of_path + share[:, None, None] * (of_motion - of_path)
         return bool(self.separation.smallest(between.reshape(-1, self.task.arm.n), 0.0).min() >= 0.0)
 

@@ -81,6 +81,8 @@ class PathSampler:
             other = trees[1 - turn % 2]
             sample = self.rng.uniform(self.lower, self.upper)
             near = grown.nearest(sample)
+
+            # new = node + share (sample - node), at most self._step away in the norm |dq / scale|.
             away = (sample - grown.nodes[near]) / self.scale
             share = min(1.0, self._step / max(float(np.linalg.norm(away)), 1e-12))
             new = self._extend(grown, near, grown.nodes[near] + share * away * self.scale)
@@ -106,7 +108,9 @@ class PathSampler:
             i = _side_at(along, u)
             j = _side_at(along, v)
             if i == j:
-                continue
+                continue  # both on one side, which is straight already
+
+            # The point at a length u on side i: q_i + (q_(i+1) - q_i) (u - along_i) / length_i.
             a = path[i] + (path[i + 1] - path[i]) * (u - along[i]) / max(lengths[i], 1e-12)
             b = path[j] + (path[j + 1] - path[j]) * (v - along[j]) / max(lengths[j], 1e-12)
             if self.is_way_free(a, b):
@@ -127,6 +131,8 @@ class PathSampler:
         free = self._free(way)
         if free.all():
             return tree.add(target, near)
+
+        # The states before the first that is not free.
         count = int(np.argmin(free))
         return tree.add(way[count - 1], near) if count else None
 

@@ -166,6 +166,8 @@ class DrawnArm:
         first, second = pair
         T_first = first.placed(frames)
         T_second = second.placed(frames)
+
+        # Lower bounds from the balls around the solids: |t_1 - t_2| - r_1 - r_2, and above a floor z_1 - height - r_1.
         if second.height is None:
             apart = np.linalg.norm(T_first[:, :3, 3] - T_second[:, :3, 3], axis=1)
             gaps: Array = apart - first.radius - second.radius

@@ -99,6 +99,7 @@ def _largest(measure: Measure, instants: Array) -> Iterator[tuple[float, Array]]
         values = every[:, i]
         k = int(np.argmax(values))
         for _ in range(ZOOMS):
+            # Between the neighbours of the largest value, in the same piece.
             piece = at[at[:, 0] == at[k, 0]]
             here = int(np.searchsorted(piece[:, 1], at[k, 1]))
             low = piece[max(here - 1, 0)]
