@@ -17,6 +17,7 @@ from dhkit.lab.desk import is_singular, start_configuration
 from dhkit.lab.dynamics_panel import DynamicsPanel
 from dhkit.lab.lab import JointPanel
 from dhkit.lab.motion_panel import MotionPanel
+from dhkit.lab.obstacle_panel import ObstaclePanel
 from dhkit.lab.own_panel import OwnPanel
 from dhkit.lab.python_panel import PythonPanel
 from dhkit.lab.requests import RequestHandler
@@ -34,7 +35,7 @@ from waiting import wait_for
 
 PANELS = (
     *(JointPanel, ToolPanel, TablePanel, MotionPanel, OwnPanel, ControlPanel, DynamicsPanel),
-    *(WorkspacePanel, SubmitPanel, TransformsPanel, TaskPanel, PythonPanel),
+    *(WorkspacePanel, SubmitPanel, TransformsPanel, TaskPanel, PythonPanel, ObstaclePanel),
 )
 ROBOTS = ["puma560", "planar2r", "cobra600", "stanford", "panda"]
 

@@ -1,4 +1,4 @@
-"""Contacts: the two links of an arm that are nearest to each other or touch, as pages show them."""
+"""Contacts: two links of an arm, or a link and an obstacle, that are nearest to each other or touch."""
 
 from __future__ import annotations
 
@@ -11,17 +11,19 @@ from dhkit.arm import Arm
 from dhkit.description import Array
 from dhkit.errors import DhkitError
 from dhkit.lab.jobs import Job, Jobs
-from dhkit.planning.obstacles import may_touch, nearest_links
+from dhkit.planning.obstacles import Scene, may_touch, nearest_links, nearest_obstacle
 
 PREPARATION_DELAY = 0.5
 """Time without another arm before an arm is prepared, s: an arm that a person edits changes again soon."""
 
 
 class NearestState(TypedDict):
-    """The two links of an arm that are nearest to each other, as pages show them."""
+    """Two links of an arm that are nearest to each other, or a link and an obstacle, as pages show them."""
 
     links: list[int]
-    """Their numbers, 0 for the base."""
+    """Numbers of the two links, or of the one, 0 for the base."""
+    obstacle: str | None
+    """Name of the obstacle; None for two links."""
     distance: float | None
     """Distance of their shapes, m, negative in a penetration; None if only their capsules are known to overlap."""
     points: list[list[float]] | None
@@ -53,29 +55,35 @@ class Contacts:
 
         self._jobs.start("contacts", work, take)
 
-    def nearest(self, arm: Arm, q: Array) -> NearestState | None:
+    def nearest(self, arm: Arm, q: Array, scene: Scene = ()) -> NearestState | None:
         """Return :func:`nearest`; None for an arm that is not prepared."""
-        return nearest(arm, q) if self._arm is arm else None
+        return nearest(arm, q, scene) if self._arm is arm else None
 
     def close(self) -> None:
         """End the preparation."""
         self._jobs.close()
 
 
-def nearest(arm: Arm, q: Array) -> NearestState | None:
-    """Return the two links of an arm that are nearest to each other at joint values, shape (n,), rad and m.
+def nearest(arm: Arm, q: Array, scene: Scene = ()) -> NearestState | None:
+    """Return two links, or a link and an obstacle, that are nearest at joint values, shape (n,), rad and m.
 
-    Where coal is not installed they are two links whose capsules overlap, and which may touch. None where no two links
-    are checked, or nothing is known of them.
+    Where coal is not installed they are two links whose capsules overlap, and which may touch. None where no distance
+    is checked, or nothing is known of the links.
     """
     try:
-        found = nearest_links(arm.description, q)
+        links = nearest_links(arm.description, q)
+        beside = nearest_obstacle(arm.description, q, scene)
     except DhkitError:
         return _by_capsules(arm, q)
-    if found is None:
+    if beside is not None and (links is None or beside.distance < links.distance):
+        points = beside.points.tolist()
+        return NearestState(
+            links=[beside.link.link], obstacle=beside.obstacle.name, distance=beside.distance, points=points
+        )
+    if links is None:
         return None
-    links = [found.first.link, found.second.link]
-    return NearestState(links=links, distance=found.distance, points=found.points.tolist())
+    numbers = [links.first.link, links.second.link]
+    return NearestState(links=numbers, obstacle=None, distance=links.distance, points=links.points.tolist())
 
 
 def _by_capsules(arm: Arm, q: Array) -> NearestState | None:
@@ -85,10 +93,10 @@ def _by_capsules(arm: Arm, q: Array) -> NearestState | None:
         return None
     if bodies is None:
         return None
-    return NearestState(links=[body.link for body in bodies], distance=None, points=None)
+    return NearestState(links=[body.link for body in bodies], obstacle=None, distance=None, points=None)
 
 
-def contacts_along(arm: Arm, q: Array) -> list[NearestState | None]:
-    """Return :func:`nearest` where links touch or may touch, None elsewhere, for joint values (N, n), rad and m."""
-    found = (nearest(arm, state) for state in q)
+def contacts_along(arm: Arm, q: Array, scene: Scene = ()) -> list[NearestState | None]:
+    """Return :func:`nearest` where something touches or may touch, else None, at joint values (N, n), rad and m."""
+    found = (nearest(arm, state, scene) for state in q)
     return [one if one is not None and (one["distance"] is None or one["distance"] < 0) else None for one in found]

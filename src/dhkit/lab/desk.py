@@ -20,6 +20,7 @@ from dhkit.viewer.scene import first_configuration
 
 if TYPE_CHECKING:
     from dhkit.control import SimulationResult
+    from dhkit.planning import Scene
     from dhkit.trajectories import Trajectory
 
 EULER_TOLERANCE = 1e-6
@@ -94,6 +95,10 @@ class Desk:
         moved. A simulation replaces it, and takes the values as its setpoint."""
         self.target_q: Array | None = None
         """Joint values, shape (n,), at which the tool is at its target; a simulation may follow them."""
+        self.scene: Scene = ()
+        """Obstacles in the world."""
+        self.on_place: list[Callable[[], None]] = []
+        """Called after the obstacles have changed."""
         self.on_show: list[Callable[[Array], None]] = []
         """Called with the joint values, shape (n,), of every state that is shown."""
         self.on_replace: list[Callable[[], None]] = []
@@ -129,6 +134,14 @@ class Desk:
         for call in self.on_replace:
             call()
 
+    def place(self, scene: Scene) -> None:
+        """Show obstacles instead of the present ones."""
+        self.scene = scene
+        self.view.obstacles(scene)
+        self.publish_state()
+        for call in self.on_place:
+            call()
+
     def show(self, q: Array) -> None:
         """Show joint values, shape (n,), rad and m."""
         self.q = q.copy()
@@ -148,7 +161,7 @@ class Desk:
         arm, q = self.arm, self.q  # another thread may replace them meanwhile
         numbers = arm.description.numbers
         outside = np.flatnonzero((q < numbers.lower) | (q > numbers.upper)).tolist()
-        nearest = self._contacts.nearest(arm, q)
+        nearest = self._contacts.nearest(arm, q, self.scene)
         self.view.panel("joints", {"q": q.tolist(), "within": not outside, "outside": outside, "nearest": nearest})
         self.view.panel("tool", self.tool_state(arm, q))
 

@@ -19,6 +19,7 @@ from dhkit.lab.desk import Desk
 from dhkit.lab.dynamics_panel import DynamicsPanel
 from dhkit.lab.jobs import Jobs
 from dhkit.lab.motion_panel import MotionPanel
+from dhkit.lab.obstacle_panel import ObstaclePanel
 from dhkit.lab.own_panel import OwnPanel
 from dhkit.lab.python_panel import PythonPanel
 from dhkit.lab.requests import Fields, JsonObject, Panel, answers
@@ -90,13 +91,16 @@ class Lab:
             desk.q = assignment.start.copy()
         self._tool = ToolPanel(desk)
         table = TablePanel(desk)
-        self._motions = MotionPanel(desk, Jobs(lambda state: self.view.panel("job", state), self._lock))
+        obstacles = ObstaclePanel(desk)
+        jobs = Jobs(lambda state: self.view.panel("job", state), self._lock)
+        self._motions = MotionPanel(desk, jobs, obstacles)
         self._own = OwnPanel(desk, own, isolation, self._lock)
         self._control = ControlPanel(desk, self._motions, self._own)
         self._panels: tuple[Panel, ...] = (
             JointPanel(desk),
             self._tool,
             table,
+            obstacles,
             self._motions,
             self._control,
             DynamicsPanel(desk, self._lock),

@@ -19,6 +19,7 @@ from dhkit.errors import DescriptionError, DhkitError
 from dhkit.lab.contacts import NearestState, contacts_along
 from dhkit.lab.desk import Desk, file_content, has_bodies
 from dhkit.lab.jobs import Job, Jobs
+from dhkit.lab.obstacle_panel import ObstaclePanel
 from dhkit.lab.requests import MAX_JOINT_VALUE, Fields, JsonObject, Panel, answers
 from dhkit.lab.tool_panel import solve_pose
 from dhkit.planning import Progress
@@ -35,7 +36,9 @@ MAX_DURATION = 600.0
 PLOT_SAMPLES = 401
 """Samples of a motion that are plotted."""
 CONTACT_SAMPLES = 101
-"""Samples of a motion at which contacts of links are looked for."""
+"""Samples of a motion at which contacts of links and obstacles are looked for."""
+CONTACT_DELAY = 0.2
+"""Time before they are looked for, s: an obstacle that a person drags moves again soon."""
 MAX_WAYPOINTS = 100
 MAX_FILE_LENGTH = 700_000
 """Largest length of a file in base64, characters."""
@@ -57,14 +60,17 @@ class PlannedMotion(NamedTuple):
 
     motion: Trajectory
     call: str
+    notes: tuple[str, ...] = ()
+    """Sentences about its certificate."""
 
 
 class MotionPanel(Panel):
     """Requests ``motion.…`` and ``waypoints.…``."""
 
-    def __init__(self, desk: Desk, jobs: Jobs) -> None:
+    def __init__(self, desk: Desk, jobs: Jobs, obstacles: ObstaclePanel) -> None:
         super().__init__(desk)
         self.jobs: Jobs = jobs
+        self._obstacles = obstacles
         self.motion: Trajectory | None = None
         self.excess: str | None = None
         """The limit that the motion exceeds most, in words; None if it keeps all limits."""
@@ -75,7 +81,10 @@ class MotionPanel(Panel):
         self.on_change: list[Callable[[], None]] = []
         """Called when there is another motion, or none."""
         self._contacts = Jobs()
+        self._state: dict[str, object] = {}
+        """The motion as pages show it."""
         desk.on_replace.append(self._forget)
+        desk.on_place.append(self._check_among_obstacles)
 
     @answers("motion.plan", "kind", "goal", "duration")
     def plan(self, fields: Fields) -> JsonObject | None:
@@ -107,7 +116,7 @@ class MotionPanel(Panel):
         if np.abs(end - start).max() < SAME_STATE:
             raise ValueError("motion.plan: the arm is there already; expected another goal")
         if kind == "least-time":
-            return self._start_job("least time", lambda job: _plan_least_time(arm, start, end, [], job))
+            return self._start_job("least time", self._least_time([start, end]))
         if duration is None and not _is_limited(arm):
             duration = USUAL_DURATION
         make = arm.quintic if kind == "quintic" else arm.trapezoidal
@@ -233,13 +242,31 @@ class MotionPanel(Panel):
             if np.abs(q - next_q).max() < SAME_STATE:
                 raise ValueError(f"motion.plan: waypoints {k} and {k + 1} are the same")
         if kind == "least-time":
-            return self._start_job(
-                "least time", lambda job: _plan_least_time(arm, points[0], points[-1], points[1:-1], job)
-            )
+            return self._start_job("least time", self._least_time(points))
         times = None if duration is None else np.linspace(0.0, duration, len(points))
         call = f"arm.spline({literal(points)}, {'None' if times is None else literal(times)})"
         self._take("waypoints", PlannedMotion(arm.spline(np.array(points), times), call))
         return None
+
+    def _least_time(self, points: list[Array]) -> Callable[[Job], PlannedMotion]:
+        """Return the work that plans a motion in least time through joint values, shape (n,) each, around obstacles."""
+        arm = self.desk.arm
+        scene = self.desk.scene
+        start, *via, goal = points
+        through = f", via={literal(via)}" if via else ""
+        around = f", obstacles=[{', '.join(each.call for each in self._obstacles.placed)}]" if scene else ""
+        call = f"arm.plan({literal(start)}, {literal(goal)}{through}{around})"
+
+        def work(job: Job) -> PlannedMotion:
+            def report(progress: Progress) -> None:
+                job.progress(f"iteration {progress.iteration}: {progress.duration:.3f} s")
+
+            job.progress("making the program")
+            motion = arm.plan(start, goal, via=via, obstacles=scene, compare=False, progress=report)
+            notes = motion.report.notes if motion.report is not None else ()
+            return PlannedMotion(motion, call, tuple(notes))
+
+        return work
 
     def _start_job(self, title: str, work: Callable[[Job], PlannedMotion]) -> JsonObject:
         return {"job": self.jobs.start(title, work, lambda planned: self._take(title, planned, by_job=True))}
@@ -255,7 +282,7 @@ class MotionPanel(Panel):
         qd = motion.qd(times)
         tau = motion.tau(times) if has_bodies(arm) else None
         excess = exceeded_limit(arm.description, q, qd, tau)
-        state = {
+        state: dict[str, object] = {
             "kind": kind,
             "duration": motion.duration,
             "times": times.tolist(),
@@ -265,11 +292,13 @@ class MotionPanel(Panel):
             "limits": limits_state(arm.description),
             "contacts": None,
             "excess": excess,
+            "notes": list(planned.notes),
         }
         checked_q = motion.q(np.linspace(0.0, motion.duration, CONTACT_SAMPLES))
         if not np.isfinite(checked_q).all() or np.abs(checked_q).max() > MAX_JOINT_VALUE:
             raise ValueError(f"the motion's joint values go beyond {MAX_JOINT_VALUE:g}")
-        self.desk.view.panel("motion", state)
+        self.desk.view.panel("motion", dict(state))
+        self._state = state
         self.motion = motion
         self.excess = excess
         self.call = planned.call
@@ -279,13 +308,39 @@ class MotionPanel(Panel):
         if not self.desk.running:
             self.desk.view.play(motion)
         self._report_change()
+        self._find_contacts()
 
-        def publish_contacts(contacts: list[NearestState | None]) -> None:
-            if any(contacts) and self.motion is motion:
-                self.desk.view.panel("motion", state | {"contacts": contacts})
+    def _check_among_obstacles(self) -> None:
+        """Look for contacts of the motion with obstacles that have changed; its certificate was about the old ones."""
+        if self.motion is None:
+            return
+        if self._state["notes"]:
+            self._state["notes"] = []
+            self.desk.view.panel("motion", dict(self._state))
+        self._find_contacts()
 
-        # Contacts are published after the motion, since computing them takes a second the first time.
-        self._contacts.start("contacts", lambda job: contacts_along(arm, checked_q), publish_contacts)
+    def _find_contacts(self) -> None:
+        """Publish the contacts along the motion once they are known: computing them takes a second the first time."""
+        motion = self.motion
+        if motion is None:
+            return
+        arm = self.desk.arm
+        scene = self.desk.scene
+        q = motion.q(np.linspace(0.0, motion.duration, CONTACT_SAMPLES))
+
+        def work(job: Job) -> list[NearestState | None]:
+            job.wait(CONTACT_DELAY)
+            return contacts_along(arm, q, scene)
+
+        def publish(contacts: list[NearestState | None]) -> None:
+            if self.motion is not motion or self.desk.scene is not scene:
+                return
+            had_contacts = self._state["contacts"] is not None
+            self._state["contacts"] = contacts if any(contacts) else None
+            if had_contacts or any(contacts):
+                self.desk.view.panel("motion", dict(self._state))
+
+        self._contacts.start("contacts", work, publish)
 
     def _report_change(self) -> None:
         for call in self.on_change:
@@ -306,18 +361,6 @@ class MotionPanel(Panel):
 def literal(array: ArrayLike) -> str:
     """Return an array of any shape as Python writes it."""
     return f"np.array({np.asarray(array).tolist()!r})"
-
-
-def _plan_least_time(arm: Arm, start: Array, goal: Array, via: list[Array], job: Job) -> PlannedMotion:
-    """Return a motion in least time between joint values, through others, shape (n,) each, rad and m."""
-
-    def report(progress: Progress) -> None:
-        job.progress(f"iteration {progress.iteration}: {progress.duration:.3f} s")
-
-    job.progress("making the program")
-    through = f", via={literal(via)}" if via else ""
-    call = f"arm.plan({literal(start)}, {literal(goal)}{through})"
-    return PlannedMotion(arm.plan(start, goal, via=via, compare=False, progress=report), call)
 
 
 def _is_limited(arm: Arm) -> bool:

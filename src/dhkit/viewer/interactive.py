@@ -38,7 +38,11 @@ def listed(array: Array | None) -> list[Any] | None:
 
 def table_texts(description: Description) -> tuple[tuple[str, ...], ...]:
     """Return theta, d, a and alpha of each row as the robot file writes them."""
-    return tuple(tuple(str(getattr(joint, name)) for name in COLUMNS) for joint in description.joints)
+    rows = []
+    for joint in description.joints:
+        row = tuple(str(getattr(joint, name)) for name in COLUMNS)
+        rows.append(row)
+    return tuple(rows)
 
 
 def limits_state(description: Description) -> dict[str, Any]:

@@ -37,6 +37,7 @@ MODULES = (
 """The page's ES modules; ``main.js`` imports the others."""
 
 _LAB_FILES = (
+    "around.js",
     "lab.js",
     "lab.css",
     "card.js",

@@ -144,10 +144,14 @@ def frame_labels(description: Description) -> tuple[Label, ...]:
 
 
 def _labels(description: Description, places: list[list[list[int]]]) -> tuple[Label, ...]:
-    def text(place: list[list[int]]) -> str:
-        return ", ".join(" = ".join(_frame_name(description, i) for i in same) for same in place)
+    def names_of_equal(frames: list[int]) -> str:
+        return " = ".join(_frame_name(description, i) for i in frames)
 
-    return tuple(Label(place[0][0], text(place)) for place in places)
+    labels = []
+    for place in places:
+        text = ", ".join(names_of_equal(frames) for frames in place)
+        labels.append(Label(place[0][0], text))
+    return tuple(labels)
 
 
 def _shared_origins(description: Description) -> list[list[list[int]]]:

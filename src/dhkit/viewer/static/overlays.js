@@ -20,6 +20,7 @@ export class Overlays {
     this.dot = sprite(THREE);
     this.ballColor = new THREE.Color();
     this.solidColor = new THREE.Color();
+    this.marked = null; // index of the obstacle that is chosen
   }
 
   get empty() {
@@ -29,9 +30,10 @@ export class Overlays {
     );
   }
 
-  // Take all that is shown into a box.
-  growBox(box) {
-    for (const layer of Object.values(this.layers)) if (layer.group.visible) box.union(layer.box);
+  // Take all that is shown into a box, or, beside panels, where ghosts come and go all the time, the obstacles alone.
+  growBox(box, onlyObstacles) {
+    const layers = onlyObstacles ? [this.layers.obstacles] : Object.values(this.layers);
+    for (const layer of layers) if (layer.group.visible) box.union(layer.box);
   }
 
   get shown() {
@@ -47,7 +49,7 @@ export class Overlays {
     this.ballColor.set(balls);
     this.solidColor.set(solids);
     this.layers.ellipsoids.group.traverse((object) => object.material?.color.set(balls));
-    this.layers.obstacles.group.traverse((object) => object.material?.color.set(solids));
+    this.colorObstacles();
   }
 
   // size: diameter of a point; three.js takes it for a field of view of 90 degrees.
@@ -158,6 +160,27 @@ export class Overlays {
       objects.push(object);
     }
     this.layers.obstacles.fill(objects, box);
+    this.colorObstacles();
+  }
+
+  // index: of the obstacle that is drawn in the accent's color, or null.
+  markObstacle(index) {
+    this.marked = index;
+    this.colorObstacles();
+  }
+
+  colorObstacles() {
+    this.layers.obstacles.group.children.forEach((object, index) => {
+      const color = index === this.marked ? this.ballColor : this.solidColor;
+      object.traverse((part) => part.material?.color.set(color));
+    });
+  }
+
+  // The index of the obstacle that a ray meets first, or null.
+  obstacleAt(caster) {
+    const { group } = this.layers.obstacles;
+    const [hit] = caster.intersectObjects(group.children, false);
+    return hit ? group.children.indexOf(hit.object) : null;
   }
 }
 

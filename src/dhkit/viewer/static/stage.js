@@ -282,7 +282,7 @@ export class Stage {
   include(placement) {
     this.placement = placement;
     this.seen.union(this.boxOf(placement));
-    if (!this.steady) this.overlays.growBox(this.seen);
+    this.overlays.growBox(this.seen, this.steady);
     if (this.held || this.touched || this.framed.containsBox(this.seen)) return;
     this.frame(this.seen);
   }
@@ -570,6 +570,28 @@ export class Stage {
 
   placeCompanion({ positions, quaternions }) {
     this.overlays.placeCompanion(positions, quaternions);
+    this.dirty();
+  }
+
+  // The ray from the camera through the pointer.
+  ray(event) {
+    const { pane, viewer } = this;
+    const box = pane.getBoundingClientRect();
+    const point = new THREE.Vector2(
+      ((event.clientX - box.left) / box.width) * 2 - 1,
+      1 - ((event.clientY - box.top) / box.height) * 2,
+    );
+    const caster = new THREE.Raycaster();
+    caster.setFromCamera(point, viewer.camera);
+    return caster;
+  }
+
+  obstacleAt(event) {
+    return this.overlays.obstacleAt(this.ray(event));
+  }
+
+  markObstacle(index) {
+    this.overlays.markObstacle(index);
     this.dirty();
   }
 

@@ -50,23 +50,25 @@ export function beyond(value, lower, upper) {
   return (lower !== null && value < lower) || (upper !== null && value > upper);
 }
 
-// nearest: the two links that are nearest to each other, with their distance (null: by their capsules alone), or null.
+// nearest: the two links, or the link and the obstacle, that are nearest to each other, with their distance (null: by
+// their capsules alone), or null.
 export function touchingText(nearest) {
   if (!touches(nearest)) return "";
   const [a, b] = nearest.links.map((link) => (link ? `link ${link}` : "the base"));
+  if (nearest.obstacle) return `${a} touches ${nearest.obstacle}`;
   return nearest.distance === null
     ? `${a} and ${b} may touch each other`
     : `${a} and ${b} touch each other`;
 }
 
-// How deep two links penetrate each other, in a unit of UNITS; empty where they do not, or nothing is known.
+// How deep they penetrate each other, in a unit of UNITS; empty where they do not, or nothing is known.
 export function depthText(nearest, unit) {
   if (!touches(nearest) || nearest.distance === null) return "";
   const { scale, digits, sign } = UNITS[unit];
   return `${fixed(-nearest.distance * scale, digits)}${sign} deep`;
 }
 
-// Whether two links touch each other, or may.
+// Whether they touch each other, or may.
 export function touches(nearest) {
   return Boolean(nearest) && (nearest.distance === null || nearest.distance < 0);
 }

@@ -98,22 +98,10 @@ export class Gizmo {
     this.stage.dirty();
   }
 
-  ray(event) {
-    const { pane, viewer } = this.stage,
-      box = pane.getBoundingClientRect();
-    const point = new THREE.Vector2(
-      ((event.clientX - box.left) / box.width) * 2 - 1,
-      1 - ((event.clientY - box.top) / box.height) * 2,
-    );
-    const caster = new THREE.Raycaster();
-    caster.setFromCamera(point, viewer.camera);
-    return caster;
-  }
-
   hit(event) {
     if (!this.group.visible) return null;
     this.group.updateMatrixWorld(true);
-    const [first] = this.ray(event).intersectObjects(this.handles, true);
+    const [first] = this.stage.ray(event).intersectObjects(this.handles, true);
     if (!first) return null;
     let object = first.object;
     while (!this.handles.includes(object)) object = object.parent;
@@ -173,7 +161,7 @@ export class Gizmo {
 
   // How far along an axis the pointer is: where its ray is nearest to the axis.
   along(event, origin, direction) {
-    const { ray } = this.ray(event),
+    const { ray } = this.stage.ray(event),
       between = origin.clone().sub(ray.origin);
     const b = direction.dot(ray.direction),
       d = direction.dot(between),
@@ -184,7 +172,7 @@ export class Gizmo {
 
   // How far round an axis the pointer is, on the plane at right angles to it.
   angle(event, origin, direction) {
-    const { ray } = this.ray(event),
+    const { ray } = this.stage.ray(event),
       plane = new THREE.Plane().setFromNormalAndCoplanarPoint(direction, origin);
     const point = ray.intersectPlane(plane, new THREE.Vector3());
     if (!point) return null;

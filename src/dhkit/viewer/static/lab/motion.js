@@ -1,5 +1,6 @@
 // Motions: planned from the state on show, taught by waypoints, or read from a file; with their curves.
 
+import { ObstacleList } from "./around.js";
 import { MotionCurves, exceeding } from "./curves.js";
 import { UNITS, base64Of, bytes, fixed, h, save, touchingText, typed } from "./dom.js";
 
@@ -87,6 +88,7 @@ export class MotionPanel {
     });
     this.degrees = h("input", { type: "checkbox" });
     this.curves = new MotionCurves(lab);
+    this.obstacles = new ObstacleList(lab);
     const download = (format) =>
       h("button", { type: "button", onclick: () => this.download(format) }, format.toUpperCase());
     this.replay = h("button", { type: "button", onclick: () => this.play() }, "Play");
@@ -117,6 +119,7 @@ export class MotionPanel {
         ),
         this.points,
       ),
+      this.obstacles.root,
       h(
         "fieldset",
         {},
@@ -130,6 +133,14 @@ export class MotionPanel {
   take_arm(arm) {
     this.arm = arm;
     this.goals();
+  }
+
+  take_obstacles(obstacles) {
+    this.obstacles.take(obstacles);
+  }
+
+  unitsChanged() {
+    this.obstacles.unitsChanged();
   }
 
   take_waypoints(points) {
@@ -299,6 +310,7 @@ export class MotionPanel {
       `${motion.kind}, ${fixed(motion.duration, 3)} s`,
       motion.excess,
       touching,
+      ...motion.notes,
       still,
     ]
       .filter(Boolean)
