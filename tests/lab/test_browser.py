@@ -21,6 +21,7 @@ from dhkit.description import pose
 from dhkit.lab.desk import start_configuration
 from lab.conftest import COMPLETE
 from lab.controls import button, labelled, panel, set_joints
+from viewer.chromium import HANGS
 from waiting import wait_for
 
 pytestmark = pytest.mark.slow
@@ -394,6 +395,34 @@ def test_the_four_transforms_of_a_row_are_animated(visit):
     end = lab.desk.arm.frames(lab.desk.q)[2]
     assert np.abs(np.array(page.evaluate("dhkit.stage.moving.position.toArray()")) - end[:3, 3]).max() < 1e-6
     page.until("!dhkit.stage.moving.visible")
+
+
+def test_the_transforms_of_all_rows_are_animated_with_their_entries_lit(visit):
+    lab, page = visit("planar2r")
+    panel(page, "table")
+    page.click(button("Animate"))
+    lit = "(cell => cell && cell.getAttribute('aria-label'))(document.querySelector('#panel-table td.now input'))"
+    seen = []
+    deadline = time.monotonic() + HANGS
+    while not (seen and page.evaluate(lit) is None) and time.monotonic() < deadline:
+        label = page.evaluate(lit)
+        if label is not None and label not in seen[-1:]:
+            seen.append(label)
+    order = [f"{name} of row {row}" for row in (1, 2) for name in ("theta", "d", "a", "alpha")]
+    assert seen[-1] == order[-1]
+    assert [label for label in order if label in seen] == seen  # a busy page may leave some out
+    end = lab.desk.arm.frames(lab.desk.q)[2]
+    assert np.abs(np.array(page.evaluate("dhkit.stage.moving.position.toArray()")) - end[:3, 3]).max() < 1e-6
+
+
+def test_a_person_makes_an_arm_of_two_joints(visit):
+    lab, page = visit("puma560")
+    panel(page, "table")
+    page.click(button("Lock the others"))
+    page.until("dhkit.lab.state.arm.n === 2 && dhkit.lab.state.table.rows.length === 2")
+    assert lab.desk.arm.n == 2
+    page.click(button("Free all joints"))
+    page.until("dhkit.lab.state.arm.n === 6 && dhkit.lab.state.table.rows.length === 6")
 
 
 # Motion

@@ -15,7 +15,7 @@ from dhkit.description import from_toml, pose_parts
 from dhkit.lab.control_panel import ControlPanel
 from dhkit.lab.desk import is_singular, start_configuration
 from dhkit.lab.dynamics_panel import DynamicsPanel
-from dhkit.lab.lab import JointPanel
+from dhkit.lab.lab import JointPanel, Lab
 from dhkit.lab.motion_panel import MotionPanel
 from dhkit.lab.obstacle_panel import ObstaclePanel
 from dhkit.lab.own_panel import OwnPanel
@@ -28,6 +28,7 @@ from dhkit.lab.tool_panel import ToolPanel
 from dhkit.lab.transforms_panel import TransformsPanel
 from dhkit.lab.workspace_panel import WorkspacePanel
 from dhkit.planning.obstacles import LinkBody, shape_distances
+from dhkit.symbolic.equations.sympy_objects import sympy_object
 from dhkit.viewer.protocol import Samples
 from dhkit.viewer.session import Slot
 from viewer.messages import decode_animation, decode_ghosts, decode_pose, decode_samples, decode_state
@@ -555,3 +556,47 @@ def test_every_arm_begins_at_a_regular_configuration(name):
     q = start_configuration(arm)
     assert not is_singular(arm, q)
     assert np.all(q >= arm.description.numbers.lower) and np.all(q <= arm.description.numbers.upper)
+
+
+def test_an_arm_of_two_joints_has_its_own_table_dynamics_and_answers_and_all_joints_come_back(open_lab):
+    lab = open_lab("puma560")
+    whole = lab.desk.arm
+    lab.answer("table.edit", {"row": 3, "column": "d", "text": "0.5"})
+    edited = lab.desk.arm
+    lab.answer("joints.set", {"q": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]})
+    lab.answer("table.lock", {"free": [1, 2]})
+    assert lab.desk.arm.description == edited.lock({0: 0, 3: 0, 4: 0, 5: 0}).description
+    assert lab.desk.q.tolist() == [0.2, 0.3]
+    shown = states(lab)["table"]
+    assert (shown["joints"], shown["locked"], len(shown["rows"])) == (6, [0, 3, 4, 5], 2)
+    M11 = sympy_object(lab.desk.arm.lagrangian.M[0, 0])
+    lab.answer("submit.grade", {"kind": "lines", "text": f"M11 = {M11}"})
+    wait_for(lambda: not states(lab)["verdict"]["running"])
+    assert [entry["passes"] for entry in states(lab)["verdict"]["entries"]] == [True]
+    with pytest.raises(ValueError, match="locked already"):
+        lab.answer("table.lock", {"free": [0]})
+
+    lab.answer("table.free", {})
+    assert lab.desk.arm is edited
+    assert lab.desk.q.tolist() == [0.0, 0.2, 0.3, 0.0, 0.0, 0.0]
+    lab.answer("table.undo", {})
+    assert lab.desk.arm.description == whole.description
+    with pytest.raises(ValueError, match="no joint is locked"):
+        lab.answer("table.free", {})
+    for free, complaint in (([7], "1 to 6"), ([], "0 joints move"), ("2", "numbers of joints"), ([True], "1 to 6")):
+        with pytest.raises(ValueError, match=complaint):
+            lab.answer("table.lock", {"free": free})
+
+
+@pytest.mark.parametrize("locked", [False, True])
+def test_copied_python_loads_the_file_of_an_arm_that_was_not_edited(tmp_path, locked):
+    arm = Arm.load("puma560")
+    file, *_ = arm.save(tmp_path / "own.toml")
+    with Lab(Arm.load(file), source=str(file)) as lab:
+        if locked:
+            lab.answer("table.lock", {"free": [1, 2]})
+        scope = {}
+        text = lab.answer("python", {})["text"]
+        exec(text, scope)
+        assert "write_text" not in text
+        assert scope["arm"].description == lab.desk.arm.description

@@ -71,6 +71,7 @@ def lab(
         isolation=found,
         solid=solid,
         assignment=assignment,
+        source=robot if assignment is None else None,
     ) as served:
         return until_interrupted(served.url, what, open_browser=not no_browser)
 

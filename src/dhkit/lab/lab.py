@@ -52,6 +52,8 @@ class Lab:
         An ``.stl`` file with the solid of the panel of transforms; by default a box.
     assignment
         Texts and goals that the page shows first; its robot is the arm.
+    source
+        Name or path that the arm was loaded from, for "Copy as Python"; by default its name, if it is in the library.
     port, token
         Address of the page, for pages that are to find it again; by default any free port and a new token.
 
@@ -78,6 +80,7 @@ class Lab:
         isolation: Isolation | None = None,
         solid: str | Path | None = None,
         assignment: Assignment | None = None,
+        source: str | None = None,
     ) -> None:
         arm = arm if isinstance(arm, Arm) else Arm(description_of(arm))
         if assignment is not None:
@@ -108,7 +111,7 @@ class Lab:
             SubmitPanel(desk, self._lock),
             TransformsPanel(desk, solid_read),
             TaskPanel(desk, self._motions, self._own, assignment),
-            PythonPanel(desk, self._tool, self._motions, self._control),
+            PythonPanel(desk, table, self._tool, self._motions, self._control, source),
             self._own,
         )
         self._requests: dict[str, Callable[[JsonObject], JsonObject]] = {}

@@ -13,6 +13,7 @@ from dhkit.lab.desk import Desk
 from dhkit.lab.motion_panel import MotionPanel, literal
 from dhkit.lab.requests import Fields, JsonObject, Panel, answers
 from dhkit.lab.run_settings import OWN, FrictionKind, ReferenceKind
+from dhkit.lab.table_panel import TablePanel
 from dhkit.lab.tool_panel import ToolPanel
 
 CONSTRUCTORS = {
@@ -36,8 +37,20 @@ FRICTION_ARGUMENTS = {
 class PythonPanel(Panel):
     """The request for the lines of Python equivalent to the panels; they run as they are."""
 
-    def __init__(self, desk: Desk, tool: ToolPanel, motions: MotionPanel, control: ControlPanel) -> None:
+    def __init__(
+        self,
+        desk: Desk,
+        table: TablePanel,
+        tool: ToolPanel,
+        motions: MotionPanel,
+        control: ControlPanel,
+        source: str | None = None,
+    ) -> None:
         super().__init__(desk)
+        self.table = table
+        self._first = desk.arm
+        self._source = source
+        """Name or path that the first arm was loaded from."""
         self.tool = tool
         self.motions = motions
         self.control = control
@@ -56,15 +69,37 @@ class PythonPanel(Panel):
         return {"text": "\n".join(lines) + "\n"}
 
     def _arm_lines(self) -> list[str]:
-        """Return the lines that load the arm by its name in the library, or from a file that they write."""
+        """Return the lines that load the arm: by its name or file where nothing but locks or bodies were changed.
+
+        An edited arm is written into a file of its own; its meshes fitted the old lengths alone.
+        """
+        arm = self._first
+        calls = ""
+        whole = self.table.whole
+        if whole is not None:
+            arm = arm.lock(whole.values)
+            calls += f".lock({whole.values})"
+        if self.desk.assumed_bodies:
+            arm = arm.with_uniform_links()
+            calls += ".with_uniform_links()"
+        loaded = self._load_call()
+        if loaded is not None and arm.description == self.desk.arm.description:
+            return [f"arm = {loaded}{calls}"]
         arm = self.desk.arm
-        if arm.name in robots() and library_robot(arm.name) == arm.description:
-            return [f"arm = dhkit.Arm.load({arm.name!r})"]
         text = to_toml(arm.description)
         quoted = f'r"""{text}"""' if '"""' not in text else repr(text)
         file = f"{arm.name}-edited.toml"
         load = f"arm = dhkit.Arm.load({file!r})"
         return ["from pathlib import Path", "", f"Path({file!r}).write_text({quoted})", load]
+
+    def _load_call(self) -> str | None:
+        """Return the call that loads the first arm; None if it comes from no file and is not in the library."""
+        if self._source is not None:
+            return f"dhkit.Arm.load({self._source!r})"
+        name = self._first.name
+        if name in robots() and library_robot(name) == self._first.description:
+            return f"dhkit.Arm.load({name!r})"
+        return None
 
     def _target_lines(self, T: ArrayLike) -> list[str]:
         """Return the lines that solve the inverse kinematics at the target, shape (4, 4), m."""

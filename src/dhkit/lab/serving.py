@@ -32,6 +32,7 @@ def serve(
     isolation: Isolation | None = None,
     solid: str | Path | None = None,
     assignment: Assignment | str | Path | None = None,
+    source: str | None = None,
 ) -> Lab:
     """Open a lab in the browser.
 
@@ -52,6 +53,8 @@ def serve(
         An ``.stl`` file for the panel of transforms; by default a box.
     assignment
         Texts and goals about this arm, or the file that has them.
+    source
+        Name or path that the arm was loaded from, for "Copy as Python": see :class:`Lab`.
 
     Returns
     -------
@@ -79,7 +82,7 @@ def serve(
         raise ValueError(f"port is {port}; expected 1024 to 65535")
     if isinstance(assignment, (str, Path)):
         assignment = Assignment.read(assignment)
-    lab = Lab(arm, port or 0, None if port is None else kept_token(port), own, isolation, solid, assignment)
+    lab = Lab(arm, port or 0, None if port is None else kept_token(port), own, isolation, solid, assignment, source)
     try:
         if open_browser:
             open_in_browser(lab.url)

@@ -37,6 +37,24 @@ class Table:
         return cls(table_texts(description), description)
 
 
+@dataclass(frozen=True, eq=False)
+class WholeArm:
+    """An arm before some of its joints were locked, with the changes of its table."""
+
+    arm: Arm
+    first: Table
+    table: Table
+    undo: list[Table]
+    redo: list[Table]
+    locked: tuple[int, ...]
+    """Places of the locked joints, from 0; all are locked at zero."""
+
+    @property
+    def values(self) -> dict[int | str, float]:
+        """The values of the locked joints, as :meth:`dhkit.Arm.lock` takes them."""
+        return dict.fromkeys(self.locked, 0)
+
+
 class TablePanel(Panel):
     """Requests ``table.…``."""
 
@@ -45,6 +63,8 @@ class TablePanel(Panel):
         self._first = self._table = Table.of(desk.arm.description)
         self._undo: list[Table] = []
         self._redo: list[Table] = []
+        self.whole: WholeArm | None = None
+        """The arm that this one was made from by locking joints, if it was."""
         self._is_replacing = False
         """Whether this panel itself puts another arm on the desk."""
         desk.on_replace.append(self._take_replaced_arm)
@@ -102,6 +122,39 @@ class TablePanel(Panel):
             steps.append({"title": title, "T": (T @ A).ravel().tolist()})
         return {"steps": steps, "A": A.ravel().tolist()}
 
+    @answers("table.lock", "free")
+    def lock_others(self, fields: Fields) -> None:
+        """Make an arm of some joints, from 0, with all others locked at zero: its own table, dynamics and answers."""
+        arm = self.desk.arm
+        free = fields.data.get("free")
+        if not isinstance(free, list) or not all(type(i) is int and 0 <= i < arm.n for i in free):
+            raise ValueError(f"table.lock: free is {str(free)[:40]}; expected numbers of joints, 1 to {arm.n}")
+        if self.whole is not None:
+            raise ValueError("table.lock: joints are locked already; expected all joints to be freed first")
+        if not 0 < len(set(free)) < arm.n:
+            raise ValueError(f"table.lock: {len(set(free))} joints move; expected 1 to {arm.n - 1}")
+        locked = tuple(i for i in range(arm.n) if i not in free)
+        whole = WholeArm(arm, self._first, self._table, self._undo, self._redo, locked)
+        self.desk.replace(arm.lock(whole.values), self.desk.q[sorted(set(free))])
+        self.whole = whole
+        self.publish()
+
+    @answers("table.free")
+    def free_all(self, _: Fields) -> None:
+        """Show the whole arm again, with the changes of its table."""
+        whole = self.whole
+        if whole is None:
+            raise ValueError("table.free: no joint is locked")
+        q = np.zeros(whole.arm.n)
+        q[[i for i in range(whole.arm.n) if i not in whole.locked]] = self.desk.q
+        self.desk.replace(whole.arm, q)
+        self.whole = None
+        self._first = whole.first
+        self._table = whole.table
+        self._undo = whole.undo
+        self._redo = whole.redo
+        self.publish()
+
     @answers("table.download", "format")
     def download(self, fields: Fields) -> JsonObject:
         """Return the arm as a robot file or a URDF."""
@@ -132,6 +185,8 @@ class TablePanel(Panel):
                 "redo": bool(self._redo),
                 "changed": table.texts != first.texts or not same_convention,
                 "note": self._note(),
+                "joints": self.desk.arm.n if self.whole is None else self.whole.arm.n,
+                "locked": None if self.whole is None else list(self.whole.locked),
             },
         )
 
@@ -205,6 +260,7 @@ class TablePanel(Panel):
             self._first = self._table = table
             self._undo = []
             self._redo = []
+            self.whole = None
         self.publish()
 
 

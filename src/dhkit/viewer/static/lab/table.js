@@ -9,6 +9,12 @@ const HEADS = {
 };
 const WIDEST = 10; // characters of a cell
 const STEP_TIME = 700; // ms of one elementary transform
+const LAST_TIME = 1500; // ms for which the last frame stays
+// The entries of a row in the order of its transforms.
+const ORDERS = {
+  standard: ["theta", "d", "a", "alpha"],
+  modified: ["alpha", "a", "theta", "d"],
+};
 
 export class TablePanel {
   constructor(lab, root) {
@@ -28,6 +34,11 @@ export class TablePanel {
       { type: "button", "aria-pressed": "false", onclick: () => this.showFrames() },
       "Frames",
     );
+    this.build = h(
+      "button",
+      { type: "button", onclick: () => this.animate(this.table.rows.map((_, i) => i)) },
+      "Animate",
+    );
     this.body = h("tbody");
     this.head = h("tr");
     this.undo = h("button", { type: "button", onclick: request("table.undo") }, "Undo");
@@ -35,6 +46,22 @@ export class TablePanel {
     this.reset = h("button", { type: "button", onclick: request("table.reset") }, "Reset");
     const file = (format) =>
       h("button", { type: "button", onclick: () => this.download(format) }, format.toUpperCase());
+    this.free = h("input", {
+      type: "text",
+      class: "number",
+      value: "2 3",
+      "aria-label": "Joints that move",
+      onkeydown: (event) => event.key === "Enter" && this.lock(),
+    });
+    this.locks = h("button", { type: "button", onclick: () => this.lock() }, "Lock the others");
+    this.frees = h("button", { type: "button", onclick: request("table.free") }, "Free all joints");
+    this.locking = h(
+      "div",
+      { class: "line", hidden: true, title: "The others are locked at zero: an arm of its own" },
+      h("label", {}, "Only joints ", this.free),
+      this.locks,
+      this.frees,
+    );
     this.note = h("p", { class: "note", role: "status" });
     this.step = h("div", { class: "step" });
     root.append(
@@ -47,16 +74,18 @@ export class TablePanel {
       h(
         "div",
         { class: "buttons" },
+        this.build,
         this.undo,
         this.redo,
         this.reset,
         lab.can("table.download") ? [file("toml"), file("urdf")] : null,
       ),
+      this.locking,
       this.note,
       h(
         "p",
         { class: "hint" },
-        "Metres and radians; expressions such as pi/2, 90*deg or 17*inch are fine. A row's number shows its four steps.",
+        "Metres and radians; pi/2, 90*deg or 17*inch are fine. A row's number shows its four transforms, Animate those of all rows.",
       ),
       this.step,
     );
@@ -66,6 +95,19 @@ export class TablePanel {
     const on = this.frames.getAttribute("aria-pressed") !== "true";
     this.frames.setAttribute("aria-pressed", String(on));
     this.lab.page.showFrames(on);
+  }
+
+  lock() {
+    const numbers = this.free.value
+      .split(/[\s,;]+/)
+      .filter(Boolean)
+      .map(Number);
+    const n = this.table.joints;
+    if (!numbers.length || numbers.some((k) => !Number.isInteger(k) || k < 1 || k > n))
+      return this.lab.complain(
+        `joints ${this.free.value.slice(0, 40)}: expected numbers from 1 to ${n}`,
+      );
+    return this.lab.ask("table.lock", { free: numbers.map((k) => k - 1) });
   }
 
   async download(format) {
@@ -99,11 +141,14 @@ export class TablePanel {
     for (const { input, i, column } of this.cells) {
       const error = errors.get(`${i} ${column}`);
       if (document.activeElement !== input) input.value = table.rows[i][column];
-      input.style.width = `calc(${this.widths[column]}ch + 12px)`;
+      input.style.width = `calc(${this.widths[column]}ch + 7px)`;
       input.setAttribute("aria-invalid", String(Boolean(error)));
       input.title =
         error ?? (errors.size ? "" : `${table.rows[i][column]} = ${this.meaning(i, column)}`);
     }
+    this.locking.hidden = !this.lab.can("table.lock") || table.joints < 2;
+    this.locks.hidden = this.free.disabled = table.locked !== null;
+    this.frees.hidden = table.locked === null;
     this.undo.disabled = !table.undo;
     this.redo.disabled = !table.redo;
     this.reset.disabled = !table.changed;
@@ -146,7 +191,7 @@ export class TablePanel {
             class: "quiet",
             title: `${row.joint}: its four transforms`,
             "aria-label": `row ${i + 1}, ${row.joint}: show its four transforms`,
-            onclick: () => this.animate(i),
+            onclick: () => this.animate([i]),
           },
           String(i + 1),
         ),
@@ -181,6 +226,7 @@ export class TablePanel {
     this.running?.();
     this.lab.stage.showMoving(null);
     this.step.replaceChildren();
+    for (const { input } of this.cells ?? []) input.closest("td").classList.remove("now");
     this.steps = null;
   }
 
@@ -197,37 +243,65 @@ export class TablePanel {
     if (q && this.steps && JSON.stringify([...q]) !== this.steps) this.stopSteps();
   }
 
-  // One elementary transform after the other, as a frame that moves.
-  async animate(row) {
+  // The elementary transforms of rows, one after the other, as a frame that moves; the entry of each is lit.
+  async animate(rows) {
     await this.lab.settled();
-    const answer = await this.lab.ask("table.steps", { row });
-    if (!answer) return;
+    const answers = [];
+    for (const row of rows) {
+      const answer = await this.lab.ask("table.steps", { row });
+      if (!answer) return;
+      answers.push({ row, ...answer });
+    }
     this.running?.();
     this.steps = JSON.stringify(this.lab.state.joints.q);
     let stopped = false;
     this.running = () => (stopped = true);
-    const { steps, A } = answer;
-    this.step.replaceChildren(
-      h("h3", {}, `The transforms of row ${row + 1}`),
-      h(
-        "ol",
-        {},
-        steps.slice(1).map((step) => h("li", {}, step.title)),
-      ),
-      matrix(A, indexed("A", row + 1)),
+    const order = ORDERS[this.table.convention];
+    const moves = answers.flatMap(({ row, steps, A }) =>
+      order.map((column, k) => ({
+        row,
+        steps,
+        A,
+        k,
+        column,
+        from: steps[k].T,
+        to: steps[k + 1].T,
+      })),
     );
-    const items = [...this.step.querySelectorAll("li")],
-      start = performance.now();
+    const start = performance.now();
+    let before = null;
     const tick = (now) => {
       if (stopped) return;
       // The first picture's time may lie before the start.
-      const at = Math.min(Math.max(0, now - start) / STEP_TIME, steps.length - 1),
-        k = Math.min(steps.length - 2, Math.floor(at));
-      items.forEach((item, j) => item.classList.toggle("now", j === k && at < steps.length - 1));
-      this.lab.stage.showMoving(steps[k].T, steps[k + 1].T, at - k);
-      if (at < steps.length - 1) requestAnimationFrame(tick);
-      else setTimeout(() => !stopped && this.lab.stage.showMoving(null), 1500);
+      const at = Math.min(Math.max(0, now - start) / STEP_TIME, moves.length);
+      const over = at === moves.length;
+      const move = moves[Math.min(moves.length - 1, Math.floor(at))];
+      if (move !== before || over) this.light(move, before, over);
+      before = move;
+      this.lab.stage.showMoving(move.from, move.to, over ? 1 : at % 1);
+      if (!over) requestAnimationFrame(tick);
+      else setTimeout(() => !stopped && this.lab.stage.showMoving(null), LAST_TIME);
     };
     requestAnimationFrame(tick);
+  }
+
+  // Light the entry of a move and its line in the list of its row's transforms; none when all is over.
+  light(move, before, over) {
+    if (move.row !== before?.row)
+      this.step.replaceChildren(
+        h("h3", {}, `The transforms of row ${move.row + 1}`),
+        h(
+          "ol",
+          {},
+          move.steps.slice(1).map((step) => h("li", {}, step.title)),
+        ),
+        matrix(move.A, indexed("A", move.row + 1)),
+      );
+    const items = this.step.querySelectorAll("li");
+    items.forEach((item, k) => item.classList.toggle("now", !over && k === move.k));
+    for (const { input, i, column } of this.cells) {
+      const isNow = !over && i === move.row && column === move.column;
+      input.closest("td").classList.toggle("now", isNow);
+    }
   }
 }

@@ -212,6 +212,8 @@ export class OfflineDesk {
       undo: this.before.length > 0,
       redo: this.after.length > 0,
       changed,
+      joints: rows.length,
+      locked: null,
       note: this.edited
         ? "drawn from the table; limits are those of the arm as it was written"
         : null,
