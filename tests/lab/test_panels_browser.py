@@ -2,10 +2,12 @@
 
 # ruff: noqa: E501 - JavaScript in one line
 
+import base64
 import json
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from dhkit import Arm
 from dhkit.description import pose
@@ -215,3 +217,29 @@ def test_what_is_said_of_a_target_is_not_said_of_another_state(open_page):
     note = "document.querySelector('#panel-tool .note').textContent"
     page.until(f"{note}.startsWith('the tool is not at the target')")
     assert "singular" not in page.evaluate(note)
+
+
+def test_columns_of_a_mat_file_are_chosen(open_page, tmp_path):
+    lab, page = open_page("planar2r")
+    t = np.linspace(0.0, 1.0, 11)
+    q = np.column_stack([0.2 * t, 0.1 * t])
+    savemat(tmp_path / "log.mat", {"log": np.column_stack([t, q, q])})
+    content = base64.b64encode((tmp_path / "log.mat").read_bytes()).decode()
+    panel(page, "motion")
+    field = labelled("File with a motion")
+    page.evaluate(
+        f"""(() => {{
+          const data = Uint8Array.from(atob("{content}"), letter => letter.charCodeAt(0));
+          const files = new DataTransfer();
+          files.items.add(new File([data], "log.mat"));
+          {field}.files = files.files;
+          {field}.dispatchEvent(new Event("change"));
+        }})()"""
+    )
+    page.until(f"{labelled('Joint values')}.offsetWidth")
+    values = page.evaluate(f"[...{labelled('Joint values')}.options].map(option => option.value)")
+    assert values == ["log(:,2:3)", "log(:,4:5)"]
+    page.click(button("Read these"))
+    page.until("dhkit.lab.state.motion")
+    assert np.allclose(lab._motions.motion.q(0.5), [0.1, 0.05])
+    assert not page.evaluate(f"{labelled('Joint values')}.offsetWidth")

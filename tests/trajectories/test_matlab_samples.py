@@ -10,6 +10,7 @@ from scipy.io import savemat
 from dhkit.description import from_dh, library_robot
 from dhkit.errors import DescriptionError
 from dhkit.trajectories import Trajectory
+from dhkit.trajectories.matlab_samples import matlab_choices
 from file_checks import check_damaged, check_refused
 
 ARM, COBRA = library_robot("planar2r"), library_robot("cobra600")
@@ -105,7 +106,7 @@ BAD = {
     "fewer samples than times": ({"t": T, "q": Q[:3]}, r"q1 has 3 values; expected 4, one for each time"),
     "a vector of another length": ({"t": T, "q1": T, "q2": T[:2]}, r"q2 has 2 values; expected 4"),
     "a matrix of times": ({"t": Q, "q": Q}, r"t has shape \(4, 2\); expected a vector"),
-    "other times in a matrix": ({"t": T + 1, "q": timed(Q)}, r"q has times in its first column that are not those"),
+    "other times in a matrix": ({"t": T + 1, "q": timed(Q)}, r"q has times that are not those"),
     "one sample": ({"t": T[:1], "q": Q[:1]}, r"times has shape \(1,\); expected \(N,\) with N >= 2"),
     "times that do not increase": ({"t": T[::-1], "q": Q}, r"times do not increase: times\[0\] is 7 s"),
     "NaN": ({"t": T, "q": np.where(Q[2, 1] == Q, np.nan, Q)}, r"q has values that are not finite, the first in row 2"),
@@ -113,7 +114,7 @@ BAD = {
     "text": ({"t": T, "q": "see appendix"}, r"q: found text; expected numbers"),
     "complex numbers": ({"t": T, "q": Q + 1j}, rf"q: found a complex matrix; {EXPORT}"),
     "a cell": ({"t": T, "q": np.array([1, "a"], dtype=object)}, rf"q: found a cell; {EXPORT}"),
-    "a structure with time": ({"q": {"time": T, "signals": {"values": Q}}}, rf"q: found a struct; {EXPORT}"),
+    "a structure without signals": ({"q": {"time": T, "values": Q}}, rf"q: found a struct; {EXPORT}"),
     "a structure of another name": ({"out": {"q": Q}}, rf"no times: found out \(struct\); .*; {EXPORT}"),
     "empty": ({"t": np.zeros((0, 0)), "q": np.zeros((0, 2))}, r"times has shape \(0,\)"),
 }
@@ -242,3 +243,66 @@ def test_no_damaged_byte_leads_anywhere_else(data, packed, tmp_path_factory):
     savemat(path, {"t": T, "q": Q, "gains": {"kp": 1.0}, "note": "x"}, do_compression=packed)
     path.write_bytes(path.read_bytes() + opaque("out", "timeseries"))
     check_damaged(data.draw, lambda file: Trajectory.read(file, ARM), path)
+
+
+# Structures of Simulink
+
+
+def structure(values, labels=("",), times=T):
+    """What "To Workspace" writes as a structure, with time unless ``times`` is empty."""
+    signals = np.zeros((1, len(labels)), dtype=[(name, object) for name in ("values", "dimensions", "label")])
+    for k, label in enumerate(labels):
+        each = values[k] if len(labels) > 1 else values
+        signals[0, k] = (each, float(np.shape(each)[1]), label)
+    return {"time": np.reshape(times, (-1, 1)), "signals": signals, "blockName": "arm/To Workspace"}
+
+
+SHAPES = {
+    "array and tout": {"tout": T, "yout": Q},
+    "structure with time": {"q": structure(Q)},
+    "structure with time, of any name": {"simout": structure(Q)},
+    "structure without time": {"tout": T, "q": structure(Q, times=[])},
+    "structure with a label": {"ScopeData": structure(Q, ("q",))},
+    "structure with labels of joints": {"ScopeData": structure([Q[:, :1], Q[:, 1:]], ("q1", "q2"))},
+    "values with time last": {"q": structure(Q.T[:, None, :])},
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_shapes_of_simulink_are_read(name, tmp_path):
+    assert read(tmp_path, SHAPES[name]) == Trajectory.from_samples(ARM, T, Q)
+
+
+def test_rates_of_a_structure_are_used(tmp_path):
+    values = {"ScopeData": structure([Q, QD], ("q", "qd"))}
+    assert read(tmp_path, values) == Trajectory.from_samples(ARM, T, Q, QD)
+
+
+def test_structures_of_other_times_are_refused(tmp_path):
+    savemat(tmp_path / "log.mat", {"q": structure(Q), "qd": structure(QD, times=T + 1)})
+    with pytest.raises(DescriptionError, match="qd has times"):
+        Trajectory.read(tmp_path / "log.mat", ARM)
+
+
+def test_columns_of_a_matrix_are_chosen(tmp_path):
+    values = {"log": np.column_stack([T, Q, QD])}
+    savemat(tmp_path / "log.mat", values)
+    content = (tmp_path / "log.mat").read_bytes()
+    choices = matlab_choices(ARM, content, 10**6)
+    assert choices == {"t": ["log(:,1)"], "q": ["log(:,2:3)", "log(:,4:5)"]}
+    columns = {"t": "log(:,1)", "q": "log(:,2:3)", "qd": "log(:,4:5)"}
+    assert read(tmp_path, values, columns=columns) == Trajectory.from_samples(ARM, T, Q, QD)
+    for wrong in ("log(:,5:9)", "log(:,0:1)", "log(:,3:2)"):
+        with pytest.raises(DescriptionError, match=r"log has shape"):
+            read(tmp_path, values, columns=columns | {"q": wrong})
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_each_choice_can_be_read(name, tmp_path):
+    savemat(tmp_path / "log.mat", SHAPES[name])
+    choices = matlab_choices(ARM, (tmp_path / "log.mat").read_bytes(), 10**6)
+    if name == "structure with labels of joints":
+        assert choices["q"] == []  # each joint has a signal of its own
+        return
+    columns = {"t": choices["t"][0], "q": choices["q"][0]}
+    assert read(tmp_path, SHAPES[name], columns=columns) == Trajectory.from_samples(ARM, T, Q)

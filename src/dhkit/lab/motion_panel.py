@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import binascii
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
@@ -20,10 +20,11 @@ from dhkit.lab.contacts import NearestState, contacts_along
 from dhkit.lab.desk import Desk, file_content, has_bodies
 from dhkit.lab.jobs import Job, Jobs
 from dhkit.lab.obstacle_panel import ObstaclePanel
-from dhkit.lab.requests import MAX_JOINT_VALUE, Fields, JsonObject, Panel, answers
+from dhkit.lab.requests import MAX_JOINT_VALUE, MAX_TEXT_LENGTH, Fields, JsonObject, Panel, answers
 from dhkit.lab.tool_panel import solve_pose
 from dhkit.planning import Progress
 from dhkit.trajectories import Trajectory, read_motion
+from dhkit.trajectories.matlab_samples import matlab_choices
 from dhkit.viewer.interactive import limits_state
 from dhkit.viewer.motion import exceeded_limit
 
@@ -42,6 +43,8 @@ CONTACT_DELAY = 0.2
 MAX_WAYPOINTS = 100
 MAX_FILE_LENGTH = 700_000
 """Largest length of a file in base64, characters."""
+MAX_UNPACKED = 20_000_000
+"""Largest size of the unpacked variables of a .mat file, bytes."""
 SUFFIXES = (".csv", ".mat", ".npz", ".yaml", ".yml")
 SAME_STATE = 1e-9
 """Joint values that differ by less than this, rad and m, are one state."""
@@ -138,22 +141,25 @@ class MotionPanel(Panel):
             self.desk.show(self.desk.q)
         self._report_change()
 
-    @answers("motion.file", "name", "content", "degrees")
+    @answers("motion.columns", "name", "content")
+    def list_columns(self, fields: Fields) -> JsonObject:
+        """Return the variables of a .mat file that may be the times or the joint values."""
+        _, content = _file_of(fields, (".mat",))
+        return matlab_choices(self.desk.arm.description, content, MAX_UNPACKED)
+
+    @answers("motion.file", "name", "content", "degrees", "columns")
     def read_file(self, fields: Fields) -> None:
         """Read a motion from a file whose content the page sends; a path would be a file of this machine."""
-        suffix = Path(fields.text("name")).suffix.lower()
-        if suffix not in SUFFIXES:
-            raise ValueError(f"motion.file: name ends in {suffix[:10]!r}; expected {', '.join(SUFFIXES)}")
-        try:
-            content = base64.b64decode(fields.text("content", MAX_FILE_LENGTH), validate=True)
-        except (binascii.Error, ValueError):
-            raise ValueError("motion.file: content is not in base64") from None
+        suffix, content = _file_of(fields, SUFFIXES)
         degrees = fields.flag("degrees", False)
+        columns = fields.data.get("columns")
+        if columns is not None and not (isinstance(columns, dict) and all(map(_is_text, columns.values()))):
+            raise ValueError("motion.file: columns is not an object of texts")
         with tempfile.TemporaryDirectory(prefix="dhkit-lab-") as folder:
             path = Path(folder) / f"file{suffix}"
             path.write_bytes(content)
             try:
-                motion = read_motion(path, self.desk.arm.description, degrees=degrees)
+                motion = read_motion(path, self.desk.arm.description, degrees=degrees, columns=columns)
             except DescriptionError as error:
                 raise ValueError(str(error).replace(str(path), fields.text("name"))) from None
         name = f"{self.desk.arm.name}-motion.npz"
@@ -368,6 +374,21 @@ def _is_limited(arm: Arm) -> bool:
     numbers = arm.description.numbers
     is_fast = np.isfinite(numbers.velocity).any()
     return bool(is_fast or (has_bodies(arm) and np.isfinite(numbers.effort).any()))
+
+
+def _file_of(fields: Fields, suffixes: Collection[str]) -> tuple[str, bytes]:
+    """Return the suffix and the content of the file that a request holds."""
+    suffix = Path(fields.text("name")).suffix.lower()
+    if suffix not in suffixes:
+        raise ValueError(f"{fields.request}: name ends in {suffix[:10]!r}; expected {', '.join(suffixes)}")
+    try:
+        return suffix, base64.b64decode(fields.text("content", MAX_FILE_LENGTH), validate=True)
+    except (binascii.Error, ValueError):
+        raise ValueError(f"{fields.request}: content is not in base64") from None
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str) and len(value) <= MAX_TEXT_LENGTH
 
 
 class Circle(NamedTuple):

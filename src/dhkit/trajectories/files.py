@@ -194,7 +194,8 @@ def read_samples(
         there rates and accelerations, ``qd1`` or ``dq1``, ``qdd1`` or ``ddq1``. A ``.yaml`` of a ROS JointTrajectory,
         its joints in any order. Or a ``.mat`` of arrays, saved in MATLAB by ``save(..., '-v7')`` or older: a vector
         ``t``, ``time`` or ``tout``, and either vectors of the same names as columns or a matrix ``q``, shape (N, n),
-        with ``qd`` and ``qdd`` if they are there; a matrix of n+1 columns has the times in its first.
+        with ``qd`` and ``qdd`` if they are there; a matrix of n+1 columns has the times in its first. Structures that
+        Simulink writes, with or without time, count as such matrices; see :func:`matlab_table`.
     description
         The robot.
     degrees
@@ -202,6 +203,7 @@ def read_samples(
     columns
         The file's names of columns or variables, by our names: ``t``, ``q1``, ``qd1``, ``qdd1`` and so on, a
         joint's name for its values, and in a ``.mat`` ``q``, ``qd`` and ``qdd`` for matrices. Others keep their names.
+        ``{"q": "yout(:,1:6)"}`` takes columns of a matrix.
 
     Raises
     ------

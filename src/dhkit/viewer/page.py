@@ -52,6 +52,7 @@ _LAB_FILES = (
     "gizmo.js",
     "table.js",
     "motion.js",
+    "motion_file.js",
     "curves.js",
     "own.js",
     "control.js",

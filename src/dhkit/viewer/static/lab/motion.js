@@ -2,7 +2,8 @@
 
 import { ObstacleList } from "./around.js";
 import { MotionCurves, exceeding } from "./curves.js";
-import { UNITS, base64Of, bytes, fixed, h, save, touchingText, typed } from "./dom.js";
+import { MotionFile } from "./motion_file.js";
+import { UNITS, bytes, fixed, h, save, touchingText, typed } from "./dom.js";
 
 const KINDS = [
   ["quintic", "Quintic"],
@@ -11,7 +12,6 @@ const KINDS = [
   ["line", "Straight line"],
   ["circle", "Circle"],
 ];
-const LARGEST_FILE = 500000; // bytes
 
 export class MotionPanel {
   constructor(lab, root) {
@@ -80,13 +80,7 @@ export class MotionPanel {
     );
     this.facts = h("p", { class: "facts" });
     this.points = h("ol", { class: "points" });
-    this.file = h("input", {
-      type: "file",
-      accept: ".csv,.mat,.npz,.yaml,.yml",
-      "aria-label": "File with a motion",
-      onchange: () => this.read(),
-    });
-    this.degrees = h("input", { type: "checkbox" });
+    this.file = new MotionFile(lab);
     this.curves = new MotionCurves(lab);
     this.obstacles = new ObstacleList(lab);
     const download = (format) =>
@@ -120,13 +114,7 @@ export class MotionPanel {
         this.points,
       ),
       this.obstacles.root,
-      h(
-        "fieldset",
-        {},
-        h("legend", {}, "From a file"),
-        h("label", { class: "line" }, this.file),
-        h("label", { class: "line" }, this.degrees, " angles in degrees"),
-      ),
+      this.file.root,
     );
   }
 
@@ -266,22 +254,6 @@ export class MotionPanel {
   moved(q, time) {
     if (q && this.motion) this.lab.warn(...exceeding(this.motion, time));
     if (q && this.lab.dock.shows(this.curves)) this.curves.mark(time);
-  }
-
-  async read() {
-    const [file] = this.file.files;
-    if (!file) return;
-    if (file.size > LARGEST_FILE) this.file.value = "";
-    if (file.size > LARGEST_FILE)
-      return this.lab.complain(
-        `${file.name} has ${file.size} bytes; expected at most ${LARGEST_FILE}`,
-      );
-    await this.lab.ask("motion.file", {
-      name: file.name,
-      content: await base64Of(file),
-      degrees: this.degrees.checked,
-    });
-    this.file.value = "";
   }
 
   async download(format) {
