@@ -243,3 +243,27 @@ def test_columns_of_a_mat_file_are_chosen(open_page, tmp_path):
     page.until("dhkit.lab.state.motion")
     assert np.allclose(lab._motions.motion.q(0.5), [0.1, 0.05])
     assert not page.evaluate(f"{labelled('Joint values')}.offsetWidth")
+
+
+def test_a_motion_is_saved_as_a_video(open_page):
+    lab, page = open_page("planar2r")
+    panel(page, "motion")
+    lab.answer("motion.plan", {"kind": "quintic", "goal": {"q": [0.5, 0.8]}, "duration": 1.0})
+    page.until("dhkit.lab.state.motion && dhkit.player.active")
+    page.evaluate(
+        """(() => {
+          let content = null;
+          URL.createObjectURL = blob => { content = blob.arrayBuffer(); return "#"; };
+          HTMLAnchorElement.prototype.click = async function () {
+            const bytes = new Uint8Array(await content);
+            globalThis.saved = [this.download, bytes.length, [...bytes.slice(0, 4)]];
+          };
+        })()"""
+    )
+    page.click(button("Video"))
+    page.until("globalThis.saved")
+    name, size, head = page.evaluate("globalThis.saved")
+    assert name == "planar2r-motion.webm"
+    assert bytes(head) == b"\x1aE\xdf\xa3"  # EBML
+    assert size > 5_000
+    page.until("!dhkit.player.playing")

@@ -45,6 +45,7 @@ _LAB_FILES = (
     "dock.js",
     "icons.js",
     "panels.js",
+    "recording.js",
     "requests.js",
     "dom.js",
     "joints.js",

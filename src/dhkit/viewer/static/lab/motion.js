@@ -3,6 +3,7 @@
 import { ObstacleList } from "./around.js";
 import { MotionCurves, exceeding } from "./curves.js";
 import { MotionFile } from "./motion_file.js";
+import { recorded, videoFormat } from "./recording.js";
 import { UNITS, bytes, fixed, h, save, touchingText, typed } from "./dom.js";
 
 const KINDS = [
@@ -86,12 +87,23 @@ export class MotionPanel {
     const download = (format) =>
       h("button", { type: "button", onclick: () => this.download(format) }, format.toUpperCase());
     this.replay = h("button", { type: "button", onclick: () => this.play() }, "Play");
+    this.video = h(
+      "button",
+      {
+        type: "button",
+        hidden: videoFormat() === null,
+        title: "Play the motion once and save it as a video",
+        onclick: () => this.record(),
+      },
+      "Video",
+    );
     this.files = h(
       "div",
       { class: "buttons", hidden: true },
       this.replay,
       download("csv"),
       download("npz"),
+      this.video,
       h("button", { type: "button", onclick: () => lab.ask("motion.clear") }, "Remove"),
     );
     root.append(
@@ -254,6 +266,20 @@ export class MotionPanel {
   moved(q, time) {
     if (q && this.motion) this.lab.warn(...exceeding(this.motion, time));
     if (q && this.lab.dock.shows(this.curves)) this.curves.mark(time);
+  }
+
+  async record() {
+    const { player } = this.lab.page;
+    if (!player.active) await this.lab.ask("motion.play");
+    if (!player.active) return;
+    this.video.disabled = true;
+    try {
+      const video = await recorded(this.lab.stage.viewer.renderer.domElement, player);
+      const suffix = video.type.includes("mp4") ? "mp4" : "webm";
+      save(`${this.arm.name}-motion.${suffix}`, video, video.type);
+    } finally {
+      this.video.disabled = false;
+    }
   }
 
   async download(format) {
