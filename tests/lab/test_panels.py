@@ -224,6 +224,28 @@ def test_solids_of_files_have_each_vertex_once(tmp_path):
         assert abs(mesh.volume) == pytest.approx(6.0)
 
 
+@pytest.mark.parametrize(("unit", "size"), [("m", 0.3), ("mm", 300.0), ("in", 12.0)])
+def test_the_unit_of_a_solid_is_found_by_its_size_and_chosen(tmp_path, unit, size):
+    path = tmp_path / "part.stl"
+    path.write_bytes(trimesh.exchange.stl.export_stl(trimesh.creation.box((size, size / 2, size / 3))))
+    with Lab(Arm.load("puma560"), solid=path) as lab:
+        assert state(lab, "solid")["unit"] == unit
+        edges = np.ptp(state(lab, "solid")["vertices"], axis=0)
+        assert edges.max() == pytest.approx(0.3, rel=0.02)
+        lab.answer("transforms.unit", {"unit": "cm"})
+        assert np.ptp(state(lab, "solid")["vertices"], axis=0).max() == pytest.approx(size / 100)
+        lab.answer("transforms.unit", {"unit": unit})
+        assert np.ptp(state(lab, "solid")["vertices"], axis=0) == pytest.approx(edges, abs=1e-9)
+        with pytest.raises(ValueError, match="expected one of m, mm, in, cm"):
+            lab.answer("transforms.unit", {"unit": "ft"})
+
+
+def test_the_box_without_a_file_has_no_unit(open_lab):
+    lab = open_lab("planar2r")
+    with pytest.raises(ValueError, match="the box has no file"):
+        lab.answer("transforms.unit", {"unit": "mm"})
+
+
 @pytest.mark.parametrize(
     ("name", "content", "complaint"),
     [

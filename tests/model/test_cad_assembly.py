@@ -123,8 +123,25 @@ def test_the_pumas_own_meshes_come_back_and_its_table_stays(tmp_path):
     assert pinocchio_model(again).inertias[2].mass == pytest.approx(float(again.joints[1].body.mass))
     urdf = files[1].read_text()
     assert urdf.count('filename="meshes/link3.stl"') == urdf.count('filename="meshes/link3_hull.stl"') == 1
-    with pytest.raises(ModelError, match="is not empty; expected a new folder"):
+    with pytest.raises(ModelError, match=r"is not empty; expected a new folder; --force .* replaces an earlier import"):
         found.write(tmp_path / "robot")
+    (tmp_path / "robot" / "meshes" / "link9.stl").write_bytes(b"of an earlier import")
+    found.write(tmp_path / "robot", force=True)
+    assert read_robot(files[0]) == found.description
+    assert not (tmp_path / "robot" / "meshes" / "link9.stl").exists()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["parts", "robot"]
+
+
+def test_force_never_replaces_a_folder_with_other_files(tmp_path):
+    arm = library_robot("puma560")
+    meshes = [read_mesh(part.file) for part in link_parts(arm)]
+    found = import_cad(export(tmp_path / "parts", arm, meshes, arm.numbers.configurations["ready"]), arm)
+    found.write(tmp_path / "robot")
+    thesis = tmp_path / "robot" / "thesis.tex"
+    thesis.write_text("three years")
+    with pytest.raises(ModelError, match="files that an import does not make"):
+        found.write(tmp_path / "robot", force=True)
+    assert thesis.read_text() == "three years"
 
 
 def test_a_mat_file_of_faces_and_vertices_is_the_same_assembly(tmp_path):

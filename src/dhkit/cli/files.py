@@ -88,6 +88,7 @@ def import_cad(
         ),
     ] = None,
     degrees: Annotated[bool, degrees_option("Angles of --at are in degrees.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an earlier import in the folder.")] = False,
     json: Json = False,
 ) -> None:
     """Make a robot of a CAD assembly's parts and a DH table: meshes in their links' frames, masses, TOML and URDF."""
@@ -103,7 +104,7 @@ def import_cad(
         simplify=simplify,
         files=_files(mapping or ()),
     )
-    written = imported.write(output)
+    written = imported.write(output, force=force)
     warnings = [note for note in imported.notes if note.startswith("warning: ")]
     if json:
         links = {str(link): len(mesh.faces) for link, mesh in imported.meshes.items()}

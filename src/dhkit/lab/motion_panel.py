@@ -145,7 +145,10 @@ class MotionPanel(Panel):
     def list_columns(self, fields: Fields) -> JsonObject:
         """Return the variables of a .mat file that may be the times or the joint values."""
         _, content = _file_of(fields, (".mat",))
-        return matlab_choices(self.desk.arm.description, content, MAX_UNPACKED)
+        try:
+            return matlab_choices(self.desk.arm.description, content, MAX_UNPACKED)
+        except DescriptionError as error:
+            raise ValueError(f"{fields.text('name')}: {error}") from None
 
     @answers("motion.file", "name", "content", "degrees", "columns")
     def read_file(self, fields: Fields) -> None:

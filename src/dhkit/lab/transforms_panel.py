@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,12 @@ MAX_FILE_BYTES = 5_000_000
 """Largest size of a solid's file, bytes: the page gets it as text."""
 MAX_TRIANGLES = 5_000
 """Largest number of triangles of a solid."""
+UNITS = {"m": 1.0, "mm": 1e-3, "in": 0.0254, "cm": 1e-2}
+"""Units of a solid's file, m, in the order in which they are tried."""
+SMALLEST_SHARE = 0.02
+"""Size of a solid, as a share of the arm's reach, below which its unit is another one."""
+LARGEST_SHARE = 1.5
+"""Size above which it is."""
 MAX_STEPS = 30
 LISTED_VERTICES = 24
 """Vertices whose coordinates are listed, and whose numbers are drawn."""
@@ -40,6 +46,25 @@ class Solid:
     """Shape (k, 3), m."""
     faces: NDArray[np.intp]
     """Numbers of the vertices of each triangle, from 0, shape (m, 3)."""
+    unit: str | None = None
+    """Unit in which the file is read: one of :data:`UNITS`; None for a solid without a file."""
+
+    def scaled(self, unit: str) -> Solid:
+        """Return the solid with its file's numbers in another unit."""
+        factor = UNITS[unit] / UNITS[self.unit or "m"]
+        return replace(self, vertices=factor * self.vertices, unit=unit)
+
+    def beside(self, reach: float) -> Solid:
+        """Return the solid in the first unit in which it is not larger than an arm of this reach, m, nor tiny.
+
+        STL files have no unit: most are in mm, some in m or inches.
+        """
+        for unit in UNITS:
+            solid = self.scaled(unit)
+            size = float(np.ptp(solid.vertices, axis=0).max())
+            if SMALLEST_SHARE * reach <= size <= LARGEST_SHARE * reach:
+                return solid
+        return self
 
     @classmethod
     def box(cls, edges: tuple[float, float, float]) -> Solid:
@@ -74,7 +99,7 @@ class Solid:
             raise ModelError(f"{path}: {size} bytes; expected a file of at most {MAX_FILE_BYTES}")
         corners = read_mesh(path, max_triangles=MAX_TRIANGLES, max_bytes=MAX_FILE_BYTES).corners
         vertices, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-        return cls(path.stem, vertices, faces.reshape(-1, 3))
+        return cls(path.stem, vertices, faces.reshape(-1, 3), "m")
 
 
 class TransformsPanel(Panel):
@@ -84,7 +109,16 @@ class TransformsPanel(Panel):
         super().__init__(desk)
         reach = desk.arm.description.reach or 1.0
         x, y, z = (float(f"{edge * reach:.2g}") for edge in BOX_EDGES)
-        self.solid = solid or Solid.box((x, y, z))
+        self.solid = solid.beside(reach) if solid is not None else Solid.box((x, y, z))
+
+    @answers("transforms.unit", "unit")
+    def set_unit(self, fields: Fields) -> None:
+        """Read the numbers of the solid's file in another unit."""
+        unit = fields.choice("unit", UNITS)
+        if self.solid.unit is None:
+            raise ValueError("transforms.unit: the box has no file; expected a lab with --solid FILE")
+        self.solid = self.solid.scaled(unit)
+        self.publish()
 
     @answers("transforms.apply", "steps")
     def apply(self, fields: Fields) -> JsonObject:
@@ -120,6 +154,7 @@ class TransformsPanel(Panel):
         solid = self.solid
         state = {
             "name": solid.name,
+            "unit": solid.unit,
             "vertices": np.round(solid.vertices, 9).tolist(),
             "faces": solid.faces.tolist(),
             "listed": min(LISTED_VERTICES, len(solid.vertices)),

@@ -60,11 +60,18 @@ class CadImport:
     notes: tuple[str, ...]
     """Findings, choices and changes, a line each."""
 
-    def write(self, directory: str | Path) -> tuple[Path, ...]:
+    def write(self, directory: str | Path, *, force: bool = False) -> tuple[Path, ...]:
         """Write ``robot.toml``, ``robot.urdf`` and ``meshes/``, all or nothing; return the files.
 
         ``meshes/linkN.stl`` is the visible shape, in single precision, ``meshes/linkN_hull.stl`` its convex hull,
         which the URDF names for collisions.
+
+        Parameters
+        ----------
+        directory
+            The folder: new, empty, or with ``force`` one that an earlier import made.
+        force
+            Whether an earlier import in the folder is replaced; a folder with any other file is refused all the same.
 
         Raises
         ------
@@ -73,18 +80,29 @@ class CadImport:
         """
         folder = Path(directory)
         with model_errors(folder):
-            if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-                fault = "is not empty" if folder.is_dir() else "is not a folder"
-                raise ModelError(f"{folder} {fault}; expected a new folder")
+            if folder.exists() and not folder.is_dir():
+                raise ModelError(f"{folder} is not a folder; expected a new folder")
+            has_content = folder.exists() and any(folder.iterdir())
+            if has_content and not force:
+                again = "; --force (force=True) replaces an earlier import" if _is_import(folder) else ""
+                raise ModelError(f"{folder} is not empty; expected a new folder{again}")
+            if has_content and not _is_import(folder):
+                raise ModelError(f"{folder} has files that an import does not make; expected a new folder")
             folder.absolute().parent.mkdir(parents=True, exist_ok=True)
             # Written under another name and renamed: a folder of this name is complete.
             with tempfile.TemporaryDirectory(dir=folder.absolute().parent, prefix=f".{folder.name}.") as holder:
                 complete = Path(holder) / "made"
                 complete.mkdir()
                 names = self._write_files(complete)
+                previous = Path(holder) / "previous"
                 if folder.exists():
-                    folder.rmdir()
-                complete.replace(folder)
+                    folder.replace(previous)
+                try:
+                    complete.replace(folder)
+                except BaseException:
+                    if previous.exists():
+                        previous.replace(folder)
+                    raise
         return tuple(folder / name for name in names)
 
     def __repr__(self) -> str:
@@ -93,10 +111,10 @@ class CadImport:
         return repr_line("CadImport", self.description.name, text)
 
     def _repr_html_(self) -> str:
-        rows = [
-            (str(link), str(len(mesh.faces)), " x ".join(f"{x:.4g}" for x in np.ptp(mesh.bounds, axis=0)))
-            for link, mesh in self.meshes.items()
-        ]
+        rows = []
+        for link, mesh in self.meshes.items():
+            size = " x ".join(f"{x:.4g}" for x in np.ptp(mesh.bounds, axis=0))
+            rows.append((str(link), str(len(mesh.faces)), size))
         table = html_table(("link", "triangles", "box around it [m]"), rows, align="rrl")
         return html_block(f"{self.description.name} from CAD", table, html_lines(self.notes))
 
@@ -303,3 +321,10 @@ def _with_parts(
 
 def _link_list(links: Iterable[int]) -> str:
     return ", ".join(map(str, sorted(links)))
+
+
+def _is_import(folder: Path) -> bool:
+    """Return whether a folder holds what :meth:`CadImport.write` makes, and nothing else."""
+    names = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir()}
+    others = {name for name in names if not name.lower().endswith((".stl", ".dae", ".obj"))}
+    return others == {_ROBOT_FILE, _URDF_FILE}

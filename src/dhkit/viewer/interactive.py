@@ -56,7 +56,7 @@ def arm_state(description: Description, *, assumed_bodies: bool = False) -> dict
     limits = limits_state(description)
     numbers = description.numbers
     fit = classify(description)
-    configurations = {"zero": np.zeros(description.n)} | dict(numbers.configurations)
+    configurations = numbers.configurations
     joints = []
     for i, joint in enumerate(description.joints):
         state = {"name": joint.name, "unit": "rad" if joint.is_revolute else "m"}

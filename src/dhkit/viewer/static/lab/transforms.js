@@ -30,12 +30,22 @@ export class TransformsPanel {
       },
       "Add a step",
     );
+    this.unit = h(
+      "select",
+      {
+        "aria-label": "Unit of the solid's file",
+        onchange: () => lab.ask("transforms.unit", { unit: this.unit.value }),
+      },
+      ["m", "cm", "mm", "in"].map((unit) => h("option", { value: unit }, unit)),
+    );
+    this.units = h("label", { class: "line", hidden: true }, "file in ", this.unit);
     this.hide = h("input", { type: "checkbox", onchange: () => this.hideArm() });
     this.result = h("div", { class: "step" });
     this.note = h("p", { class: "note", role: "status" });
     this.name = h("h2", {}, "");
     root.append(
       this.name,
+      this.units,
       this.list,
       h("div", { class: "buttons" }, this.add, this.apply),
       h("label", { class: "line" }, this.hide, " hide the arm"),
@@ -57,6 +67,8 @@ export class TransformsPanel {
 
   take_solid(solid) {
     this.solid = solid;
+    this.units.hidden = solid.unit === null;
+    this.unit.value = solid.unit;
     this.name.textContent = `${solid.name}: ${solid.vertices.length} vertices`;
     this.labels.set(
       solid.vertices.slice(0, solid.listed).map((_, frame) => ({ frame, text: String(frame + 1) })),
