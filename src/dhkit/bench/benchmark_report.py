@@ -352,10 +352,10 @@ class BenchReport(Report):
     def tables(self) -> list[Table]:
         """Timings by quantity, requirements, and results of the probes."""
         columns = ("contender", "called", "items", "time", "quartiles", "x batch", "x single", "solutions", "error")
-        tables: list[Table] = [
-            (quantity, columns, [_cells(row) for row in self.rows if row.quantity == quantity])
-            for quantity in self.quantities
-        ]
+        tables: list[Table] = []
+        for quantity in self.quantities:
+            timings = [_cells(row) for row in self.rows if row.quantity == quantity]
+            tables.append((quantity, columns, timings))
         others = (
             ("Required", ("what", "required", "measured", ""), self.requirements),
             ("Two threads", ThreadScaling.COLUMNS, self.scaling),
@@ -364,7 +364,9 @@ class BenchReport(Report):
             ("Operations", Operations.COLUMNS, self.operations),
             ("Derivations", Derivation.COLUMNS, self.derivations),
         )
-        tables += [(heading, columns, [list(row.cells) for row in rows]) for heading, columns, rows in others]
+        for heading, other_columns, rows in others:
+            cells = [list(row.cells) for row in rows]
+            tables.append((heading, other_columns, cells))
         gaps = [[gap.quantity, gap.name, gap.reason] for gap in self.missing]
         return [*tables, ("Did not take part", ("quantity", "who", "why"), gaps)]
 
@@ -418,7 +420,11 @@ def _text_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[
 def _markdown_table(columns: Sequence[str], cells: Iterable[Sequence[str]]) -> list[str]:
     """Return the lines of a table in Markdown."""
     lines = [columns, ["---"] * len(columns), *cells]
-    return ["| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines]
+    written = []
+    for line in lines:
+        escaped = [cell.replace("|", "\\|") for cell in line]
+        written.append(f"| {' | '.join(escaped)} |")
+    return written
 
 
 def _with_lists(value: Any) -> Any:

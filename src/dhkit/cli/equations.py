@@ -200,12 +200,15 @@ FORMATS: Mapping[str, Callable[[Any, Sequence[Quantity]], str]] = {
 
 
 def _facts(lag: Source, shown: Sequence[Quantity], form: str, text: str) -> dict[str, Any]:
+    term_counts = {}
+    for quantity in shown:
+        term_counts[quantity.name] = [len(element) for element in quantity.elements.flat]
     return {
         "robot": lag.description.name,
         "what": [quantity.name for quantity in shown],
         "format": form,
         "text": text,
-        "terms": {quantity.name: [len(element) for element in quantity.elements.flat] for quantity in shown},
+        "terms": term_counts,
         "constants": lag.constants,
         "notes": list(lag.notes),
     }

@@ -77,7 +77,11 @@ def _constants(lag: Lagrangian | SymbolicKinematics, quantities: Sequence[Quanti
     elements = _elements(quantities)
     values = dict(lag.description.numbers.values) | lag.arm.parameters
     order = {name: k for k, name in enumerate([*lag.description.parameters, *lag.arm.parameters])}
-    rings = {name: x.ring for x in elements for name in symbols_of(constants_of(generators_of([x])))}
+    rings = {}
+    for element in elements:
+        constants = constants_of(generators_of([element]))
+        for name in symbols_of(constants):
+            rings[name] = element.ring
     names = sorted(rings, key=lambda name: (order.get(name, len(order)), name))
     if not names:
         return

@@ -36,8 +36,11 @@ def robots(
         return
     arms = [Arm.load(name).description for name in library_names()]
     if json:
-        keys = ("name", "n", "source", "kinds")
-        print_json([{key: getattr(arm, key) for key in keys} | {"reach_m": tool_reach(arm)} for arm in arms])
+        facts = []
+        for arm in arms:
+            named = {"name": arm.name, "n": arm.n, "source": arm.source, "kinds": arm.kinds}
+            facts.append({**named, "reach_m": tool_reach(arm)})
+        print_json(facts)
         return
     rows = [
         (arm.name, arm.kinds, arm.convention.value, f"{tool_reach(arm):.2f}", _shortened(arm.source)) for arm in arms

@@ -151,7 +151,8 @@ def _result(
     rows = len(run.t)
     reference = [np.broadcast_to(_with_batch_axis(x), (size, rows, n)) for x in run.reference[:2]]
     has_norms = run.measured
-    lower, upper = (np.stack([getattr(arm.numbers, name) for arm in arms]) for name in ("lower", "upper"))
+    lower = np.stack([arm.numbers.lower for arm in arms])
+    upper = np.stack([arm.numbers.upper for arm in arms])
     return BatchResult(
         arms=arms,
         friction=friction,

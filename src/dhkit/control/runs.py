@@ -117,7 +117,9 @@ class Run(ABC):
 
     def edges(self) -> list[float]:
         """Return the times (s) at which torques jump, apart from those of the rows, ascending."""
-        return sorted({edge for push in self.plant.pushes for edge in (push.begin, push.end)})
+        begins = {push.begin for push in self.plant.pushes}
+        ends = {push.end for push in self.plant.pushes}
+        return sorted(begins | ends)
 
     def stops(self, k: int, edges: Sequence[float]) -> list[float]:
         """Return the times at which integration from row k to the next one pauses, the next row's at the end."""

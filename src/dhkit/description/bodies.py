@@ -143,10 +143,10 @@ def rod(mass: Expression, start: Vector, end: Vector) -> Body:
 def _steiner_term(lever: ExactArray, mass: Expression) -> ExactArray:
     """Return mass (l^2 1 - l l^T), shape (3, 3), of a lever l, shape (3,)."""
     square = sum((x * x for x in lever), ZERO)
-    return np.array(
-        [[mass * ((square if i == j else ZERO) - lever[i] * lever[j]) for j in range(3)] for i in range(3)],
-        dtype=object,
-    )
+    square_times_identity = np.full((3, 3), ZERO, dtype=object)
+    np.fill_diagonal(square_times_identity, square)
+    term: ExactArray = (square_times_identity - np.outer(lever, lever)) * mass
+    return term
 
 
 def _inertia(tensor: ExactArray) -> Inertia:

@@ -14,7 +14,9 @@ from dhkit.expressions import ZERO, Expression, arc_tangent, cos, decimals, exac
 
 def identity() -> ExactPose:
     """Return the identity transform."""
-    return np.array([[ONE if i == j else ZERO for j in range(4)] for i in range(4)], dtype=object)
+    T: ExactPose = np.full((4, 4), ZERO, dtype=object)
+    np.fill_diagonal(T, ONE)
+    return T
 
 
 def _plane_rotation(first: int, second: int, angle: Expression) -> ExactPose:
@@ -78,7 +80,7 @@ def placement_of(T: ExactPose) -> Placement:
     angles = roll, arc_tangent(-R[2, 0], sqrt(level)), yaw
     has_symbols = any(entry.symbols for entry in R.ravel().tolist())
     if not has_symbols and any(angle.half_turns is None for angle in angles):
-        _, euler = pose_parts(np.array([[float(entry) for entry in row] for row in T]), order="ZYX")
+        _, euler = pose_parts(T.astype(float), order="ZYX")
         yaw, pitch, roll = (exact_angle(exact(float(angle))) for angle in euler)
         angles = roll, pitch, yaw
     return Placement(settled_vector(T[:3, 3]), angles)

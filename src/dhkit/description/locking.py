@@ -211,6 +211,9 @@ def _lock_all(description: Description, locked: Mapping[int, Expression]) -> Des
     moving = [i for i in range(description.n) if i not in locked]
     new_numbers = {i + 1: k for k, i in enumerate(moving, start=1)}  # couplings count joints from 1
     on_base = [body for body in chain.bodies[0] if body is not None]
+    configurations = {}
+    for name, q in description.configurations.items():
+        configurations[name] = tuple(q[i] for i in moving)
     return replace(
         description,
         base=replace(chain.base, body=joined(on_base) if on_base else None),
@@ -224,7 +227,7 @@ def _lock_all(description: Description, locked: Mapping[int, Expression]) -> Des
             for coupling in description.couplings
             if new_numbers.keys() >= set(coupling.joints)
         ),
-        configurations=Named({name: tuple(q[i] for i in moving) for name, q in description.configurations.items()}),
+        configurations=Named(configurations),
     )
 
 

@@ -143,6 +143,8 @@ class Numbers:
         along_centres = float(ends.lengths.sum())
         is_far = along_table > FAR * along_centres
         mass, com, inertia = zip(*(_body_arrays(_as_one(j.bodies, values), array, np.nan) for j in joints), strict=True)
+        configurations = {"zero": np.zeros(len(joints))}
+        configurations |= {name: array(q) for name, q in description.configurations.items()}
         numbers = cls(
             values={name: float(value) for name, value in values.items()},
             a=a,
@@ -170,7 +172,7 @@ class Numbers:
             gravity=array(description.gravity),
             T_world_base=matrix(description.base.placement, values),
             T_last_tool=T_last_tool,
-            configurations={name: array(q) for name, q in description.configurations.items()},
+            configurations=configurations,
             reach=(along_centres if is_far else along_table) + float(sum(strokes)),
             link_ends=ends if is_far else None,
         )
@@ -194,8 +196,12 @@ def matrix(placement: Placement, values: dict[str, Expression]) -> Array:
 @lru_cache(maxsize=1024)
 def _cached_matrix(placement: Placement, values: tuple[tuple[str, Expression], ...]) -> Array:
     """Return :func:`matrix`; an exact pose costs 1 ms, and most placements stay while a user edits the table."""
-    pose = pose_of(placement, dict(values))
-    return np.array([[float(substitute(entry, dict(values))) for entry in row] for row in pose], dtype=float)
+    numbers = dict(values)
+    exact_pose = pose_of(placement, numbers)
+    pose = np.empty(exact_pose.shape)
+    for index, entry in np.ndenumerate(exact_pose):
+        pose[index] = float(substitute(entry, numbers))
+    return pose
 
 
 def _coupling_matrix(description: RobotData, array: Callable[[Iterable[Expression]], Array]) -> Array:

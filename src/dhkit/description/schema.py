@@ -54,7 +54,10 @@ def _keyed_inertia(value: object) -> object:
         return value
     if len(value) != 3 or not all(isinstance(row, list) and len(row) == 3 for row in value):
         raise expected("keys xx, yy, zz, xy, yz, xz or a 3x3 matrix; tools order plain lists differently")
-    rows = [[_entry(entry) for entry in row] for row in value]
+    rows = []
+    for row in value:
+        entries = [_entry(entry) for entry in row]
+        rows.append(entries)
     for i, j in ((0, 1), (1, 2), (0, 2)):
         if rows[i][j] != rows[j][i]:
             raise expected(f"a symmetric matrix; {rows[i][j]} is not {rows[j][i]}")

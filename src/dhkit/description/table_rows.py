@@ -197,7 +197,10 @@ def _body_inertia(where: str, given: Any, names: Mapping[str, object]) -> Inerti
         return Inertia(**{key: quantity(where, given.get(key, 0), names) for key in INERTIA_PLACES})
     if not _has_length(given, 3) or not all(_has_length(row, 3) for row in given):
         raise DescriptionError(f"{where}: found {str(given)[:80]}; {expected}")
-    rows = [[quantity(where, value, names) for value in row] for row in given]
+    rows = []
+    for row in given:
+        entries = [quantity(where, value, names) for value in row]
+        rows.append(entries)
     if any(rows[i][j] != rows[j][i] for i, j in ((0, 1), (0, 2), (1, 2))):
         raise DescriptionError(f"{where}: {expected}")
     return Inertia(**{key: rows[i][j] for key, (i, j) in INERTIA_PLACES.items()})

@@ -226,8 +226,10 @@ def _check_only_body(body: Body, where: str, value: _Value) -> Iterator[str]:
 
 def _principal_moments(body: Body, where: str, value: _Value) -> tuple[float, float, float]:
     """Return the eigenvalues of the inertia, kg m^2, the lowest first."""
-    rows = [[value(f"{where}: body.inertia", entry) for entry in row] for row in body.inertia.rows]
-    lowest, middle, largest = (float(x) for x in np.linalg.eigvalsh(np.array(rows)))
+    inertia = np.empty((3, 3))
+    for i, row in enumerate(body.inertia.rows):
+        inertia[i] = [value(f"{where}: body.inertia", entry) for entry in row]
+    lowest, middle, largest = (float(x) for x in np.linalg.eigvalsh(inertia))
     return lowest, middle, largest
 
 

@@ -233,8 +233,11 @@ def number_symbols_from_one() -> None:
         if 1 in (m, n):
             entries = [of_casadi(f"{name}{k + 1}") for k in range(m * n)]
             return casadi.vertcat(*entries) if n == 1 else casadi.horzcat(*entries)
-        rows = [[of_casadi(f"{name}_{i + 1}_{j + 1}") for j in range(n)] for i in range(m)]
-        return casadi.vertcat(*(casadi.horzcat(*row) for row in rows))
+        rows = []
+        for i in range(1, m + 1):
+            entries = [of_casadi(f"{name}_{i}_{j}") for j in range(1, n + 1)]
+            rows.append(casadi.horzcat(*entries))
+        return casadi.vertcat(*rows)
 
     casadi.SX.sym = staticmethod(sym)  # type: ignore[method-assign, assignment]
 
@@ -453,8 +456,12 @@ class Writer:
         is_formula = hasattr(value, "as_explicit")  # of matrices: A*B of MatrixSymbols
         if getattr(value, "is_Matrix", False) or is_formula:
             explicit = value.doit().as_explicit() if is_formula else value
-            rows = [[self._sympy(entry) for entry in row] for row in explicit.tolist()]
-            return [row[0] for row in rows] if rows and len(rows[0]) == 1 else rows
+            rows = []
+            for row in explicit.tolist():
+                entries = [self._sympy(entry) for entry in row]
+                rows.append(entries)
+            is_column = bool(rows) and len(rows[0]) == 1
+            return [row[0] for row in rows] if is_column else rows
         value = value.doit()  # Derivative(V, q1) is written out; that of q1(t) stays
         import sympy
 
@@ -584,7 +591,7 @@ def rows_of(shape: tuple[int, int], entries: list[str]) -> object:
         return entries[0]
     if n == 1:
         return entries
-    return [[entries[i + m * j] for j in range(n)] for i in range(m)]
+    return [entries[i::m] for i in range(m)]
 
 
 def number_text(value: Any) -> str:

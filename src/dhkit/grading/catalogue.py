@@ -34,11 +34,10 @@ FACTORS = {
 
 def _catalogue(groups: Mapping[tuple[Subject, str], Mapping[str, str]]) -> dict[str, Mistake]:
     """Return mistakes by identity, of tables that hold, by subject and hint, sentences by identity."""
-    return catalogue(
-        Mistake(identity, subject, sentence, hint)
-        for (subject, hint), sentences in groups.items()
-        for identity, sentence in sentences.items()
-    )
+    mistakes = []
+    for (subject, hint), sentences in groups.items():
+        mistakes += [Mistake(identity, subject, sentence, hint) for identity, sentence in sentences.items()]
+    return catalogue(mistakes)
 
 
 _WRITING = _catalogue(
@@ -286,9 +285,13 @@ _EQUATION = _catalogue(
 )
 
 LIBRARY: Mapping[str, Mistake] = catalogue(
-    mistake
-    for group in (INVERSE, JACOBIAN, TABLE, KINEMATIC_MISTAKES, MISTAKES, _EQUATION, _WRITING)
-    for mistake in group.values()
+    INVERSE.values(),
+    JACOBIAN.values(),
+    TABLE.values(),
+    KINEMATIC_MISTAKES.values(),
+    MISTAKES.values(),
+    _EQUATION.values(),
+    _WRITING.values(),
 )
 """All mistakes by identity, in the order in which the command line lists them."""
 

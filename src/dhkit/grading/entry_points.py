@@ -25,7 +25,12 @@ from dhkit.grading.sheet_judge import judge_sheet
 
 MAX_PREPARED_JOINTS = 4
 """Largest arm whose mistakes are all derived ahead; for larger arms that takes longer than most sheets need."""
-_IDENTITY = [["1" if i == j else "0" for j in range(4)] for i in range(4)]
+_IDENTITY = [
+    ["1", "0", "0", "0"],
+    ["0", "1", "0", "0"],
+    ["0", "0", "1", "0"],
+    ["0", "0", "0", "1"],
+]
 
 
 def grade(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,17 @@ from dhkit.symbolic.textbook import BodyMotion, TextbookDerivation, derive
 from dhkit.symbolic.textbook_kinematics import derive_kinematics
 
 
+class StepResult(NamedTuple):
+    """One entry of a quantity that a step derives."""
+
+    name: str
+    """Name as text: M[1,2]."""
+    latex_name: str
+    """Name in LaTeX."""
+    element: Element
+    """Value, in the sums of angles that make it shortest."""
+
+
 @dataclass(frozen=True, eq=False)
 class SolutionStep:
     """A step of a derivation.
@@ -31,12 +43,12 @@ class SolutionStep:
     method
         How the result is derived, in a sentence.
     results
-        Names, the same in LaTeX, and elements in the sums of angles that make them shortest; without zeros.
+        Entries that are not zero.
     """
 
     title: str
     method: str
-    results: tuple[tuple[str, str, Element], ...]
+    results: tuple[StepResult, ...]
 
 
 def _worked_solution(description: Description) -> list[SolutionStep]:
@@ -64,7 +76,8 @@ def explanation_text(description: Description) -> str:
     lines = [f"{description.name}: the equations of motion, step by step", ""]
     for number, step in enumerate(_worked_solution(description), start=1):
         lines += [f"{number}. {step.title}", f"   {step.method}", ""]
-        lines += [f"   {name} = {plain_text(element)}" for name, _, element in step.results] or ["   all zero"]
+        results = [f"   {result.name} = {plain_text(result.element)}" for result in step.results]
+        lines += results or ["   all zero"]
         lines.append("")
     return "\n".join(lines) + (f"\n{inverse.text()}" if inverse is not None else "")
 
@@ -77,9 +90,10 @@ def explanation_html(description: Description) -> str:
     body = [f"<h1>{html.escape(description.name)}: the equations of motion, step by step</h1>"]
     for number, step in enumerate(_worked_solution(description), start=1):
         body += [f"<h2>{number}. {html.escape(step.title)}</h2>", f"<p>{html.escape(step.method)}</p>"]
-        for name, head, element in step.results:
-            text = f"{name} = {plain_text(element)}"
-            body.append(f"<p>{mathml(f'{head} = {latex_text(element)}') or html.escape(text)}</p>")
+        for result in step.results:
+            formula = mathml(f"{result.latex_name} = {latex_text(result.element)}")
+            text = f"{result.name} = {plain_text(result.element)}"
+            body.append(f"<p>{formula or html.escape(text)}</p>")
     if inverse is not None:
         body.append(f"<h1>{html.escape(description.name)}: inverse kinematics, step by step</h1>")
         body.append(inverse._repr_html_())
@@ -176,5 +190,6 @@ class _Solution:
                     indices = [str(k + 1) for k in index]
                     subscript = ",".join(filter(None, (number, "".join(indices))))
                     latex = f"{letter}_{{{subscript}}}" if subscript else letter
-                    results.append((f"{name}[{','.join(indices)}]" if index else name, latex, element))
+                    text = f"{name}[{','.join(indices)}]" if index else name
+                    results.append(StepResult(text, latex, element))
         return SolutionStep(title, method, tuple(results))

@@ -136,7 +136,9 @@ class Entry:
 
 def entry_name(quantity: str, index: tuple[int, ...]) -> str:
     """Return the name of an entry, counted from 1: M12, and M1_10 if an index has two digits."""
-    return quantity + ("_" if any(k > 8 for k in index) else "").join(str(k + 1) for k in index)
+    numbers = [str(k + 1) for k in index]
+    separator = "_" if any(len(number) > 1 for number in numbers) else ""
+    return quantity + separator.join(numbers)
 
 
 def worst_verdict(entries: Iterable[Entry]) -> Verdict | None:
@@ -303,11 +305,13 @@ class GradeReport:
     @property
     def missing_text(self) -> str:
         """Missing quantities, by name; of steps of inverse kinematics with the joint that none finds."""
-        incomplete = (entry for entry in self._incomplete if not entry.answer)
-        return ", ".join(
-            f"{entry.name} ({entry.statement})" if entry.statement.startswith(NO_STEP) else entry.name
-            for entry in incomplete
-        )
+        texts = []
+        for entry in self._incomplete:
+            if entry.answer:
+                continue
+            is_step = entry.statement.startswith(NO_STEP)
+            texts.append(f"{entry.name} ({entry.statement})" if is_step else entry.name)
+        return ", ".join(texts)
 
     @property
     def unfinished(self) -> tuple[Entry, ...]:
@@ -354,7 +358,15 @@ class GradeReport:
 
     def data(self) -> dict[str, object]:
         """Return all fields as plain data, which :meth:`from_data` reads back."""
-        return asdict(self, dict_factory=lambda items: {key: x.value if isinstance(x, Enum) else x for key, x in items})
+
+        def with_plain_values(fields: Iterable[tuple[str, object]]) -> dict[str, object]:
+            plain = dict(fields)
+            for name, value in plain.items():
+                if isinstance(value, Enum):
+                    plain[name] = value.value
+            return plain
+
+        return asdict(self, dict_factory=with_plain_values)
 
     @classmethod
     def from_data(cls, data: object) -> GradeReport:

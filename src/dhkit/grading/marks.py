@@ -80,11 +80,11 @@ def marks(report: GradeReport, rubric: Rubric) -> Marks:
         sums[entry.quantity][0] += share * most
         entries.append(Mark(entry.name, float(share * most), float(most), rule if most else "counts nothing"))
     missing = weights.keys() - set(report.quantities)
-    quantities = tuple(
-        Mark(quantity, float(got), float(most), "not on the sheet" if quantity in missing else "")
-        for quantity, (got, most) in sums.items()
-    )
-    return Marks(float(sum(got for got, _ in sums.values())), rubric.points, tuple(entries), quantities)
+    quantities = []
+    for quantity, (got, most) in sums.items():
+        rule = "not on the sheet" if quantity in missing else ""
+        quantities.append(Mark(quantity, float(got), float(most), rule))
+    return Marks(float(sum(got for got, _ in sums.values())), rubric.points, tuple(entries), tuple(quantities))
 
 
 def _quantity_weights(report: GradeReport, rubric: Rubric) -> dict[str, Fraction]:
@@ -133,7 +133,8 @@ def _reasons(entry: Entry, diagnosis: tuple[Diagnosis, ...], credit: Credit) -> 
     if any(one.mistake == "other_frames" for one in mistakes):
         reasons.append((_exact(credit.other_frames), "right in other frames"))
     elif mistakes:
-        shares = [_mistake_share(one, credit, credit.diagnosed if len(mistakes) == 1 else 0.0) for one in mistakes]
+        otherwise = credit.diagnosed if len(mistakes) == 1 else 0.0
+        shares = [_mistake_share(one, credit, otherwise) for one in mistakes]
         reasons.append((_exact(min(shares)), " and ".join(str(one.mistake) for one in mistakes)))
     return reasons
 

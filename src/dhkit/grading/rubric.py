@@ -152,7 +152,8 @@ def _entry_name(name: str) -> str | None:
     if match is None:
         return None
     quantity, *indices = [part for part in match.groups() if part] or [name]
-    return quantity + ("_" if any(len(index) > 1 for index in indices) else "").join(indices)
+    separator = "_" if any(len(index) > 1 for index in indices) else ""
+    return quantity + separator.join(indices)
 
 
 def _one_line(error: ErrorDetails) -> str:

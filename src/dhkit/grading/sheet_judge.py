@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from itertools import chain
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -90,14 +90,15 @@ def judge_sheet(
             iter(refused.values()),
             AnswerError(f"{sheet.file}: answer: every entry is empty; expected at least one quantity"),
         )
-    follows, agreement, diagnosis = _explain(truth, judged, digits) if explain else ({}, [], [])
+    explanation = _explain(truth, judged, digits) if explain else _Explanation()
+    diagnosis = [*explanation.diagnosis]
     entries: list[Entry] = []
     at_values: dict[str, float] = {}
     for name, quantity in judged.items():
-        entries += _entries(truth, quantity, follows.get(name, {}))
+        entries += _entries(truth, quantity, explanation.follows.get(name, {}))
         at_values |= _numbers_in(truth, quantity)
     notes = [Note(NoteKind.PROGRAM, values=(text,)) for text in sheet.notes]
-    notes += [*_notes(truth, judged, vocabulary), *agreement]
+    notes += [*_notes(truth, judged, vocabulary), *explanation.notes]
     entries += [Entry(name, (), Verdict.UNREADABLE, statement=str(error)) for name, error in refused.items()]
     for other in others:
         at_values |= other.at_values
@@ -168,7 +169,8 @@ class _SheetJudge:
                     read[name] = given_quantity(name, value, shape, self.vocabulary, names, matrix_of.without(name))
             except (AnswerError, DescriptionError) as error:
                 refused[name] = self._refusal(error)
-        trees = [entry.tree for given in read.values() for entry in given if entry.tree is not None]
+        read_entries = chain.from_iterable(read.values())
+        trees = [entry.tree for entry in read_entries if entry.tree is not None]
         used = frozenset[str]().union(*map(names_of, trees))
         letters = used & frozenset(self.truth.description.parameters)
         for name, given in read.items():
@@ -207,7 +209,8 @@ class _SheetJudge:
     def _rows_of_few(self) -> list[tuple[int, ...]]:
         """Return the rows, from 0, that a Jacobian of fewer than six has."""
         J = self.truth.of("J")
-        moving = [row for row in range(6) if not all(element.is_zero for element in J[row])]
+        is_moving = np.array([not element.is_zero for element in J.flat]).reshape(J.shape)
+        moving = np.flatnonzero(is_moving.any(axis=1)).tolist()
         position = tuple(row for row in moving if row < 3)
         is_planar = len(position) == 2 and len(moving) <= 3
         if is_planar:
@@ -265,24 +268,25 @@ class _SheetJudge:
             from dhkit.grading.judging.inverse_steps import judge_steps
 
             steps = given_steps(self.sheet.steps, vocabulary)
-            return self._at_other_values(
-                [tree for step in steps for tree in (*step.solutions, *chain.from_iterable(step.equations))],
-                lambda arm, formula, explain: judge_steps(
-                    arm, [step.changed(formula) for step in steps], seed=self.seed, explain=explain
-                ),
-                explain,
-            )
-        return _judge_rows(
-            "ik",
-            given_branches(self.sheet.branches, description.n, vocabulary),
-            lambda trees: self._at_other_values(
-                list(chain.from_iterable(trees)),
-                lambda arm, formula, explain: judge_inverse(
-                    arm, [[formula(tree) for tree in branch] for branch in trees], seed=self.seed, explain=explain
-                ),
-                explain,
-            ),
-        )
+            step_trees: list[Tree] = []
+            for step in steps:
+                step_trees += [*step.solutions, *chain.from_iterable(step.equations)]
+
+            def judge_changed_steps(arm: Description, formula: _Change, explain: bool) -> KinematicJudgement:
+                changed = [step.changed(formula) for step in steps]
+                return judge_steps(arm, changed, seed=self.seed, explain=explain)
+
+            return self._at_other_values(step_trees, judge_changed_steps, explain)
+
+        def judge_branches(branches: Sequence[Sequence[Tree]]) -> KinematicJudgement:
+            def judge_changed_branches(arm: Description, formula: _Change, explain: bool) -> KinematicJudgement:
+                changed = [list(map(formula, branch)) for branch in branches]
+                return judge_inverse(arm, changed, seed=self.seed, explain=explain)
+
+            return self._at_other_values(list(chain.from_iterable(branches)), judge_changed_branches, explain)
+
+        given = given_branches(self.sheet.branches, description.n, vocabulary)
+        return _judge_rows("ik", given, judge_branches)
 
     def _at_other_values(self, trees: Sequence[Tree], judge: _FormulaJudge, explain: bool) -> KinematicJudgement:
         """Judge formulas at the file's values; those that pass at other values of the arm's letters too.
@@ -311,7 +315,9 @@ class _SheetJudge:
         return _in_numbers(judged, other.at_values, self.sheet.task)
 
 
-_FormulaJudge: TypeAlias = Callable[[Description, Callable[[Tree], Tree], bool], KinematicJudgement]
+_Change: TypeAlias = Callable[[Tree], Tree]
+"""Change of a formula."""
+_FormulaJudge: TypeAlias = Callable[[Description, _Change, bool], KinematicJudgement]
 """Function from an arm, a change of formulas, and whether to look for mistakes, to the judgement of a sheet."""
 
 
@@ -326,21 +332,25 @@ def _in_numbers(judged: KinematicJudgement, at_values: Mapping[str, float], task
     entries = judged.entries
     if task.in_letters:
         statement = "right at the file's values; the task asks for letters"
-        entries = tuple(
-            replace(entry, verdict=Verdict.INCOMPLETE, statement=statement) if entry.verdict.passes else entry
-            for entry in entries
-        )
+        entries = tuple(_incomplete_if_passing(entry, statement) for entry in entries)
     return replace(judged, entries=entries, at_values=at_values)
+
+
+def _incomplete_if_passing(entry: Entry, statement: str) -> Entry:
+    if not entry.verdict.passes:
+        return entry
+    return replace(entry, verdict=Verdict.INCOMPLETE, statement=statement)
 
 
 def _judge_rows(
     name: str, rows: Sequence[Sequence[Given]], judge: Callable[[Sequence[Sequence[Tree]]], KinematicJudgement]
 ) -> KinematicJudgement:
     """Judge rows of a table, or branches of inverse kinematics; all are unreadable if an entry cannot be read."""
-    texts = [", ".join(entry.text for entry in row) for row in rows]
+    texts = []
     trees = []
     errors = []
     for row in rows:
+        texts.append(", ".join(entry.text for entry in row))
         trees.append([entry.tree for entry in row if entry.tree is not None])
         errors.append([entry.error for entry in row if entry.error])
 
@@ -360,19 +370,26 @@ def _judge_rows(
     return KinematicJudgement(tuple(unreadable))
 
 
-def _explain(
-    truth: Truth, judged: Mapping[str, JudgedQuantity], digits: int
-) -> tuple[dict[str, dict[tuple[int, ...], str]], list[Note], list[Diagnosis]]:
-    """Return what wrong entries follow from, which quantities agree with each other, and the mistakes.
+class _Explanation(NamedTuple):
+    """Reasons of wrong entries of equations and transforms."""
 
-    If an answer is too long for that, return a note instead.
-    """
+    follows: Mapping[str, Mapping[tuple[int, ...], str]] = {}
+    """Wrong answer from which a wrong entry follows, by quantity and index."""
+    notes: Sequence[Note] = ()
+    """Which quantities agree with each other; that an answer is too long to be explained."""
+    diagnosis: Sequence[Diagnosis] = ()
+    """Mistakes."""
+
+
+def _explain(truth: Truth, judged: Mapping[str, JudgedQuantity], digits: int) -> _Explanation:
+    """Return the reasons of wrong entries; only a note if an answer is too long for that."""
     consistency = Consistency(truth, judged)
     try:
         follows = {name: consistency.follows(name) for name in judged}
-        return follows, consistency.notes(), explain_mistakes(truth, judged, digits, follows)
+        return _Explanation(follows, consistency.notes(), explain_mistakes(truth, judged, digits, follows))
     except RingError as error:
-        return {}, [Note(NoteKind.NOT_EXPLAINED, values=(str(error)[:160],))], []
+        note = Note(NoteKind.NOT_EXPLAINED, values=(str(error)[:160],))
+        return _Explanation(notes=[note])
 
 
 def _is_empty(value: object) -> bool:
@@ -452,7 +469,9 @@ def _factorization(truth: Truth, judged: JudgedQuantity) -> NoteKind | None:
     if any(finding.verdict is Verdict.ROUNDED for finding in judged.findings.values()):
         return NoteKind.BY_TORQUES  # of rounded decimals only the torques are known to be right
     M = truth.with_numbers("M", truth.of("M"), judged.numbers)
-    rate = np.array([[entry.by_time() for entry in row] for row in M], dtype=object)
+    rate = np.empty_like(M)
+    for index, entry in np.ndenumerate(M):
+        rate[index] = entry.by_time()
     N = rate - 2 * C
     is_skew = all(element.is_zero for element in (N + N.T).flat)
     return NoteKind.SKEW if is_skew else NoteKind.NOT_SKEW

@@ -77,8 +77,8 @@ class _Layout:
     @property
     def outputs(self) -> list[int]:
         """First row of each output, and the row after the last."""
-        start = self.inputs[-1]
-        return [start, *(start + x for x in accumulate(variable.size for variable in self.graph.outputs))]
+        sizes = [variable.size for variable in self.graph.outputs]
+        return list(accumulate(sizes, initial=self.inputs[-1]))
 
 
 def llvm_source(graph: Graph, types: Sequence[str]) -> str:

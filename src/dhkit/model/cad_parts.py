@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -84,12 +85,16 @@ def cad_parts(
         if not names:
             raise ModelError(f"{folder}: no mesh files; expected .stl, .obj, .ply or .dae files, or one .mat file")
         assignment = assign_parts(names, links, files, str(folder))
-        paths = {name: file_inside(folder, name) for several in assignment.parts.values() for name in several}
+        assigned = chain.from_iterable(assignment.parts.values())
+        paths = {name: file_inside(folder, name) for name in assigned}
         for path in paths.values():  # all headers before the first file is read
             _check_count(str(path), mesh_header(path, BOUNDS.cad_bytes).triangles or 0, simplify)
         max_triangles = BOUNDS.cad_triangles if simplify is None else BOUNDS.simplified_triangles
         parts = {name: _read_part(name, path, max_triangles) for name, path in paths.items()}
-    return {i: tuple(parts[name] for name in several) for i, several in assignment.parts.items()}, assignment.note
+    parts_by_link = {}
+    for link, part_names in assignment.parts.items():
+        parts_by_link[link] = tuple(parts[name] for name in part_names)
+    return parts_by_link, assignment.note
 
 
 def _check_count(where: str, count: int, simplify: int | None) -> None:

@@ -76,10 +76,13 @@ class _Document:
     def mesh(self) -> TriangleMesh:
         instance = self.root.find("scene/instance_visual_scene")
         scene = self._named(instance) if instance is not None else self.root.find("library_visual_scenes/visual_scene")
+        pieces: list[TriangleMesh] = []
         if scene is not None:
-            pieces = [piece for node in scene.findall("node") for piece in self._node(node, np.eye(4), 0)]
+            for node in scene.findall("node"):
+                pieces += self._node(node, np.eye(4), 0)
         else:
-            pieces = [mesh for geometry in self.root.iter("geometry") for _, mesh in self._geometry(geometry)]
+            for geometry in self.root.iter("geometry"):
+                pieces += [mesh for _, mesh in self._geometry(geometry)]
         if not pieces:
             raise ModelError("no triangles")
         mesh = joined_meshes(pieces)

@@ -206,7 +206,8 @@ def _tool_parts(description: Description, last_link: Sequence[Part]) -> list[Par
 def _described_parts(description: Description, shapes: Sequence[Shape], link: int, color: str) -> list[Part]:
     """Return shapes of a link as parts, without meshes whose files are missing or unreadable."""
     values = resolved(description.parameters)
-    poses = {frame: matrix(frame, values) for frame in dict.fromkeys(shape.frame for shape in shapes)}
+    frames = dict.fromkeys(shape.frame for shape in shapes)
+    poses = {frame: matrix(frame, values) for frame in frames}
     parts: list[Part] = []
     for shape in shapes:
         geometry = shape.geometry

@@ -37,7 +37,7 @@ _MASS_UNITS = {"grams": 1e-3, "gram": 1e-3, "kilograms": 1.0, "kilogram": 1.0, "
 """Mass units by SolidWorks' names, kg."""
 _LENGTH_UNITS = {"millimeters": 1e-3, "centimeters": 1e-2, "meters": 1.0, "inches": 0.0254, "feet": 0.3048}
 """Length units by SolidWorks' names, m."""
-_ENTRY_NAMES = [["xx", "xy", "xz"], ["yx", "yy", "yz"], ["zx", "zy", "zz"]]
+_ENTRY_NAMES = ("xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz")
 _MAX_MISFIT_RATIO = 0.2
 """The sign is decided if one tensor's misfit to another block is below this share of the other tensor's misfit."""
 _WARNED_ROUNDING = 1e-3
@@ -179,9 +179,9 @@ class _ReportReader:
         """Return a block's nine entries as listed, kg m^2, and half a unit of the last decimals, shape (3, 3)."""
         unit = self._moment_unit(block)
         entries = self._entries(block, letter)
-        if missing := [name for row in _ENTRY_NAMES for name in row if name not in entries]:
+        if missing := [name for name in _ENTRY_NAMES if name not in entries]:
             raise self._error(f"no {letter}{missing[0]}; expected nine entries {letter}xx ... {letter}zz", block)
-        numbers = np.array([[entries[name] for name in row] for row in _ENTRY_NAMES])
+        numbers = np.array([entries[name] for name in _ENTRY_NAMES]).reshape(3, 3, 2)
         listed = unit * numbers[..., 0]
         half = unit * numbers[..., 1]
         if np.any(np.abs(listed - listed.T) > 2 * (half + half.T)):
@@ -192,6 +192,10 @@ class _ReportReader:
         following = _BLOCK.search(self.text, block.end())
         matches = _ENTRY.finditer(self.text, block.end(), following.start() if following else len(self.text))
         return {match[2]: self._number(match[3], match) for match in matches if match[1] == letter}
+
+    def _axis(self, match: re.Match[str]) -> tuple[_Number, _Number, _Number]:
+        """Return the coordinates of a principal axis from its line."""
+        return self._number(match[2], match), self._number(match[3], match), self._number(match[4], match)
 
     def _moment_unit(self, block: re.Match[str]) -> float:
         words = block[1].lower().replace("*", " ").split()
@@ -251,8 +255,9 @@ class _ReportReader:
             tensor = _with_products_times(-sign, listed)
             deviation = float(np.abs(np.linalg.eigvalsh(tensor) - np.sort(moments)).max())
             if set(axes) == set("xyz"):
-                rows = np.array([[self._number(axes[k][j], axes[k]).value for j in (2, 3, 4)] for k in "xyz"])
-                last = max(self._number(axes["x"][j], axes["x"]).half for j in (2, 3, 4))
+                listed_axes = [self._axis(axes[k]) for k in "xyz"]
+                rows = np.array([[x.value, y.value, z.value] for x, y, z in listed_axes])
+                last = max(number.half for number in listed_axes[0])
                 residual = np.abs(rows @ tensor - moments[:, None] * rows).max() - 4 * last * np.abs(moments).max()
                 deviation = max(deviation, float(residual))
             deviations.append(deviation)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -167,7 +168,7 @@ def chain_of(tree: UrdfTree, base: str | None = None, tip: str | None = None, *,
 
 def _require_no_fault(tree: UrdfTree, joints: Sequence[UrdfJoint], groups: Sequence[Sequence[str]]) -> None:
     """Refuse a chain with a joint or a link that could not be read."""
-    links = [tree.links[link] for group in groups for link in group]
+    links = [tree.links[link] for link in itertools.chain.from_iterable(groups)]
     parts: list[UrdfJoint | UrdfLink] = [*joints, *links]
     for part in parts:
         if part.fault is not None:
@@ -329,7 +330,7 @@ def _notes(
     side: Side,
 ) -> list[str]:
     names = _names(joints)
-    links = {link for group in groups for link in group}
+    links = set(itertools.chain.from_iterable(groups))
     notes = [
         str(warning)
         for warning in tree.warnings

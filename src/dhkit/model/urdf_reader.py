@@ -250,7 +250,9 @@ class _UrdfReader:
             return None
         mass = number(str(name), inertial.find("mass"), "value")
         keys = ("ixx", "iyy", "izz", "ixy", "iyz", "ixz")
-        moments = [x for key in keys for x in numbers(str(name), inertial.find("inertia"), key, 1)]
+        moments: list[float] = []
+        for key in keys:
+            moments += numbers(str(name), inertial.find("inertia"), key, 1)
         if mass is None or len(moments) != len(keys):
             raise ModelError(f"{name}: <inertial> lacks mass or inertia; expected value, {', '.join(keys)}")
         if mass < 0:
@@ -286,8 +288,9 @@ class _UrdfReader:
         where = f"{name}: {shape.tag}"
         parent = shape.find("geometry")
         for element in [] if parent is None else parent:
-            keys = _GEOMETRY_SIZES.get(element.tag, ())
-            sizes = [size for key, count in keys for size in numbers(where, element, key, count)]
+            sizes: list[float] = []
+            for key, count in _GEOMETRY_SIZES.get(element.tag, ()):
+                sizes += numbers(where, element, key, count)
             entries = [exact(size) for size in sizes] if sizes and min(sizes) > 0 else []
             match element.tag, entries:
                 case "mesh", _:

@@ -93,11 +93,11 @@ class CheckReport:
         return repr_line("CheckReport", f"{self.program} against {self.robot}", score)
 
     def _repr_html_(self) -> str:
-        rows = [
-            (function, part.name, f"{part.points:.3g} of {part.most:g}", part.text)
-            for function, parts in self.functions.items()
-            for part in parts
-        ]
+        rows = []
+        for function, parts in self.functions.items():
+            for part in parts:
+                points = f"{part.points:.3g} of {part.most:g}"
+                rows.append((function, part.name, points, part.text))
         title = f"{self.program} against {self.robot}: {self.points:g} of {self.most:g} points"
         return html_block(title, html_table(("function", "part", "points", ""), rows), html_lines(self.notes))
 

@@ -93,10 +93,16 @@ def _single(quantity: str) -> Callable[[Workload], Task]:
         function = method(workload.arm, quantity)
         inputs = workload.inputs(quantity)
         items = list(zip(*inputs, strict=True))
-        return Task(
-            one_by_one(function, items),
-            lambda k: [_answers(quantity, function(*(x[None] for x in item)))[0] for item in items[:k]],
-        )
+
+        def first_answers(count: int) -> list[Array]:
+            """Return the answers to the first items, each called as a batch of one."""
+            found = []
+            for item in items[:count]:
+                batch_of_one = [x[None] for x in item]
+                found.append(_answers(quantity, function(*batch_of_one))[0])
+            return found
+
+        return Task(one_by_one(function, items), first_answers)
 
     return setup
 

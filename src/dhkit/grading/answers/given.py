@@ -45,7 +45,7 @@ _SYSTEM = re.compile(
 )
 """Environments whose rows are statements."""
 
-POSE_NAMES = ("px", "py", "pz", *(f"r{i}{j}" for i in "123" for j in "123"))
+POSE_NAMES = ("px", "py", "pz", "r11", "r12", "r13", "r21", "r22", "r23", "r31", "r32", "r33")
 """Names of the tool's pose in the world, the data of inverse kinematics: its origin, m, and its rotation by rows."""
 
 Answer: TypeAlias = object
@@ -110,7 +110,7 @@ def vocabulary_of(
     further = (*POSE_NAMES, *table_lengths(description)) if inverse else ()
     names = sheet.names
     vocabulary = Vocabulary(description, q=names.q, qd=names.qd, qdd=names.qdd, sums=sums, further=further)
-    steps = [text for step in sheet.steps for text in (*step.equations, *step.solutions)]
+    steps = [[*step.equations, *step.solutions] for step in sheet.steps]
     texts = _texts([sheet.answers, sheet.table, sheet.branches, steps, names.parameters])
     vocabulary.first_index = first_index(texts, vocabulary)
     if vocabulary.first_index is None and sheet.file.endswith((".py", ".ipynb")):
@@ -339,10 +339,13 @@ def _mirrored(given: Sequence[Given]) -> tuple[Given, ...]:
     """Return the entries of a symmetric matrix: those that are missing from the other half."""
     by_index = {entry.index: entry for entry in given}
     other_half = [by_index[entry.index[::-1]] for entry in given]
-    return tuple(
-        replace(other, index=entry.index) if entry.is_missing and not other.is_missing else entry
-        for entry, other in zip(given, other_half, strict=True)
-    )
+    mirrored = []
+    for entry, other in zip(given, other_half, strict=True):
+        if entry.is_missing and not other.is_missing:
+            mirrored.append(replace(other, index=entry.index))
+        else:
+            mirrored.append(entry)
+    return tuple(mirrored)
 
 
 def given_rows(rows: Sequence[Sequence[str]], n: int, vocabulary: Vocabulary) -> list[tuple[Given, ...]]:
@@ -369,11 +372,19 @@ def given_branches(branches: Sequence[Sequence[str]], n: int, vocabulary: Vocabu
     for k, branch in enumerate(branches, start=1):
         if len(branch) != n:
             raise AnswerError(f"ik: branch {k}: found {len(branch)} formulas; expected {n}, one a joint")
-    return _given_lists([[with_pose_entries(text, vocabulary) for text in branch] for branch in branches], vocabulary)
+    named_branches = []
+    for branch in branches:
+        named = [with_pose_entries(text, vocabulary) for text in branch]
+        named_branches.append(named)
+    return _given_lists(named_branches, vocabulary)
 
 
 def _given_lists(lists: Sequence[Sequence[str]], vocabulary: Vocabulary) -> list[tuple[Given, ...]]:
-    return [tuple(_read((i, k), text, vocabulary) for k, text in enumerate(texts)) for i, texts in enumerate(lists)]
+    given = []
+    for i, texts in enumerate(lists):
+        entries = tuple(_read((i, k), text, vocabulary) for k, text in enumerate(texts))
+        given.append(entries)
+    return given
 
 
 def _read(index: tuple[int, ...], value: Answer, vocabulary: Vocabulary) -> Given:
@@ -399,7 +410,10 @@ def _flat(
             return [(index, value)]
         expected = "an expression in quotes, or a number"
     elif isinstance(value, list) and len(value) == shape[0]:
-        return [entry for k, part in enumerate(value) for entry in _flat(name, part, shape[1:], (*index, k))]
+        entries: list[tuple[tuple[int, ...], Answer]] = []
+        for k, part in enumerate(value):
+            entries += _flat(name, part, shape[1:], (*index, k))
+        return entries
     else:
         expected = f"a list of {shape[0]}"
     kind = f"a list of {len(value)}" if isinstance(value, list) else str(value)[:40] or "nothing"
@@ -414,8 +428,12 @@ def _from_one_text(
     """Return the entries of a matrix, a vector or a number that stands in one text, of one matrix or of several."""
     try:
         if is_algebra(text, vocabulary, matrix_of):
+            # An entry of a product has no text of its own: each is shown as the whole formula.
             shown = text.strip()[: BOUNDS.unread_characters]
-            rows = [[(shown, tree) for tree in row] for row in read_algebra(text, vocabulary, matrix_of)]
+            rows = []
+            for trees in read_algebra(text, vocabulary, matrix_of):
+                row = [(shown, tree) for tree in trees]
+                rows.append(row)
         else:
             rows = read_matrix(text, vocabulary)
     except AnswerError as error:

@@ -7,6 +7,7 @@ import unicodedata
 from bisect import bisect_right
 from collections.abc import Sequence
 from itertools import accumulate, chain, pairwise
+from typing import NamedTuple
 
 from dhkit.errors import AnswerError
 from dhkit.expressions.syntax import Token, Tree
@@ -72,23 +73,28 @@ def read_matrix(text: str, vocabulary: Vocabulary) -> list[list[tuple[str, Tree]
     if end < start:
         hint = "; a matrix that it names is not on the sheet" if re.search(r"[A-Za-z]", text) else ""
         raise AnswerError(f"expected a matrix in brackets, found {text[:60]!r}{hint}")
-    before, after, is_transposed = _factors(tokens[:start], tokens[end + 1 :], text)
+    factors = _factors(tokens[:start], tokens[end + 1 :], text)
     entry_count = sum(token.text in (*_COLUMN_SIGNS, *_ROW_SIGNS) for token in tokens)
     rows = _rows(tokens[start : end + 1], text) if entry_count <= BOUNDS.matrix_entries else []
     if entry_count > BOUNDS.matrix_entries or sum(map(len, rows)) > BOUNDS.matrix_entries:
         raise AnswerError(f"a matrix of more than {BOUNDS.matrix_entries} entries")
-    if is_transposed and len(rows) > 1 and max(map(len, rows)) > 1:
+    if factors.is_transposed and len(rows) > 1 and max(map(len, rows)) > 1:
         if len(set(map(len, rows))) > 1:
             raise AnswerError(f"{quote(text)}: rows of different lengths, transposed")
         rows = [list(column) for column in zip(*rows, strict=True)]
 
-    def with_factors(entry: Sequence[Token]) -> Sequence[Token]:
-        return [*before, *in_brackets(entry, entry[0].at), *after] if entry and (before or after) else entry
+    def read_entry(entry: Sequence[Token]) -> tuple[str, Tree]:
+        """Return the text of an entry, and its tree with the factors before and after the matrix."""
+        factors_and_entry = entry
+        if entry and (factors.before or factors.after):
+            factors_and_entry = [*factors.before, *in_brackets(entry, entry[0].at), *factors.after]
+        return _typed(entry, places, text), answer_tree(factors_and_entry, vocabulary, text)
 
-    return [
-        [(_typed(entry, places, text), answer_tree(with_factors(entry), vocabulary, text)) for entry in row]
-        for row in rows
-    ]
+    pairs = []
+    for row in rows:
+        entries = [read_entry(entry) for entry in row]
+        pairs.append(entries)
+    return pairs
 
 
 def matrix_tokens(text: str, vocabulary: Vocabulary) -> tuple[list[Token], str]:
@@ -211,12 +217,25 @@ def _with_diagonal(tokens: list[Token], text: str) -> list[Token]:
     matrix: list[Token] = []
     for i, entry in enumerate(entries):
         for j in range(len(entries)):
-            matrix += [sign("," if j else ";", at), *(entry if j == i else zero)]
+            separator = "," if j else ";"
+            matrix.append(sign(separator, at))
+            matrix += entry if j == i else zero
     is_of_module = k > 1 and tokens[k - 1].text == "." and tokens[k - 2].kind == "name"
     return [*tokens[: k - 2 * is_of_module], sign("[", at), *matrix[1:], sign("]", at), *tokens[end + 1 :]]
 
 
-def _factors(before: list[Token], after: list[Token], text: str) -> tuple[list[Token], list[Token], bool]:
+class _Factors(NamedTuple):
+    """Factors of a matrix in brackets."""
+
+    before: list[Token]
+    """Tokens of the factors before it."""
+    after: list[Token]
+    """Tokens of the factors after it."""
+    is_transposed: bool
+    """Whether a sign after it transposes it."""
+
+
+def _factors(before: list[Token], after: list[Token], text: str) -> _Factors:
     """Return the factors before and after a matrix, and whether it is transposed.
 
     Raises
@@ -248,7 +267,7 @@ def _factors(before: list[Token], after: list[Token], text: str) -> tuple[list[T
         for token, depth in zip(tokens, depths, strict=True):
             if depth == 0 and token.kind == "sign" and token.text in ("+", "-"):
                 fail(text, token.at, "a matrix in a sum with a number (write it into the entries that have it)")
-    return before, after, is_transposed
+    return _Factors(before, after, is_transposed)
 
 
 def _strip(tokens: list[Token]) -> list[Token]:
@@ -276,13 +295,15 @@ def _rows(tokens: Sequence[Token], text: str) -> list[list[list[Token]]]:
                 fail(text, row[0].at if row else inner[-1].at, "a row that is not in brackets, beside rows that are,")
         return [_split(row[1:-1], _COLUMN_SIGNS, text) for row in rows]
     may_have_spaces = not is_latex(text) and not is_mathematica(text)
-    return [
-        _split_at_spaces(row, text)
-        if may_have_spaces and not places_outside_brackets(row, *_COLUMN_SIGNS)
-        else _split(row, _COLUMN_SIGNS, text)
-        for row in _split(inner, _ROW_SIGNS, text)
-        if row
-    ]
+    rows_of_entries = []
+    for row in _split(inner, _ROW_SIGNS, text):
+        if not row:
+            continue
+        if may_have_spaces and not places_outside_brackets(row, *_COLUMN_SIGNS):
+            rows_of_entries.append(_split_at_spaces(row, text))
+        else:
+            rows_of_entries.append(_split(row, _COLUMN_SIGNS, text))
+    return rows_of_entries
 
 
 def _split(tokens: Sequence[Token], signs: Sequence[str], text: str) -> list[list[Token]]:

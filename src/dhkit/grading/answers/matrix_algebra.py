@@ -15,6 +15,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from itertools import chain
 from typing import TypeAlias
 
 from dhkit.errors import AnswerError
@@ -145,7 +146,14 @@ class _MatrixReader:
             hint = "; g is the parameter, write G for the answer to g" if is_gravity else ""
             raise AnswerError(f"{quote(self.text)}: a sum of matrices of {found}{hint}")
         ((m, n),) = sizes
-        return [[Sum(tuple((added, rows[i][j]) for added, rows in matrices)) for j in range(n)] for i in range(m)]
+        total: Rows = []
+        for i in range(m):
+            row: list[Tree] = []
+            for j in range(n):
+                entries = tuple((added, rows[i][j]) for added, rows in matrices)
+                row.append(Sum(entries))
+            total.append(row)
+        return total
 
     def _terms(self, tokens: Sequence[Token]) -> list[tuple[bool, list[Token]]]:
         """Split a sum at the signs between its terms: each is added or subtracted."""
@@ -195,7 +203,10 @@ class _MatrixReader:
         """Return the value of the factor at k if it is, or contains, a matrix; None of numbers."""
         first = tokens[k]
         if _begins_matrix(tokens, k, self.text):
-            rows = [[self._entry(entry, first) for entry in row] for row in matrix_rows(inside, self.text)]
+            rows: Rows = []
+            for row in matrix_rows(inside, self.text):
+                entries = [self._entry(entry, first) for entry in row]
+                rows.append(entries)
             if len(set(map(len, rows))) != 1:
                 fail(self.text, first.at, "a matrix whose rows have different lengths")
             return rows
@@ -279,7 +290,7 @@ class _MatrixReader:
         if _is_number(left) or _is_number(right):
             number, rows = (left, right) if _is_number(left) else (right, left)
             factor = number[0][0] if isinstance(number, list) else number
-            return [[Product(((True, factor), (True, entry))) for entry in row] for row in _as_matrix(rows)]
+            return _scaled(factor, _as_matrix(rows))
         return self._product_of(_as_matrix(left), _as_matrix(right))
 
     def _product_of(self, left: Rows, right: Rows) -> Rows:
@@ -296,7 +307,20 @@ class _MatrixReader:
                 f"{quote(self.text)}: more than {BOUNDS.matrix_products} products of matrices, or too large ones"
             )
         columns = list(zip(*right, strict=True))
-        return [[_dot(row, column) for column in columns] for row in left]
+        product: Rows = []
+        for row in left:
+            entries = [_dot(row, column) for column in columns]
+            product.append(entries)
+        return product
+
+
+def _scaled(factor: Tree, matrix: Rows) -> Rows:
+    """Return a number times a matrix."""
+    scaled: Rows = []
+    for row in matrix:
+        entries: list[Tree] = [Product(((True, factor), (True, entry))) for entry in row]
+        scaled.append(entries)
+    return scaled
 
 
 def _dot(row: Sequence[Tree], column: Sequence[Tree]) -> Tree:
@@ -322,7 +346,7 @@ def _as_matrix(value: _Value) -> Rows:
 
 
 def _as_column(rows: Rows) -> Rows:
-    return [[entry] for row in rows for entry in row]
+    return [[entry] for entry in chain.from_iterable(rows)]
 
 
 def _are_vectors(sizes: set[tuple[int, int]]) -> bool:

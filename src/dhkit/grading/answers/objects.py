@@ -160,15 +160,22 @@ def _casadi_entries(value: Any, n: int, names: frozenset[str]) -> Any:
         if not 1 <= value.n_in() <= len(_STATES) or value.n_out() != 1:
             raise AnswerError(f"{value.name()}: expected a function of (q), (q, qd) or (q, qd, qdd) with one result")
         try:
-            states = [[casadi.SX.sym(f"{name}{i}") for i in range(1, n + 1)] for name in _STATES[: value.n_in()]]
-            value = value(*(casadi.vertcat(*state) for state in states))
+            states = []
+            for name in _STATES[: value.n_in()]:
+                symbols = [casadi.SX.sym(f"{name}{i}") for i in range(1, n + 1)]
+                states.append(casadi.vertcat(*symbols))
+            value = value(*states)
         except RuntimeError as error:
             raise AnswerError(f"{value.name()}: {str(error).splitlines()[-1][:200]}") from None
     if isinstance(value, casadi.DM):
         return _squeeze(value.full().tolist())
     if not isinstance(value, casadi.SX):
         raise AnswerError(f"found casadi.{type(value).__name__}; expected SX, DM or a Function that takes SX")
-    rows = [[_CasadiScalar(value[i, j], names) for j in range(value.shape[1])] for i in range(value.shape[0])]
+    m, n_columns = value.shape
+    rows = []
+    for i in range(m):
+        row = [_CasadiScalar(value[i, j], names) for j in range(n_columns)]
+        rows.append(row)
     return rows[0][0] if value.shape == (1, 1) else _squeeze(rows)
 
 

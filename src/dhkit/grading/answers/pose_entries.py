@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import product
 
 from dhkit.grading.answers.vocabulary import Meaning, Vocabulary
 
@@ -12,7 +13,15 @@ _BY_TWO = re.compile(
 """Entry by two indices: in round brackets (MATLAB) and double ones (Mathematica) from 1, else (Python) from 0."""
 _BY_ONE = re.compile(r"(?<![\w.\\])([pP])\s*(?:\(\s*(\d)\s*\)|\[\s*(\d)\s*\])")
 _PAUL = {
-    f"{letter}{axis}": f"r{row}{column}" for column, letter in enumerate("noa", 1) for row, axis in enumerate("xyz", 1)
+    "nx": "r11",
+    "ny": "r21",
+    "nz": "r31",
+    "ox": "r12",
+    "oy": "r22",
+    "oz": "r32",
+    "ax": "r13",
+    "ay": "r23",
+    "az": "r33",
 }
 """Paul's columns of the tool's rotation: n, o and a."""
 
@@ -37,9 +46,9 @@ def with_pose_entries(text: str, vocabulary: Vocabulary) -> str:
 
 def other_names() -> dict[str, Meaning]:
     """Return other names of the pose's entries: T14, R13, Px, and Paul's ax."""
-    names = {f"T{i}{j}": _entry("T", i, j) for i in (1, 2, 3) for j in (1, 2, 3, 4)}
-    names |= {f"R{i}{j}": f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)}
-    names |= {f"P{axis}": f"p{axis}" for axis in "xyz"} | _PAUL
+    names = {f"T{i}{j}": _entry("T", i, j) for i, j in product((1, 2, 3), (1, 2, 3, 4))}
+    names |= {f"R{i}{j}": _entry("R", i, j) for i, j in product((1, 2, 3), (1, 2, 3))}
+    names |= {"Px": "px", "Py": "py", "Pz": "pz", **_PAUL}
     return {name: (entry,) for name, entry in names.items() if entry is not None}
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from typing import NamedTuple
 
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.bounds import BOUNDS
@@ -58,6 +59,17 @@ class _LostError(Exception):
     """A character that belongs to nothing."""
 
 
+class _Piece(NamedTuple):
+    """A tall bracket or a fraction inside a block, already in one line."""
+
+    end: int
+    """Column after its last one."""
+    text: str
+    """Its formula in one line."""
+    rows: Sequence[int]
+    """Rows that the line of the formula around it may be: those of the bracket, or that of the fraction's bar."""
+
+
 @dataclass(frozen=True)
 class _Block:
     """A rectangle of characters, with how deep it is nested."""
@@ -76,16 +88,15 @@ class _Block:
 
     def text(self) -> str:
         """Return the block's formula in one line."""
-        pieces: dict[int, tuple[int, str]] = {}  # brackets and fractions: their end and text by their first column
+        pieces: dict[int, _Piece] = {}  # by their first column
         taken = [False] * self.width
         allowed = set(range(len(self.lines)))
         for column in range(self.width):
             piece = None if taken[column] else self._bracket(column) or self._fraction(column)
             if piece is not None:
-                end, text, rows = piece
-                pieces[column] = (end, text)
-                taken[column:end] = [True] * (end - column)
-                allowed &= set(rows)
+                pieces[column] = piece
+                taken[column : piece.end] = [True] * (piece.end - column)
+                allowed &= set(piece.rows)
         if not allowed:
             raise _LostError("a fraction's bar that is not on the line of what stands beside it")
         free = set()
@@ -98,14 +109,14 @@ class _Block:
             raise _LostError("a character below the line")
         return self._join(pieces, base)
 
-    def _join(self, pieces: dict[int, tuple[int, str]], base: int) -> str:
+    def _join(self, pieces: dict[int, _Piece], base: int) -> str:
         """Return the line ``base``, with the pieces and the powers above it put in."""
         texts: list[str] = []
         column = 0
         while column < self.width:
             if column in pieces:
-                column, text = pieces[column]
-                texts.append(text)
+                texts.append(pieces[column].text)
+                column = pieces[column].end
                 continue
             if all(line[column] == " " for r, line in enumerate(self.lines) if r != base):
                 texts.append(self.lines[base][column])
@@ -123,8 +134,8 @@ class _Block:
     def _is_above(self, column: int, base: int) -> bool:
         return any(line[column] != " " for line in self.lines[:base])
 
-    def _bracket(self, column: int) -> tuple[int, str, Sequence[int]] | None:
-        """Return a tall bracket that begins in a column: where it ends, its text, and its rows."""
+    def _bracket(self, column: int) -> _Piece | None:
+        """Return the tall bracket that begins in a column; None if there is none."""
         top = next((row for row, line in enumerate(self.lines) if line[column] in _TALL_BRACKETS), None)
         if top is None:
             return None
@@ -148,10 +159,11 @@ class _Block:
         if any(line[column : end + 1].strip() for r, line in enumerate(self.lines) if r not in rows):
             raise _LostError("a character above or below a bracket")
         inner = self.part(slice(top, bottom + 1), slice(column + 1, end))
-        return end + 1, inner.matrix() if hook == "⎡" else f"({inner.text()})", rows
+        text = inner.matrix() if hook == "⎡" else f"({inner.text()})"
+        return _Piece(end + 1, text, rows)
 
-    def _fraction(self, column: int) -> tuple[int, str, Sequence[int]] | None:
-        """Return a fraction whose bar begins in a column, the longest of those that do: its end, text, and row."""
+    def _fraction(self, column: int) -> _Piece | None:
+        """Return the fraction whose bar begins in a column, with the longest such bar; None if there is none."""
         bars = [
             (len(line) - len(line[column:].lstrip(_BAR)), row)
             for row, line in enumerate(self.lines)
@@ -166,22 +178,32 @@ class _Block:
             raise _LostError("a bar without a numerator or a denominator")
         top = above.text()
         bottom = below.text()
-        return end, f"{top}/{bottom}" if (top, bottom) in _DERIVATIVES else f"(({top})/({bottom}))", [row]
+        is_derivative = (top, bottom) in _DERIVATIVES
+        text = f"{top}/{bottom}" if is_derivative else f"(({top})/({bottom}))"
+        return _Piece(end, text, [row])
 
     def matrix(self) -> str:
         """Return the inside of a matrix as a list of rows: blank lines part rows, two blank columns entries."""
         rows = [block.split_columns() for block in self.split_rows()]
         if len({len(row) for row in rows}) != 1:
             raise _LostError("a matrix whose rows have different lengths")
-        return "[" + ", ".join("[" + ", ".join(entry.text() for entry in row) + "]" for row in rows) + "]"
+        row_texts = []
+        for row in rows:
+            entries = ", ".join(entry.text() for entry in row)
+            row_texts.append(f"[{entries}]")
+        return f"[{', '.join(row_texts)}]"
 
     def split_rows(self) -> list[_Block]:
         groups = groupby(range(len(self.lines)), key=lambda row: bool(self.lines[row].strip()))
         filled = [list(rows) for is_filled, rows in groups if is_filled]
         return [self.part(slice(rows[0], rows[-1] + 1)) for rows in filled]
 
+    def _is_blank(self, column: int) -> bool:
+        return all(line[column] == " " for line in self.lines)
+
     def split_columns(self) -> list[_Block]:
-        blank = [all(line[c] == " " for line in self.lines) for c in range(self.width)] + [True, True]
+        # Two blank columns are added, which end the last entry.
+        blank = [self._is_blank(column) for column in range(self.width)] + [True, True]
         blocks: list[_Block] = []
         start = None
         for column, is_blank in enumerate(blank):

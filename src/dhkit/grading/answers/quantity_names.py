@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain, combinations
 
 from dhkit.description import Description
 from dhkit.grading.answers.bounds import BOUNDS
@@ -94,11 +95,13 @@ class QuantityNames:
         if second is not None:
             readings = [(letters + digits, first, second), (letters, number, second)]
         else:
+            # Digits: one index; two indices; digits of the name, and then two indices.
             cuts = range(1, len(number))
             readings = [(letters, number)]
             readings += [(letters, number[:k], number[k:]) for k in cuts]
-            readings += [(letters + number[:i], number[i:k], number[k:]) for i in cuts for k in cuts if i < k]
-        return list(dict.fromkeys(target for reading in readings for target in self._entry(*reading)))
+            readings += [(letters + number[:i], number[i:k], number[k:]) for i, k in combinations(cuts, 2)]
+        targets = chain.from_iterable(self._entry(*reading) for reading in readings)
+        return list(dict.fromkeys(targets))
 
     def _entry(self, head: str, *numbers: str) -> Iterable[Target]:
         """Yield the entry of a vector with one number, or of a matrix with two, counted from 1."""

@@ -275,7 +275,9 @@ class _Rewriting:
             nearest = vocabulary.nearest(token.text[:60])
             return fail(self.text, at, f"unknown name {token.text[:60]!r} ({nearest})")
         vocabulary.taken_for[token.text] = " ".join(pieces)
-        words = [word for piece in pieces for word in ("*", *(vocabulary.find(piece) or ()))]
+        words: list[str] = []
+        for piece in pieces:
+            words += ["*", *(vocabulary.find(piece) or ())]
         return _written_out(words[1:], at)
 
     # Functions

@@ -52,12 +52,16 @@ def typeset_equations(equations: Sequence[tuple[Tree, Tree]]) -> tuple[str, str]
     >>> typeset_equations([(read("q1"), read("atan2(py, px)")), (read("q2"), read("pz"))])
     ('q1 = atan2(py, px); q2 = pz', 'q_{1} = \\mathrm{atan2}(p_{y}, p_{x}), \\quad q_{2} = p_{z}')
     """
-    sides = [(typeset(left), typeset(right)) for left, right in equations]
-    if not all(text for side in sides for text, _ in side):
-        return "", ""
-    plain = "; ".join(f"{left[0]} = {right[0]}" for left, right in sides)
-    latex = r", \quad ".join(f"{left[1]} = {right[1]}" for left, right in sides)
-    return plain, latex
+    plain = []
+    latex = []
+    for left, right in equations:
+        left_text, left_latex = typeset(left)
+        right_text, right_latex = typeset(right)
+        if not left_text or not right_text:
+            return "", ""
+        plain.append(f"{left_text} = {right_text}")
+        latex.append(f"{left_latex} = {right_latex}")
+    return "; ".join(plain), r", \quad ".join(latex)
 
 
 class _Text(NamedTuple):

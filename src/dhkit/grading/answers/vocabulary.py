@@ -30,7 +30,15 @@ _SPELLINGS = (
 )
 """Functions that may be called, each with its spellings."""
 
-FUNCTION_NAMES = {spelling: name for name, spellings in _SPELLINGS.items() for spelling in spellings.split()}
+
+def _function_by_spelling() -> dict[str, str]:
+    functions: dict[str, str] = {}
+    for function, spellings in _SPELLINGS.items():
+        functions |= dict.fromkeys(spellings.split(), function)
+    return functions
+
+
+FUNCTION_NAMES = _function_by_spelling()
 """The function of each spelling."""
 
 _ANGLES = ("q", "th", "theta", "Theta", "vartheta", "t", "phi", "varphi")
@@ -261,8 +269,9 @@ class Vocabulary:
         if len(number) > 3 or not all(digit in self.numbers for digit in number):
             return []
         digits = [self.numbers[digit] for digit in number]
-        in_a_row = all(b == a + 1 for a, b in pairwise(digits))
-        return digits if in_a_row and all(self.kinds[k - 1] == "R" for k in digits) else []
+        are_in_a_row = all(b == a + 1 for a, b in pairwise(digits))
+        are_revolute = all(self.kinds[k - 1] == "R" for k in digits)
+        return digits if are_in_a_row and are_revolute else []
 
     def _sine_or_cosine(self, name: str) -> Meaning | None:
         """Return the sine or the cosine of a sum of joint angles: c1, s12, c_{1-2}."""
@@ -323,7 +332,8 @@ class Vocabulary:
             *self.symbols,
             *FUNCTION_NAMES,
         ]
-        known += [f"{kind}{i}" for i in range(1, len(self.kinds) + 1) for kind in ("q", "qd", "qdd", "c", "s")]
+        for i in range(1, len(self.kinds) + 1):
+            known += [f"q{i}", f"qd{i}", f"qdd{i}", f"c{i}", f"s{i}"]
         known = [other for other in known if len(other) <= BOUNDS.name_characters]
         close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
         own = (other for other in self.own if len(other) <= BOUNDS.name_characters and other not in self.aliases)
@@ -335,7 +345,9 @@ def _sum_of(terms: Sequence[Meaning]) -> Meaning:
     """Return a sum in brackets; one term as it is."""
     if len(terms) == 1:
         return terms[0]
-    tokens = [token for term in terms for token in ("+", *term)]
+    tokens: list[str] = []
+    for term in terms:
+        tokens += ["+", *term]
     return ("(", *tokens[1:], ")")
 
 

@@ -138,12 +138,14 @@ def judge_sampled(name: str, answer: SampledAnswer, truth: Truth, seed: int = 0)
 
     generators = np.array([np.array(sample.generators, dtype=float) for sample in listed]).T
     flat = [np.broadcast_to(element.value(generators), _SAMPLES) for element in right.reshape(-1)]
-    rates = [np.array([state[f"qd{i + 1}"] for state in states]) for i in range(n)]
+    rates = np.empty((_SAMPLES, n))
+    for i in range(n):
+        rates[:, i] = [state[f"qd{i + 1}"] for state in states]
     sampled = _SampledValues(
         called=answer.name,
         answer=values,
         expected=np.stack(flat, axis=-1).reshape(_SAMPLES, *right.shape),
-        rates=np.stack(rates, axis=-1),
+        rates=rates,
         state_of=states.__getitem__,
         group=GROUP,
         verdict=Verdict.SAMPLED,
@@ -212,7 +214,8 @@ def _call_at_states(
 
     def work() -> bytes:
         try:
-            results = [_call(name, function, [state[k] for state in states], shape) for k in range(_SAMPLES)]
+            # A sample is one row of each of the arrays q, qd and qdd.
+            results = [_call(name, function, list(sample), shape) for sample in zip(*states, strict=True)]
         except AnswerError as error:
             return _ERROR_MARK + str(error).encode("utf-8", "replace")
         return np.array(results).tobytes()

@@ -207,7 +207,7 @@ class MistakeSearch:
 
     def _explain_several(self, branch: Branch, agreeing: list[Edit]) -> Iterator[Explanation]:
         """Yield changes of the same part, or of the same names, in several formulas."""
-        size = sum(sum(1 for _ in parts_of(tree)) for tree in branch.trees)
+        size = len(list(chain.from_iterable(map(parts_of, branch.trees))))
         if size > BOUNDS.edited_nodes * branch.n:
             return
         equal = equal_parts(branch.trees)

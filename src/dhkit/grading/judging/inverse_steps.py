@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -97,6 +98,17 @@ def judge_steps(
     return replace(other, notes=(*other.notes, Note(NoteKind.TABLE_ANGLES, "ik")))
 
 
+class _JudgedStep(NamedTuple):
+    """Judgement of one step."""
+
+    entry: Entry
+    """Its verdict."""
+    diagnosis: list[Diagnosis]
+    """Mistakes in its parts."""
+    notes: list[Note]
+    """Remarks, and roots that it lacks."""
+
+
 class _Judge(StepContext):
     """Judges the steps of one sheet, in their order."""
 
@@ -109,11 +121,11 @@ class _Judge(StepContext):
         self.solutions = Solutions(self)
         for k, step in enumerate(steps):
             before = list(dict.fromkeys(other.joint for other in steps[:k]))
-            entry, found, note = self._step(k, step, before, [j for j in before if j in wrong])
-            entries.append(entry)
-            diagnosis += found
-            notes += note
-            if entry.verdict is Verdict.WRONG and step.joint not in self.solutions.solved:
+            judged = self._step(k, step, before, [j for j in before if j in wrong])
+            entries.append(judged.entry)
+            diagnosis += judged.diagnosis
+            notes += judged.notes
+            if judged.entry.verdict is Verdict.WRONG and step.joint not in self.solutions.solved:
                 wrong.append(step.joint)
 
         missing = sorted({*range(self.description.n)} - {step.joint for step in steps})
@@ -125,10 +137,8 @@ class _Judge(StepContext):
             notes.append(Note(NoteKind.ASKED_FOR, "ik", self.poses.pose_parts))
         return KinematicJudgement(tuple(entries), tuple(diagnosis), tuple(notes))
 
-    def _step(
-        self, k: int, step: GivenStep, before: Sequence[int], wrong: Sequence[int]
-    ) -> tuple[Entry, list[Diagnosis], list[Note]]:
-        """Return the entry of step k, from 0, its diagnosis, and notes.
+    def _step(self, k: int, step: GivenStep, before: Sequence[int], wrong: Sequence[int]) -> _JudgedStep:
+        """Return the judgement of step k, from 0.
 
         Parameters
         ----------
@@ -143,7 +153,7 @@ class _Judge(StepContext):
         if step.error:
             if step.joint not in before:
                 self.solutions.skip(step.joint)
-            return Entry("ik", (k,), Verdict.UNREADABLE, step.text, statement=step.error), [], []
+            return _JudgedStep(Entry("ik", (k,), Verdict.UNREADABLE, step.text, statement=step.error), [], [])
 
         parts: list[Part] = []
         notes: list[Note] = []
@@ -164,7 +174,7 @@ class _Judge(StepContext):
                     notes.append(Note(NoteKind.ROOTS_MISSING, name, (str(roots[0]), str(roots[1]))))
         except AnswerError as error:
             self.solutions.skip(step.joint)
-            return Entry("ik", (k,), Verdict.UNREADABLE, step.text, statement=str(error)), [], []
+            return _JudgedStep(Entry("ik", (k,), Verdict.UNREADABLE, step.text, statement=str(error)), [], [])
         notes += [Note(NoteKind.STEP_REMARK, name, (one.remark,)) for one in parts if one.remark]
 
         worst = max(parts, key=lambda part: part.verdict.severity)
@@ -190,7 +200,7 @@ class _Judge(StepContext):
             witness=witness,
             read=read,
         )
-        return entry, found, notes
+        return _JudgedStep(entry, found, notes)
 
     def _diagnosis(self, k: int, step: GivenStep, part: Part) -> Diagnosis:
         """Return the diagnosis of the first mistake in a part of step k, from 0."""

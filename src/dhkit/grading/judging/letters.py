@@ -10,7 +10,7 @@ one of these terms, the letter was left out there.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -148,7 +148,7 @@ def _without_written(tree: Tree, whole: Collection[Fraction] = ()) -> Tree:
             return tree if inner is base else replace(tree, base=inner, exponent=exponent)
         case Sum(terms):
             changed = tuple((added, _without_written(term, whole)) for added, term in terms)
-            return tree if all(a[1] is b[1] for a, b in zip(changed, terms, strict=True)) else Sum(changed)
+            return Sum(changed) if _differ(changed, terms) else tree
         case Product(factors):
             parts: list[tuple[bool, Tree]] = []
             for is_factor, factor in factors:
@@ -156,7 +156,12 @@ def _without_written(tree: Tree, whole: Collection[Fraction] = ()) -> Tree:
                 if inner is _NOTHING:
                     return _NOTHING
                 parts.append((is_factor, inner))
-            return tree if all(a[1] is b[1] for a, b in zip(parts, factors, strict=True)) else Product(tuple(parts))
+            return Product(tuple(parts)) if _differ(parts, factors) else tree
         case Name() | Call():
             return tree
     return tree
+
+
+def _differ(changed: Sequence[tuple[bool, Tree]], parts: Sequence[tuple[bool, Tree]]) -> bool:
+    """Whether a term or factor was replaced: the trees that were not are the same objects."""
+    return any(new is not old for (_, new), (_, old) in zip(changed, parts, strict=True))

@@ -377,5 +377,5 @@ def _euler_lagrange(answer: Quotient, truth: Element) -> Sequence[Element]:
 
 def _accelerates(element: Element) -> bool:
     """Whether an element depends on an acceleration."""
-    places = [element.ring.place("acceleration", i) for i in range(element.ring.n)]
-    return any(any(monomial[place] for place in places) for monomial in element.terms)
+    ring = element.ring
+    return element.contains_any(ring.place("acceleration", i) for i in range(ring.n))

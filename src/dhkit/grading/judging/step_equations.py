@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +55,17 @@ _NO_CHANGE = 1e-7
 """Largest derivative of an equation, relative to the size of its terms, per rad or per reach, that is rounding."""
 _SAME_RANK = 1e-5
 """Smallest singular value of a Jacobian, as a share of its largest one, that counts for its rank."""
+
+
+class _Identity(NamedTuple):
+    """Judgement of a difference that should be zero."""
+
+    verdict: Verdict
+    """Whether it is zero for the arm's pose."""
+    statement: str
+    """Reason of the verdict; empty for a wrong equation."""
+    difference: str | None
+    """The difference as text; None where it is zero, or where it cannot be written exactly."""
 
 
 class Equations:
@@ -167,8 +179,8 @@ class Equations:
             f"other values of {own}, so that the equation does not determine {own}",
         )
 
-    def _identity(self, tree: Tree) -> tuple[Verdict, str, str | None]:
-        """Return the verdict on a difference that should be zero for the arm's pose, the reason, and the difference.
+    def _identity(self, tree: Tree) -> _Identity:
+        """Return the judgement of a difference that should be zero for the arm's pose.
 
         It is tried as an identity for any lengths first, then as one for the lengths of this arm.
         """
@@ -187,11 +199,12 @@ class Equations:
             except (OutsideTheRingError, RingError, AnswerError):
                 continue
             if element.is_zero:
-                return Verdict.CORRECT, statement, None
+                return _Identity(Verdict.CORRECT, statement, None)
             difference = difference or _shown(element)
         if np.max(np.abs(self.residual(tree))) > _ZERO:
-            return Verdict.WRONG, "", difference
-        return Verdict.UNDECIDED, f"holds at {len(self.context.poses.q)} random poses; tried, not proved", None
+            return _Identity(Verdict.WRONG, "", difference)
+        tried = f"holds at {len(self.context.poses.q)} random poses; tried, not proved"
+        return _Identity(Verdict.UNDECIDED, tried, None)
 
     def _element(self, tree: Tree, chain: ExactChain, known: dict[str, Fraction]) -> Element:
         """Return the numerator of a difference, with the pose of the arm put in for px ... r33.
@@ -311,10 +324,14 @@ class Equations:
         def number_at_s(x: object) -> float:
             return float(np.broadcast_to(np.asarray(x), len(residual))[s])
 
-        left, right = (number_at_s(doubles(side, values)) for side in self.step.equations[k])
+        def finite_at_s(side: Tree) -> float | None:
+            value = number_at_s(doubles(side, values))
+            return value if np.isfinite(value) else None
+
+        left, right = self.step.equations[k]
         state = {name: number_at_s(values[name]) for name in POSE_NAMES}
         state |= {f"q{i + 1}": float(x) for i, x in enumerate(self.context.poses.q[s])}
-        witness = Witness(state, left if np.isfinite(left) else None, right if np.isfinite(right) else None)
+        witness = Witness(state, finite_at_s(left), finite_at_s(right))
         subject = f"equation {k + 1}" if len(self.differences) > 1 else "equation"
         part = Part(Verdict.WRONG, f"{subject}: no identity of the arm", difference=difference, witness=witness)
         if self.context.explain:

@@ -128,7 +128,7 @@ class Solutions:
             divided: list[Hypothesis] = []
             for hypothesis in self._hypotheses:
                 parts = self._divided(hypothesis, self.unsolved)
-                divided += [part for part in parts if any(np.any(choice.alive) for choice in part)]
+                divided += [part for part in parts if _is_alive(part)]
             self._hypotheses = divided[: BOUNDS.hypotheses]
             self.unsolved = []
         return self._hypotheses
@@ -416,6 +416,11 @@ class Solutions:
 def _all_choices(parts: Sequence[dict[int, Choice]]) -> Hypothesis:
     """Return the hypothesis that all choices of some parts are possible."""
     return tuple(chain.from_iterable(part.values() for part in parts))
+
+
+def _is_alive(hypothesis: Hypothesis) -> bool:
+    """Whether a hypothesis is possible at some pose."""
+    return any(np.any(choice.alive) for choice in hypothesis)
 
 
 def _has_pairs(hypothesis: Hypothesis, step: GivenStep) -> bool:

@@ -128,7 +128,9 @@ class TableArm:
     def of_rows(cls, rows: Sequence[Row], kinds: str, convention: Convention, values: Mapping[str, float]) -> TableArm:
         """Return the arm of exact rows, at given values of parameters."""
         at_zero = dict(values) | {f"q{i + 1}": 0.0 for i in range(len(kinds))}
-        entries = np.array([[number_of(entry, at_zero) for entry in row] for row in rows])
+        entries = np.empty((len(rows), 4))
+        for i, row in enumerate(rows):
+            entries[i] = [number_of(entry, at_zero) for entry in row]
         return cls(convention, kinds, entries, np.ones(len(kinds)))
 
     @classmethod

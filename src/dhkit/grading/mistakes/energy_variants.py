@@ -80,7 +80,9 @@ def _parts(textbook: TextbookDerivation) -> list[_Part]:
     parts: list[_Part] = []
     for i, link in enumerate(textbook.links, start=1):
         has_several = len(link.bodies) > 1
-        parts += [_Part(i, motion.body.name if has_several else None, motion) for motion in link.bodies]
+        for motion in link.bodies:
+            name = motion.body.name if has_several else None
+            parts.append(_Part(i, name, motion))
     return parts
 
 

@@ -19,7 +19,7 @@ from dhkit.grading.mistakes.wording import diagnosis_of_slip
 from dhkit.symbolic import ExactArm
 from dhkit.symbolic.equations import plain_text
 from dhkit.symbolic.exact.compact import shortened_alike
-from dhkit.symbolic.ring import Element
+from dhkit.symbolic.ring import Element, Monomial
 
 _MAX_NAMED_TERMS = 3
 """Largest number of terms of each kind that a description names."""
@@ -105,7 +105,11 @@ def _is_weight(truth: Truth, difference: Element) -> bool:
     places = [k for k, generator in enumerate(difference.ring.generators) if generator.text in names]
     if not places:
         return True
-    return all(any(monomial[k] for k in places) for monomial in difference.terms)
+
+    def contains_gravity(monomial: Monomial) -> bool:
+        return any(monomial[k] for k in places)
+
+    return all(map(contains_gravity, difference.terms))
 
 
 def distinct(quantity: JudgedQuantity) -> list[Index]:

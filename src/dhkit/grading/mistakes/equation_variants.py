@@ -82,14 +82,20 @@ def _steps(truth: Truth) -> Iterator[Variant]:
 def _mass_rate(lag: Lagrangian, momenta: Elements) -> Elements:
     """Return dM/dt qd, for the momenta p = M qd: sum over k of dp/dq_k qd_k."""
     ring = lag.arm.ring
-    rates = [ring.sum(p.by_position(k) * ring.rate(k) for k in range(ring.n)) for p in momenta]
+    rates = []
+    for p in momenta:
+        rate_of_p = ring.sum(p.by_position(k) * ring.rate(k) for k in range(ring.n))
+        rates.append(rate_of_p)
     return element_array(rates)
 
 
 def _without_chain_rule(lag: Lagrangian, momenta: Elements) -> Elements:
     """Return the change of h if d/dt of cos(q) is taken for -sin(q), without the rate of q."""
     ring = lag.arm.ring
-    without_rates = [ring.sum(p.by_position(k) for k in range(ring.n)) for p in momenta]
+    without_rates = []
+    for p in momenta:
+        gradient_sum = ring.sum(p.by_position(k) for k in range(ring.n))
+        without_rates.append(gradient_sum)
     return element_array(without_rates) - _mass_rate(lag, momenta)
 
 

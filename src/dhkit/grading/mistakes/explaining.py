@@ -277,8 +277,11 @@ def _parts(truth: Truth, judged: Mapping[str, JudgedQuantity], quantity: JudgedQ
         return []
     tables = tables_of(truth, quantity)
     split = _split_in_parts(truth, quantity.name, differences)
-    wrong = {part: whole for part, whole in split.items() if not all(x.is_zero for x in whole.values())}
-    right = {part: whole for part, whole in split.items() if part not in wrong}
+    wrong: dict[str, Differences] = {}
+    right: dict[str, Differences] = {}
+    for part, whole in split.items():
+        is_right = all(difference.is_zero for difference in whole.values())
+        (right if is_right else wrong)[part] = whole
 
     def leaves_right_parts(variant: Variant) -> bool:
         unchanged = [tables.changes_none(variant, part, list(whole)) for part, whole in right.items()]
@@ -341,8 +344,13 @@ def _split_in_parts(truth: Truth, name: str, differences: Differences) -> Mappin
     names = ("M", "h", "g") if name == "tau" else ("K", "V")
     parts: dict[str, dict[Index, Element]] = {part: {} for part in names}
     for index, element in differences.items():
-        moving = {m: c for m, c in element.terms.items() if any(m[k] for k in rates)}
-        resting = {m: c for m, c in element.terms.items() if not any(m[k] for k in (*rates, *accelerations))}
+        moving = {}
+        resting = {}
+        for monomial, coefficient in element.terms.items():
+            if any(monomial[k] for k in rates):
+                moving[monomial] = coefficient
+            elif not any(monomial[k] for k in accelerations):
+                resting[monomial] = coefficient
         if name == "L":
             # L = K - V
             parts["K"][index] = ring.from_terms(moving)

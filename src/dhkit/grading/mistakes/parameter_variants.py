@@ -152,14 +152,11 @@ def _replaced(truth: Truth, values: Mapping[str, Element]) -> Addition:
         if constant.text not in values and not constant.symbols.isdisjoint(values)
     ]
 
-    def depends(element: Element) -> bool:
-        return any(any(monomial[k] for k in dependent) for monomial in element.terms)
-
     def adds(quantity: str) -> Elements:
         whole = right_value(truth.lagrangian, quantity)
         if quantity == "tau" and truth.friction:
             whole = whole + truth.viscous
-        if dependent and any(map(depends, whole.flat)):
+        if dependent and any(element.contains_any(dependent) for element in whole.flat):
             return whole * 0
         return translated_array(whole, places) - whole
 

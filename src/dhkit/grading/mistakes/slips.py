@@ -67,7 +67,7 @@ def kind_of_terms(arm: ExactArm, terms: Element) -> str:
         gravity |= component.symbols
 
     # Names in the terms, also those of which a constant of the ring is made.
-    used = [g for k, g in enumerate(terms.ring.generators) if any(monomial[k] for monomial in terms.terms)]
+    used = [terms.ring.generators[k] for k in sorted(terms.used_generators)]
     constants: set[str] = set()
     for generator in used:
         if generator.kind == "constant":

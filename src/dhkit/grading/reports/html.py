@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from html import escape
+from itertools import chain
 
 from dhkit.grading.bounds import BOUNDS
 from dhkit.grading.grade_report import Entry, GradeReport, Verdict, worst_verdict
@@ -148,7 +149,8 @@ def _equation(latex: str, text: str) -> str:
 
 def _marks_table(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
     """Return the table of a class's marks: a row for each sheet, a column for each quantity."""
-    quantities = list(dict.fromkeys(mark.name for sheet in marks for mark in sheet.quantities))
+    all_marks = chain.from_iterable(sheet.quantities for sheet in marks)
+    quantities = list(dict.fromkeys(mark.name for mark in all_marks))
     heads = "".join(f"<th>{_text(head, 40)}</th>" for head in ("student", "verdict", "points", *quantities))
     rows = [f"<tr>{heads}</tr>"]
     for number, (report, sheet) in enumerate(zip(reports, marks, strict=True), start=1):

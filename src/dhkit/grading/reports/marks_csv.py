@@ -6,6 +6,7 @@ import csv
 import io
 import re
 from collections.abc import Sequence
+from itertools import chain
 
 from dhkit.grading.grade_report import GradeReport
 from dhkit.grading.marks import Marks
@@ -33,7 +34,8 @@ def cell(text: str) -> str:
 
 def marks_csv(reports: Sequence[GradeReport], marks: Sequence[Marks]) -> str:
     """Return the marks of sheets as CSV text, in the order given."""
-    quantities = list(dict.fromkeys(mark.name for sheet in marks for mark in sheet.quantities))
+    all_marks = chain.from_iterable(sheet.quantities for sheet in marks)
+    quantities = list(dict.fromkeys(mark.name for mark in all_marks))
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(

@@ -82,13 +82,23 @@ def hypot(a: SX, b: SX) -> SX:
 
 def rotate(R: SX, vector: tuple[SX, SX, SX]) -> tuple[SX, SX, SX]:
     """Return a vector times a 3 x 3 matrix."""
-    x, y, z = (sum(R[i, k] * vector[k] for k in range(3)) for i in range(3))
-    return x, y, z
+    x, y, z = vector
+    return (
+        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
+        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
+        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
+    )
 
 
 def weighted_sum(weights: tuple[SX, ...], vectors: tuple[tuple[SX, SX, SX], ...]) -> tuple[SX, SX, SX]:
     """Return the sum of vectors times their weights."""
-    x, y, z = (sum(w * vector[k] for w, vector in zip(weights, vectors, strict=True)) for k in range(3))
+    x: SX = 0
+    y: SX = 0
+    z: SX = 0
+    for weight, vector in zip(weights, vectors, strict=True):
+        x = x + weight * vector[0]
+        y = y + weight * vector[1]
+        z = z + weight * vector[2]
     return x, y, z
 
 

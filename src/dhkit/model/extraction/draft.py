@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Sequence
@@ -126,7 +127,8 @@ class Draft:
         # Bodies and shapes are placed in the frames of the rounded table.
         frames = world_to_frames(bare, np.zeros(bare.n))
         tool_pose = np.linalg.inv(frames[-1]) @ chain.zero_poses[chain.tip]
-        has_bodies = any(chain.tree.links[link].inertial is not None for group in chain.groups[1:] for link in group)
+        moving_links = itertools.chain.from_iterable(chain.groups[1:])
+        has_bodies = any(chain.tree.links[link].inertial is not None for link in moving_links)
         joints = tuple(
             replace(
                 joint,

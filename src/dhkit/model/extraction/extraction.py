@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -185,8 +186,8 @@ def _robot_name(chain: Chain) -> str:
 
 def _shapes(chain: Chain, meshes: MeshFinder, notes: list[str]) -> tuple[tuple[tuple[Shape, Array], ...], ...]:
     """Return the shapes of each group of links with their poses in the base; unreadable meshes are noted."""
-    links = [chain.tree.links[link] for group in chain.groups for link in group]
-    has_visuals = any(link.visuals for link in links)
+    link_names = itertools.chain.from_iterable(chain.groups)
+    has_visuals = any(chain.tree.links[link].visuals for link in link_names)
     left_out: list[str] = []
     groups = []
     for group in chain.groups:

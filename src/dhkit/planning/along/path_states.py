@@ -23,7 +23,6 @@ from dhkit.planning.criteria import LoadedArm, Point
 from dhkit.symbolic import Friction
 from dhkit.symbolic.differentiable.friction import friction_parameters, friction_torque
 from dhkit.trajectories import JointPath, Limits
-from dhkit.trajectories.pieces import Side
 
 if TYPE_CHECKING:
     import casadi
@@ -116,9 +115,16 @@ class PathStates:
 
         and the tool's position p has p' = J q', p'' = J q'' + Jd q', with Jd for the rates q'.
         """
-        pieces = [path.pieces.differentiated(order) for order in range(4)]
-        ends: tuple[tuple[Array, Side], ...] = ((knots[:-1], "right"), (knots[1:], "left"))
-        q, qs, qss, qsss = (np.stack([piece(s, side) for s, side in ends]) for piece in pieces)
+
+        def at_both_ends(order: int) -> Array:
+            """Return the derivative of q by s of an order at both ends of each interval, shape (2, K, n)."""
+            derivative = path.pieces.differentiated(order)
+            return np.stack([derivative(knots[:-1], "right"), derivative(knots[1:], "left")])
+
+        q = at_both_ends(0)
+        qs = at_both_ends(1)
+        qss = at_both_ends(2)
+        qsss = at_both_ends(3)
         still = np.zeros_like(q)
         m = still
         c = still

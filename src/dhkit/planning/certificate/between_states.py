@@ -202,7 +202,9 @@ def _travels(states: States, steps: NDArray[np.int_], beside_axes: float) -> Arr
 
 def _longest_lever(states: States) -> float:
     """Return a bound, m, of the distance of any point of a capsule's axis from any joint's axis."""
-    ends = [point for capsule in link_capsules(states.description) for point in (capsule.start, capsule.end)]
+    ends: list[Array] = []
+    for capsule in link_capsules(states.description):
+        ends += [capsule.start, capsule.end]
     outside = max((float(np.linalg.norm(point)) for point in ends), default=0.0)
     strokes = np.abs(states.q[:, states.description.numbers.prismatic]).max(axis=0, initial=0.0)
     return states.description.reach + outside + float(strokes.sum())

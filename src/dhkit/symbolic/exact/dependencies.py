@@ -157,7 +157,10 @@ class _Regressor:
                 continue
 
             # Cramer's rule for A f = y: f_j = det(A with column j replaced by y) / det(A)
-            A = [[self._entry(k, other) for other in support] for k in rows]
+            A = []
+            for k in rows:
+                row = [self._entry(k, other) for other in support]
+                A.append(row)
             y = [self._entry(k, name) for k in rows]
             denominator = _determinant(A)
             numerators = [_determinant(_with_column(A, j, y)) for j in range(len(A))]

@@ -183,6 +183,15 @@ class Element:
             used.update(k for k, exponent in enumerate(monomial) if exponent)
         return used
 
+    def contains_any(self, generators: Iterable[int]) -> bool:
+        """Whether a term of the normal form contains one of some generators, given by their indices in the ring."""
+        listed = list(generators)
+
+        def contains(monomial: Monomial) -> bool:
+            return any(monomial[k] for k in listed)
+
+        return any(map(contains, self.terms))
+
     @cached_property
     def _products(self) -> list[tuple[float, list[tuple[int, int]]]]:
         """Coefficient of each term, with the indices of its generators and their exponents."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.tokens import word_set
@@ -183,19 +184,27 @@ def matrix_rows(formula: str) -> list[list[str]] | None:
             rows[-1][-1] += piece
     if not "".join(rows[-1]).strip():
         rows.pop()
-    return [[entry.strip() for entry in row] for row in rows]
+    stripped_rows = []
+    for row in rows:
+        stripped = [entry.strip() for entry in row]
+        stripped_rows.append(stripped)
+    return stripped_rows
 
 
 def has_symmetry_marks(formula: str) -> bool:
     """Whether a formula is a matrix in which signs stand for entries."""
-    return any(_is_mark(entry) for row in matrix_rows(formula) or () for entry in row)
+    entries = chain.from_iterable(matrix_rows(formula) or ())
+    return any(_is_mark(entry) for entry in entries)
 
 
 def marked_places(rows: list[list[str]]) -> set[tuple[int, int]]:
     """Return the places, from 0, where a sign or nothing refers to the other half; none where both halves have one."""
-    places = {(i, j) for i, row in enumerate(rows) for j, entry in enumerate(row) if not entry or _is_mark(entry)}
+    places = set[tuple[int, int]]()
+    for i, row in enumerate(rows):
+        places |= {(i, j) for j, entry in enumerate(row) if not entry or _is_mark(entry)}
     is_one_half = len({i > j for i, j in places}) == 1
-    return places if is_one_half and all(i != j for i, j in places) else set()
+    is_off_diagonal = all(i != j for i, j in places)
+    return places if is_one_half and is_off_diagonal else set()
 
 
 def _is_mark(entry: str) -> bool:

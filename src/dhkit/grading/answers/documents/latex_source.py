@@ -107,7 +107,8 @@ def _statements(text: str) -> Iterator[Statement]:
     for display in _displays(text):
         inside, problems = _expand(display.inside, macros)
         statements = list(latex_statements(inside, display.line))
-        lost = [why for name, why in problems.items() if not any(f"\\{name}" in s.text for s in statements)]
+        whole_text = "\n".join(statement.text for statement in statements)
+        lost = [why for name, why in problems.items() if f"\\{name}" not in whole_text]
         for k, statement in enumerate(statements):
             used = [why for name, why in problems.items() if _uses(statement.text, name)]
             if used or lost:

@@ -270,7 +270,8 @@ def _statements_of_rows(rows: Sequence[Row], problem: str) -> list[Statement]:
             statements[refused:] = [replace(s, problem=s.problem or why) for s in statements[refused:]]
             refused = len(statements)
         own = problem or (words + alone if alone else "")
-        statements += [_statement(bare, line, own) for piece in _equations(part) if (bare := _bare(piece))]
+        equations = [_bare(piece) for piece in _equations(part)]
+        statements += [_statement(equation, line, own) for equation in equations if equation]
         alone = "" if is_whole else bare_part[:60]
     return statements
 

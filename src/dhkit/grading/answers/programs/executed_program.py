@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from dhkit.execution.process import Failure, Limits, ProgramError, printable
 from dhkit.grading.answers.bounds import BOUNDS
 from dhkit.grading.answers.programs.program_answers import answers_of, called_name
 from dhkit.grading.answers.programs.robot_names import RobotNames, is_same_number
-from dhkit.grading.answers.programs.scope import Bound, Record, Scope
+from dhkit.grading.answers.programs.scope import Binding, Record, Scope
 from dhkit.grading.answers.programs.values import (
     Function,
     Index,
@@ -119,9 +119,9 @@ def _functions_first(code: SourceCode) -> SourceCode:
         return replace(code, text="\n".join(lines))
     order = [*range(starts[0], len(lines)), *range(starts[0])]
 
-    def line_name(line: int) -> str:
+    def line_name(line_number: int) -> str:
         """Return the name of a line that has moved; one more stands in front."""
-        return code.line_name(order[min(max(line - 2, 0), len(order) - 1)] + 1)
+        return code.line_name(order[min(max(line_number - 2, 0), len(order) - 1)] + 1)
 
     return replace(code, text="\n".join(["1;", *(lines[k] for k in order)]), line_name=line_name)
 
@@ -168,11 +168,11 @@ class _ExecutedProgram:
             hint = "; Octave needs its symbolic package (octave-symbolic)" if "'syms' undefined" in str(error) else ""
             raise AnswerError(f"{file}: executed: {self.error_text(error)}{hint}") from None
         record.note(f"executed, {child.isolation}")
-        self._lines = {name: _whole(line) for name, line in _fields(first.get("names"))}
+        self._lines = {name: _whole(number) for name, number in _fields(first.get("names"))}
         self.functions = [_function(one, self._line) for one in _listed(first.get("functions"))]
         self._bind_names()
         for function in self.functions:
-            self.main.set_argument(function.name, function, function.line)
+            self.main.set_argument(function.name, function, function.where)
 
     def error_text(self, error: ProgramError) -> str:
         """Return an error with the line as messages name it."""
@@ -190,28 +190,28 @@ class _ExecutedProgram:
         robot = self.record.robot
         problem = ""
         for name, line_number in self._lines.items():
-            line = self._line(line_number)
+            where = self._line(line_number)
             is_quantity = bool(robot.quantities.quantity(name) or robot.quantities.entries(name))
             if not is_quantity and not robot.is_reserved(name):
                 continue
             value = self._value_of(name)
             if robot.is_reserved(name) and isinstance(value, Scalar) and _is_constant(value) and name != "pi":
-                problem = problem or self._problem_of_number(name, value, line)
+                problem = problem or self._problem_of_number(name, value, where)
             if is_quantity:
-                self.main.set_argument(name, value, line)
+                self.main.set_argument(name, value, where)
         if problem:
-            for name, bound in list(self.main.names.items()):
-                if not isinstance(bound.value, Unread):
-                    self.main.names[name] = Bound(Unread(problem), Unread(problem), bound.line)
+            for name, binding in list(self.main.names.items()):
+                if not isinstance(binding.value, Unread):
+                    self.main.names[name] = Binding(Unread(problem), Unread(problem), binding.where)
 
-    def _problem_of_number(self, name: str, value: Scalar, line: str) -> str:
+    def _problem_of_number(self, name: str, value: Scalar, where: str) -> str:
         """Return why answers that are made with a number are not judged; empty for the file's own number."""
         robot = self.record.robot
         if not robot.quantities.is_parameter(name):
-            return f"{line}: {name} = {value.text}: the answers are at one state alone; leave {name} a symbol"
+            return f"{where}: {name} = {value.text}: the answers are at one state alone; leave {name} a symbol"
         if is_same_number(robot.parameter_value(name), value.number):
             return ""
-        return f"{line}: {name} = {value.text}; the robot's file has {robot.parameter_value(name)}"
+        return f"{where}: {name} = {value.text}; the robot's file has {robot.parameter_value(name)}"
 
     def _value_of(self, name: str) -> Value:
         try:
@@ -263,7 +263,7 @@ class _ExecutedProgram:
                 continue
             scope = Scope(self.record, self.main, frozenset(function.definition))
             for name, tree in _fields(answer.get("locals")):
-                scope.set_argument(name, self._value(tree, answer), function.line)
+                scope.set_argument(name, self._value(tree, answer), function.where)
             self._refuse_changed(function, value, scope)
             return self._with_names(value, scope), scope
         self.numeric.append(function)
@@ -285,8 +285,8 @@ class _ExecutedProgram:
         are_scalars = isinstance(value, Scalar) and isinstance(local, Scalar)
         are_alike = isinstance(value, Matrix) and isinstance(local, Matrix) and value.shape == local.shape
         if (are_scalars or are_alike) and value != local:
-            reason = f"{function.name} returns something else that it makes of {own[0]}, in {function.line}"
-            scope.set_argument(own[0], Unread(reason), function.line)
+            reason = f"{function.name} returns something else that it makes of {own[0]}, in {function.where}"
+            scope.set_argument(own[0], Unread(reason), function.where)
 
     def local_quantities(self, function: Function) -> list[str]:
         """Return the local names of a function, its arguments aside, that are called like a quantity."""
@@ -303,8 +303,15 @@ class _ExecutedProgram:
         """Return several values with the local names that they are."""
         if not isinstance(value, Several):
             return value
-        names = [next((n for n, b in scope.names.items() if b.value == one), "") for one in value.values]
-        return replace(value, names=tuple(names))
+
+        def local_name(result: Value) -> str:
+            """Return the first local name that stands for a result; empty if none does."""
+            for name, binding in scope.names.items():
+                if binding.value == result:
+                    return name
+            return ""
+
+        return replace(value, names=tuple(local_name(result) for result in value.values))
 
     def returned_names(self, function: Function) -> list[str]:
         """Return the names in a function's result, which are not known of an executed one."""
@@ -312,7 +319,8 @@ class _ExecutedProgram:
 
     def assigned_anywhere(self) -> Iterator[tuple[str, str]]:
         """Yield the names that the program assigns, with their lines."""
-        yield from ((name, self._line(line)) for name, line in self._lines.items())
+        for name, line_number in self._lines.items():
+            yield name, self._line(line_number)
 
     def symbols(self, name: str, function: Function) -> object:
         """Return an argument as names of symbols."""
@@ -524,33 +532,37 @@ def _fields(value: object) -> list[tuple[str, Any]]:
     """Return the fields of an object; none of anything else."""
     if not isinstance(value, dict):
         return []
-    return [
-        (name, one)
-        for name, one in list(value.items())[: BOUNDS.executed_names]
-        if isinstance(name, str) and name.isidentifier()
-    ]
+    return [(name, one) for name, one in list(value.items())[: BOUNDS.executed_names] if _is_identifier(name)]
 
 
 def _listed(value: object) -> list[dict[str, Any]]:
-    return [one for one in value[: BOUNDS.executed_names] if isinstance(one, dict)] if isinstance(value, list) else []
+    if not isinstance(value, list):
+        return []
+    return [one for one in value[: BOUNDS.executed_names] if isinstance(one, dict)]
+
+
+def _is_identifier(value: object) -> TypeGuard[str]:
+    return isinstance(value, str) and value.isidentifier()
 
 
 def _texts(value: object) -> tuple[str, ...]:
-    return tuple(one for one in value if isinstance(one, str) and one.isidentifier()) if isinstance(value, list) else ()
+    if not isinstance(value, list):
+        return ()
+    return tuple(one for one in value if _is_identifier(one))
 
 
 def _whole(value: object) -> int:
     return value if isinstance(value, int) and not isinstance(value, bool) and 0 < value < 10**7 else 0
 
 
-def _function(one: Mapping[str, Any], line: Callable[[int], str]) -> Function:
+def _function(one: Mapping[str, Any], line_name: Callable[[int], str]) -> Function:
     """Return a function of the program; its definition is its local names, and ``captured`` has keys in it."""
     name = one.get("name")
     return Function(
-        name if isinstance(name, str) and name.isidentifier() else "function",
+        name if _is_identifier(name) else "function",
         _texts(one.get("parameters")),
         _texts(one.get("locals")),
-        line(_whole(one.get("line"))),
+        line_name(_whole(one.get("line"))),
         captured=dict.fromkeys(_texts(one.get("keys")), Unread("")),
     )
 

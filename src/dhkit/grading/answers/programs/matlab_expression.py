@@ -28,6 +28,7 @@ from dhkit.grading.answers.programs.values import (
     matrix_of,
     number,
     opposite,
+    row_or_column,
     transposed,
 )
 from dhkit.grading.answers.tokens import rate_name, word_set
@@ -55,7 +56,7 @@ class Program(Protocol):
     """The program, as its expressions see it."""
 
     record: Record
-    bound: set[str]
+    assigned_names: set[str]
     """Names that the program assigns anywhere."""
 
     def value(self, tokens: Tokens, scope: Scope, name: str = "", count: int = 1) -> Value: ...  # noqa: D102
@@ -222,7 +223,7 @@ class MatlabExpression:
     def _called(self, name: str) -> Value:
         """Return the function of a library, or the value, that a name in front of brackets stands for."""
         is_library = name in FUNCTIONS or name in _OTHER_FUNCTIONS
-        if is_library and name not in self.program.bound and self.scope.owner(name) is None:
+        if is_library and name not in self.program.assigned_names and self.scope.owner(name) is None:
             self.scope.value(name)  # notes that the name is read, so that binding it later is refused
             return Library(name)
         return self.scope.value(name)
@@ -260,15 +261,15 @@ class MatlabExpression:
                     return Part(vector, tuple(one), is_slice=True, number=call)
             case Matrix(), [rows, columns] if not value.is_flat:
                 m, n = value.shape
-                i = range(m) if rows == "all" else rows
-                j = range(n) if columns == "all" else columns
-                if isinstance(i, range) and isinstance(j, range) and i and j and i[-1] < m and j[-1] < n:
-                    return matrix_of([[value.entries[(a, b)] for b in j] for a in i])
+                row_places = _places_within(rows, m)
+                column_places = _places_within(columns, n)
+                if row_places is not None and column_places is not None:
+                    return matrix_of(value.part(row_places, column_places))
             case Matrix(), [range() as one] if one and (value.is_flat or 1 in value.shape):  # v(1:2)
                 entries = [self.scope.scalar(self.scope.entry(value, (k,))) for k in one]
                 # A vector that was assigned entry by entry is a row in MATLAB.
                 is_row = value.is_flat or value.shape[0] == 1
-                return matrix_of([entries] if is_row else [[entry] for entry in entries])
+                return row_or_column(entries, is_column=not is_row)
         raise UnreadError(f"{text_of([*inside])[:40]!r} as an index is not read")
 
     def _index_by_names(self, inside: Tokens) -> Index | None:
@@ -340,7 +341,7 @@ class MatlabExpression:
                 lengths = [index + 1 for index in indices if index is not None]
                 if len(lengths) == len(indices) == 2 and min(lengths) == 1:
                     scalars = [self.scope.known(f"{match[1]}{k + 1}") for k in range(max(lengths))]
-                    return matrix_of([[x] for x in scalars] if lengths[0] > 1 else [scalars])
+                    return row_or_column(scalars, is_column=lengths[0] > 1)
             if match and not any(token.is_sign("[") or token.kind == "number" for token in inside):
                 return Given(match[1], is_symbol=True, is_constant=not match[2])
             text = quoted
@@ -409,6 +410,12 @@ def _places(tokens: Tokens) -> range | str:
     raise UnreadError(f"{text_of(tokens)[:40]!r} as an index is not read")
 
 
+def _places_within(chosen: range | str, length: int) -> range | None:
+    """Return the places that an index chooses, a string being a colon alone; None beyond the end of the matrix."""
+    places = range(length) if isinstance(chosen, str) else chosen
+    return places if places and places[-1] < length else None
+
+
 def arguments_of(inside: Tokens) -> list[Tokens]:
     """Return the arguments between brackets, split at commas."""
     depths = list(accumulate(token.nesting for token in inside))
@@ -427,5 +434,9 @@ def arguments_of(inside: Tokens) -> list[Tokens]:
 
 def text_of(tokens: Tokens) -> str:
     """Return tokens in one line, with the spaces between them."""
-    pieces = [(" " if token.is_spaced or token.kind == "row" else "") + token.text.strip() for token in tokens]
+    pieces = []
+    for token in tokens:
+        if token.is_spaced or token.kind == "row":
+            pieces.append(" ")
+        pieces.append(token.text.strip())
     return "".join(pieces).strip()

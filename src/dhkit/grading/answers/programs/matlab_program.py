@@ -46,7 +46,7 @@ from dhkit.grading.answers.programs.values import (
     Unread,
     UnreadError,
     Value,
-    matrix_of,
+    row_or_column,
 )
 from dhkit.grading.answers.tokens import word_set
 
@@ -134,7 +134,7 @@ class MatlabProgram:
         """Number of statements read so far, those of functions at each call."""
         self.depth = 0
         """Number of calls inside each other."""
-        self.bound: set[str] = set()
+        self.assigned_names: set[str] = set()
         """Names that the program assigns anywhere: they are not functions."""
         self.signature_names: set[str] = set()
         """Names in the first lines of the file's functions."""
@@ -145,7 +145,7 @@ class MatlabProgram:
                 raise AnswerError(f"{file}: more than {BOUNDS.statements} statements")
         self.statements = statements
         for statement in statements:
-            self.bound |= statement.assigned_names()
+            self.assigned_names |= statement.assigned_names()
             if statement.keyword == "function":
                 self.signature_names |= {token.text for token in statement.tokens if token.kind == "name"}
         for statement in statements:
@@ -167,7 +167,7 @@ class MatlabProgram:
                 token.kind == "name"
                 and token.text in _RUNS_OTHER_CODE
                 and not is_field
-                and token.text not in self.bound
+                and token.text not in self.assigned_names
             ):
                 raise self._refusal(
                     statement,
@@ -243,12 +243,12 @@ class MatlabProgram:
         if any(token.text == "=" for token in right[1:]):
             raise self._refusal(statement, "found a default of an argument", "arguments by name alone")
         parameters = tuple(token.text for token in right[1:] if token.kind == "name")
-        line = self.line_name(statement.line)
-        function = Function(name, parameters, _Definition(tuple(body), results), line)
+        where = self.line_name(statement.line)
+        function = Function(name, parameters, _Definition(tuple(body), results), where)
         self.functions.append(function)
         # Functions see each other in ``own``, handles see them among the names of ``main``.
-        self.own.bind(name, function, line)
-        self.main.bind(name, function, line)
+        self.own.bind(name, function, where)
+        self.main.bind(name, function, where)
 
     def arguments_as_given(self, function: Function) -> dict[str, Value]:
         """Return a function's arguments as themselves."""
@@ -256,7 +256,7 @@ class MatlabProgram:
         if function.name in function.definition.results:  # ``applied`` refuses it
             values = {}
         for name in set(function.definition.results) & set(values):
-            values[name] = Unread(f"{name} is an argument and an output, in {function.line}")
+            values[name] = Unread(f"{name} is an argument and an output, in {function.where}")
         return values
 
     def applied(self, function: Function, arguments: dict[str, Value]) -> tuple[Value, Scope]:
@@ -270,7 +270,7 @@ class MatlabProgram:
             The function is not read.
         """
         if function.name in function.definition.results:
-            raise UnreadError(f"{function.name} is the name of a function and of its result, in {function.line}")
+            raise UnreadError(f"{function.name} is the name of a function and of its result, in {function.where}")
         if self.depth >= BOUNDS.call_depth:
             raise UnreadError(f"{function.name} calls itself, or functions nested too deep")
         definition: _Definition = function.definition
@@ -281,7 +281,7 @@ class MatlabProgram:
         outer = self.main if definition.formula else self.own
         scope = Scope(self.record, outer, frozenset(local))
         for name, value in {**function.captured, **arguments}.items():
-            scope.set_argument(name, value, function.line)
+            scope.set_argument(name, value, function.where)
         self._refuse_later_names(function)
         self.depth += 1
         try:
@@ -289,16 +289,20 @@ class MatlabProgram:
                 try:
                     return self.value(definition.formula, scope), scope
                 except UnreadError as error:
-                    return Unread(f"{function.line}: {error}"), scope
+                    return Unread(f"{function.where}: {error}"), scope
             self._read_statements(self._without_defaults(definition.statements, function), scope)
         finally:
             self.depth -= 1
         values: list[Value] = []
         names: list[str] = []
         for result in definition.results:
-            bound = scope.names.get(result)
-            names.append(result if bound is not None else "")
-            values.append(bound.value if bound is not None else Unread(f"{result} is not assigned, in {function.line}"))
+            binding = scope.names.get(result)
+            if binding is None:
+                names.append("")
+                values.append(Unread(f"{result} is not assigned, in {function.where}"))
+            else:
+                names.append(result)
+                values.append(binding.value)
         return Several(tuple(values), tuple(names)), scope
 
     def _refuse_later_names(self, function: Function) -> None:
@@ -307,9 +311,9 @@ class MatlabProgram:
         formula = function.definition.formula  # empty for a function
         for k, token in enumerate(formula):
             is_field = k > 0 and formula[k - 1].text == "."
-            if token.kind == "name" and not is_field and token.text in self.bound and token.text not in known:
+            if token.kind == "name" and not is_field and token.text in self.assigned_names and token.text not in known:
                 raise UnreadError(
-                    f"{token.text} is assigned after the handle of {function.line}, which does not see it"
+                    f"{token.text} is assigned after the handle of {function.where}, which does not see it"
                 )
 
     @staticmethod
@@ -347,38 +351,38 @@ class MatlabProgram:
             if self.count > BOUNDS.statements:
                 raise AnswerError(f"{self.file}: more than {BOUNDS.statements} statements")
             word = statement.keyword
-            line = self.line_name(statement.line)
+            where = self.line_name(statement.line)
             if word in _BLOCK_BEGINNINGS:
                 blocks.append(word)
-                self._break(statement, scope, repr(word), line)
+                self._break(statement, scope, repr(word), where)
             elif word in _BLOCK_ENDS:
                 if not blocks:
                     raise self._refusal(statement, f"found {word!r}, which closes nothing")
                 blocks.pop()
             elif word in _BLOCK_BRANCHES and blocks:
-                self._break(statement, scope, repr(word), line)
+                self._break(statement, scope, repr(word), where)
             elif word == "return":
                 if scope is self.main:
                     raise self._refusal(statement, "found 'return' outside a function", "statements that are all run")
                 has_returned = True
                 if blocks:  # the statements after it may not be run
                     for name in scope.local:
-                        scope.change(name, f"{name} may be changed by 'return' in {line}", only_matrices=False)
+                        scope.change(name, f"{name} may be changed by 'return' in {where}", only_matrices=False)
             elif blocks or has_returned:
-                where = repr(blocks[-1]) if blocks else "a statement after 'return'"
+                what = repr(blocks[-1]) if blocks else "a statement after 'return'"
                 self._refuse_script(statement, word)
-                self._break(statement, scope, where, line)
+                self._break(statement, scope, what, where)
             else:
-                self._read_statement(statement, word, scope, line)
+                self._read_statement(statement, word, scope, where)
 
-    def _break(self, statement: MatlabStatement, scope: Scope, what: str, line: str) -> None:
+    def _break(self, statement: MatlabStatement, scope: Scope, what: str, where: str) -> None:
         """Note that a statement changes names in a way that is not read."""
         for name in sorted(statement.assigned_names()):
-            scope.change(name, f"{name[:40]} is changed by {what} in {line}", only_matrices=False)
+            scope.change(name, f"{name[:40]} is changed by {what} in {where}", only_matrices=False)
 
     def _refuse_script(self, statement: MatlabStatement, word: str) -> None:
         """Refuse a word of its own that may be the name of a file, which would be run."""
-        known = {*_KNOWN_WORDS, *self.bound, *self.signature_names}
+        known = {*_KNOWN_WORDS, *self.assigned_names, *self.signature_names}
         if len(statement.tokens) == 1 and word and word not in known:
             raise self._refusal(
                 statement, f"found {word!r}, which may be a script that changes any name", "assignments"
@@ -387,11 +391,11 @@ class MatlabProgram:
     def assigned_anywhere(self) -> Iterator[tuple[str, str]]:
         """Yield the targets of assignments, with their lines: names and fields, those in unread statements too."""
         for statement in self.statements:
-            line = self.line_name(statement.line)
+            where = self.line_name(statement.line)
             for name in sorted(statement.assigned_names() | statement.assigned_fields()):
-                yield name, line
+                yield name, where
 
-    def _read_statement(self, statement: MatlabStatement, word: str, scope: Scope, line: str) -> None:
+    def _read_statement(self, statement: MatlabStatement, word: str, scope: Scope, where: str) -> None:
         """Read a statement outside blocks: ``global``, ``clear``, ``syms``, an assignment, a change or a command."""
         tokens = statement.tokens
         equals = [k for k, token in enumerate(tokens) if token.is_sign("=")]
@@ -401,28 +405,28 @@ class MatlabProgram:
         is_change = changing is not None or tokens[0].text in STEPPING or tokens[-1].text in STEPPING
         if word in ("global", "persistent"):
             for name in statement.command_names:
-                scope.change(name, f"{name[:40]} is changed by {word!r} in {line}", only_matrices=False)
+                scope.change(name, f"{name[:40]} is changed by {word!r} in {where}", only_matrices=False)
         elif word in ("clear", "clearvars"):
             named = [name for name in statement.command_names if name in scope.names]
-            bound = [name for name, one in scope.names.items() if not isinstance(one.value, Function)]
-            for name in named if statement.command_names else bound:
-                scope.change(name, f"{name[:40]} is cleared in {line}", only_matrices=False)
+            variables = [name for name, one in scope.names.items() if not isinstance(one.value, Function)]
+            for name in named if statement.command_names else variables:
+                scope.change(name, f"{name[:40]} is cleared in {where}", only_matrices=False)
         elif word == "syms":
-            self._syms(tokens[0].words, scope, line)
+            self._syms(tokens[0].words, scope, where)
         elif len(equals) > 1 or (equals and (is_change or assigning is None)):
-            self._break(statement, scope, "an assignment inside an expression", line)
+            self._break(statement, scope, "an assignment inside an expression", where)
         elif assigning is not None:
-            self._assign(statement, tokens[:assigning], tokens[assigning + 1 :], scope, line)
+            self._assign(statement, tokens[:assigning], tokens[assigning + 1 :], scope, where)
         elif is_change:
             name, index = _target(tokens[: changing or 0])
             if changing is not None and tokens[changing].text == "+=" and name and index is not None:
-                self._assign_entry(name, index, tokens[changing + 1 :], scope, line, is_added=True)
+                self._assign_entry(name, index, tokens[changing + 1 :], scope, where, is_added=True)
             else:
-                self._break(statement, scope, "an assignment that changes it", line)
+                self._break(statement, scope, "an assignment that changes it", where)
         else:
             self._refuse_script(statement, word)
 
-    def _syms(self, words: str, scope: Scope, line: str) -> None:
+    def _syms(self, words: str, scope: Scope, where: str) -> None:
         """Read ``syms q1(t) m [2 1] real``."""
         words = re.sub(r"^\s*\((.*)\)\s*$", r"\1", words)
         words = re.sub(r"['\",]", " ", words)
@@ -433,66 +437,68 @@ class MatlabProgram:
             if shape:
                 lengths = [int(k) for k in re.findall(r"\d{1,3}", shape)]
                 if len(lengths) != 2 or min(lengths) != 1:
-                    scope.change(name, f"{name[:40]} is made by 'syms' of a matrix in {line}", only_matrices=False)
+                    scope.change(name, f"{name[:40]} is made by 'syms' of a matrix in {where}", only_matrices=False)
                     continue
-                scope.bind(name, self._symbols(name, lengths, scope, line), line)
+                scope.bind(name, self._symbols(name, lengths, scope, where), where)
             elif arguments and arguments.replace(" ", "") != "(t)":
-                reason = f"{name[:40]} is made by 'syms' of a function of other names than t in {line}"
+                reason = f"{name[:40]} is made by 'syms' of a function of other names than t in {where}"
                 scope.change(name, reason, only_matrices=False)
             else:
-                scope.bind(name, Given(name, is_symbol=True, is_constant=not arguments), line)
+                scope.bind(name, Given(name, is_symbol=True, is_constant=not arguments), where)
 
-    def _symbols(self, name: str, lengths: Sequence[int], scope: Scope, line: str) -> Matrix:
+    def _symbols(self, name: str, lengths: Sequence[int], scope: Scope, where: str) -> Matrix:
         """Return the row or the column of symbols of ``syms q [2 1]``."""
         names = [f"{name}{k + 1}" for k in range(max(lengths))]
         for one in names:
-            scope.bind(one, Given(one, is_symbol=True, is_constant=True), line)
+            scope.bind(one, Given(one, is_symbol=True, is_constant=True), where)
         scalars = [Scalar(one, uses=frozenset((scope.key(one),))) for one in names]
-        return matrix_of([[x] for x in scalars] if lengths[0] > 1 else [scalars])
+        return row_or_column(scalars, is_column=lengths[0] > 1)
 
-    def _assign(self, statement: MatlabStatement, left: Tokens, right: Tokens, scope: Scope, line: str) -> None:
+    def _assign(self, statement: MatlabStatement, left: Tokens, right: Tokens, scope: Scope, where: str) -> None:
         """Read ``[M, C] = f(q)``, ``V(q1, q2) = x``, ``M(1, :) = x``, ``M(1, 2) = x``, ``V = x`` and ``p.m1 = x``."""
         if not left:
-            self._break(statement, scope, "an assignment without a name", line)
+            self._break(statement, scope, "an assignment without a name", where)
             return
         if left[0].is_sign("[") and closing(left, 0) == len(left) - 1:
-            self._assign_several(statement, left, right, scope, line)
+            self._assign_several(statement, left, right, scope, where)
             return
         name, index = _target(left)
         if right and self._is_symbolic_function(left, scope):
             name = left[0].text
             index = None
         if right and (place := _row_or_column(left)):
-            self._assign_row_or_column(left[0].text, place, right, scope, line)
+            self._assign_row_or_column(left[0].text, place, right, scope, where)
             return
         if not name or not right:
-            self._break(statement, scope, "an assignment that is not read", line)
+            self._break(statement, scope, "an assignment that is not read", where)
             return
         if index is not None:
-            self._assign_entry(name, index, right, scope, line)
+            self._assign_entry(name, index, right, scope, where)
             return
         try:
             value = self.value(right, scope, name)
         except UnreadError as error:
             names = frozenset(token.text for token in right if token.kind == "name")
-            value = Unread(f"{line}: {error}", names, any(token.is_sign("[") for token in right))
+            value = Unread(f"{where}: {error}", names, any(token.is_sign("[") for token in right))
         if "." not in name:
             if isinstance(value, Function) and scope is self.main:
                 self.functions.append(value)
-            scope.bind(name, value, line)
+            scope.bind(name, value, where)
             return
         # A field, too, is assigned once.
         structure, _, member = name.partition(".")
-        bound = scope.names.get(structure)
-        fields = dict(bound.value.fields) if bound is not None and isinstance(bound.value, Structure) else {}
-        if bound is not None and not isinstance(bound.value, Structure | Given):
-            scope.change(structure, f"{structure[:40]} is changed in {line}", only_matrices=False)
+        binding = scope.names.get(structure)
+        fields = dict(binding.value.fields) if binding is not None and isinstance(binding.value, Structure) else {}
+        if binding is not None and not isinstance(binding.value, Structure | Given):
+            scope.change(structure, f"{structure[:40]} is changed in {where}", only_matrices=False)
         elif member in fields and fields[member] != value:
-            scope.change(structure, f"{name[:40]} is assigned twice, in {line}", only_matrices=False)
+            scope.change(structure, f"{name[:40]} is assigned twice, in {where}", only_matrices=False)
         else:
-            scope.set_argument(structure, Structure({**fields, member: value}), line)
+            scope.set_argument(structure, Structure({**fields, member: value}), where)
 
-    def _assign_several(self, statement: MatlabStatement, left: Tokens, right: Tokens, scope: Scope, line: str) -> None:
+    def _assign_several(
+        self, statement: MatlabStatement, left: Tokens, right: Tokens, scope: Scope, where: str
+    ) -> None:
         """Read ``[M, C] = dynamics(q, qd)`` and ``[a, b] = deal(1, 2)``."""
         if not right:
             raise self._refusal(statement, "found nothing after '='")
@@ -500,19 +506,19 @@ class MatlabProgram:
         names = [entry[0].text if len(entry) == 1 else "" for entry in targets]
         values: Sequence[Value] = ()
         try:
-            if is_call(right, "deal") and "deal" not in self.own.names and "deal" not in self.bound:
+            if is_call(right, "deal") and "deal" not in self.own.names and "deal" not in self.assigned_names:
                 values = [self.value(x, scope) for x in arguments_of(right[2:-1])]
             else:
                 value = self.value(right, scope, "", count=len(names))
                 values = value.values if isinstance(value, Several) else ()
         except UnreadError as error:
-            values = [Unread(f"{line}: {error}")] * len(names)
+            values = [Unread(f"{where}: {error}")] * len(names)
         if len(values) < len(names) or not all(names):
-            self._break(statement, scope, "an assignment that is not read", line)
+            self._break(statement, scope, "an assignment that is not read", where)
             return
         for name, value in zip(names, values, strict=False):
             if name != "~":
-                scope.bind(name, value, line)
+                scope.bind(name, value, where)
 
     @staticmethod
     def _is_symbolic_function(left: Tokens, scope: Scope) -> bool:
@@ -520,48 +526,49 @@ class MatlabProgram:
         if not is_call(left, left[0].text) or left[0].text in scope.names:
             return False
         arguments = [entry[0].text if len(entry) == 1 else "" for entry in arguments_of(left[2:-1])]
-        bound = [scope.names.get(name) for name in arguments]
-        return all(one is not None and isinstance(one.value, Given) and one.value.is_symbol for one in bound)
+        bindings = [scope.names.get(name) for name in arguments]
+        return all(one is not None and isinstance(one.value, Given) and one.value.is_symbol for one in bindings)
 
     def _assign_row_or_column(
-        self, name: str, place: tuple[int | None, int | None], right: Tokens, scope: Scope, line: str
+        self, name: str, place: tuple[int | None, int | None], right: Tokens, scope: Scope, where: str
     ) -> None:
         """Read ``M(1, :) = [a b]``: an entry for each number of the vector."""
         row, column = place
-        bound = scope.names.get(name)
+        binding = scope.names.get(name)
         try:
             value = self.value(right, scope)
             if not isinstance(value, Matrix) or (not value.is_flat and 1 not in value.shape):
                 raise UnreadError(f"{name} is changed by an assignment to a part of it")
             entries = list(value.entries.values())
-            made = bound.value if bound is not None else None
+            made = binding.value if binding is not None else None
             if isinstance(made, Matrix) and not made.is_flat:
                 rows, columns = made.shape
                 if len(entries) != (rows if row is None else columns):
                     raise UnreadError(f"{name} is assigned a row or column of another length")
         except UnreadError as error:
-            scope.change(name, f"{line}: {error}", only_matrices=False)
+            scope.change(name, f"{where}: {error}", only_matrices=False)
             return
         for k, entry in enumerate(entries):
-            index = (k if row is None else row, k if column is None else column)
-            scope.bind_entry(name, index, entry, line)
+            i = k if row is None else row
+            j = k if column is None else column
+            scope.bind_entry(name, (i, j), entry, where)
 
     def _assign_entry(
-        self, name: str, index: Index, right: Tokens, scope: Scope, line: str, is_added: bool = False
+        self, name: str, index: Index, right: Tokens, scope: Scope, where: str, is_added: bool = False
     ) -> None:
         """Read ``M(1, 2) = ...``; ``is_added`` where the value is added to the entry."""
-        bound = scope.names.get(name)
+        binding = scope.names.get(name)
         try:
             value = self.value(right, scope)
             if isinstance(value, Matrix) and len(value.entries) > 1:
                 raise UnreadError(f"{name} is changed by an assignment of a matrix to a part of it")
             scalar = scope.scalar(value)
         except UnreadError as error:
-            scope.change(name, f"{line}: {error}", only_matrices=False)
+            scope.change(name, f"{where}: {error}", only_matrices=False)
             return
-        if not is_added and bound is not None:
+        if not is_added and binding is not None:
             scalar, is_added = _added_part(name, index, right, scalar, self, scope)
-        scope.bind_entry(name, index, scalar, line, is_added)
+        scope.bind_entry(name, index, scalar, where, is_added)
 
     # Expressions
 
@@ -599,7 +606,7 @@ class MatlabProgram:
         parameters = tuple(token.text for token in tokens[2:end] if token.kind == "name")
         if not tokens[end + 1 :]:
             raise UnreadError("'@' is not read")
-        line = self.line_name(tokens[0].line)
+        where = self.line_name(tokens[0].line)
         formula = tuple(tokens[end + 1 :])
         captured: dict[str, Value] = {}
         for token in formula:
@@ -608,7 +615,7 @@ class MatlabProgram:
                     captured[token.text] = scope.value(token.text)
                 except UnreadError as error:
                     captured[token.text] = Unread(str(error))
-        return Function(name, parameters, _Definition(formula=formula), line, captured=captured)
+        return Function(name, parameters, _Definition(formula=formula), where, captured=captured)
 
     def call(self, function: Function, arguments: Sequence[Value], scope: Scope, name: str, count: int) -> Value:
         """Return the value of a call of one of the program's functions."""

@@ -186,8 +186,12 @@ def split_rows(tokens: Tokens) -> list[list[Tokens]]:
             rows[-1].append([])
         depth += token.nesting
         rows[-1][-1].append(token)
-    filled: list[list[Tokens]] = [[entry for entry in row if entry] for row in rows]
-    return [row for row in filled if row]
+    filled_rows: list[list[Tokens]] = []
+    for row in rows:
+        filled: list[Tokens] = [entry for entry in row if entry]
+        if filled:
+            filled_rows.append(filled)
+    return filled_rows
 
 
 def _begins_entry(tokens: Tokens) -> bool:
@@ -251,41 +255,41 @@ class _Tokenizer:
     def _tokens(self, text: str) -> Iterator[MatlabToken]:
         """Yield the tokens outside block comments."""
         depth = 0
-        for number, line in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1):
-            mark = line.strip()
+        for number, line_text in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), start=1):
+            mark = line_text.strip()
             if mark in ("%{", "#{"):
                 depth += 1
             elif depth:
                 depth -= mark in ("%}", "#}")
             else:
-                yield from self._line_tokens(line, number)
+                yield from self._line_tokens(line_text, number)
         if depth:
             raise AnswerError(f"{self.file}: a comment that %{{ begins does not end")
 
-    def _line_tokens(self, line: str, number: int) -> Iterator[MatlabToken]:
+    def _line_tokens(self, line_text: str, number: int) -> Iterator[MatlabToken]:
         """Yield a line's tokens, and its end where it ends a statement or a row of a matrix."""
         at = 0
         is_spaced = True
-        while at < len(line):
-            if match := _SPACE.match(line, at):
+        while at < len(line_text):
+            if match := _SPACE.match(line_text, at):
                 at = match.end()
                 is_spaced = True
                 continue
             is_at_row = self.previous.kind == "row" and not self.brackets
-            if line[at] in "%#" or (line[at] == "!" and is_at_row):
+            if line_text[at] in "%#" or (line_text[at] == "!" and is_at_row):
                 break  # a comment, or a command of the system's
-            if line.startswith("...", at):
+            if line_text.startswith("...", at):
                 self.previous = self.previous if self.brackets else MatlabToken("space", " ", number, True)
                 return
             begins_statement = is_at_row or (not self.brackets and self.previous.text in (";", ","))
-            match = self._match(line, at, number, is_spaced)
+            match = self._match(line_text, at, number, is_spaced)
             kind = str(match.lastgroup)
             text = match[0]
             at = match.end()
             is_command = begins_statement and kind == "name" and text in COMMANDS
-            rest = line[at:] if is_command else ""
-            end = len(line) - len(_behind_words(rest))
-            token = MatlabToken(kind, text, number, is_spaced, line[at:end] if is_command else "")
+            rest = line_text[at:] if is_command else ""
+            end = len(line_text) - len(_behind_words(rest))
+            token = MatlabToken(kind, text, number, is_spaced, line_text[at:end] if is_command else "")
             self._count_bracket(token)
             yield token
             self.previous = token
@@ -296,16 +300,16 @@ class _Tokenizer:
             self.previous = MatlabToken("row", "\n", number, True)
             yield self.previous
 
-    def _match(self, line: str, at: int, number: int, is_spaced: bool) -> re.Match[str]:
+    def _match(self, line_text: str, at: int, number: int, is_spaced: bool) -> re.Match[str]:
         """Match the token that begins in a column of a line."""
         is_in_matrix = bool(self.brackets) and self.brackets[-1][0] in "[{"
         is_transpose = self.previous.ends_operand and not (is_spaced and is_in_matrix)
         pattern = _TOKEN
-        problem = f"found {line[at]!r}, which no statement has"
-        if line[at] == '"' or (line[at] == "'" and not is_transpose):
+        problem = f"found {line_text[at]!r}, which no statement has"
+        if line_text[at] == '"' or (line_text[at] == "'" and not is_transpose):
             pattern = _STRING
             problem = "a string that does not end"
-        match = pattern.match(line, at)
+        match = pattern.match(line_text, at)
         if match is None:
             raise self._error(number, problem)
         return match

@@ -46,10 +46,12 @@ class Notebook:
     starts: tuple[int, ...]
     notes: tuple[str, ...]
 
-    def line_name(self, line: int) -> str:
+    def line_name(self, line_number: int) -> str:
         """Return how messages name a line: ``cell 2, line 3``, cells of code and lines counted from 1."""
-        cell = bisect_right(self.starts, line)
-        return f"cell {cell}, line {line - self.starts[cell - 1] + 1}" if cell else f"line {line}"
+        cell = bisect_right(self.starts, line_number)
+        if not cell:
+            return f"line {line_number}"
+        return f"cell {cell}, line {line_number - self.starts[cell - 1] + 1}"
 
 
 def notebook_code(text: str, file: str) -> Notebook:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.bounds import BOUNDS
@@ -67,8 +67,8 @@ class _Candidate:
     ----------
     target
         The quantity or entry.
-    line
-        Where it is assigned.
+    where
+        The line in which it is assigned, as messages name it.
     value
         Its formula or matrix.
     name
@@ -82,13 +82,24 @@ class _Candidate:
     """
 
     target: Target
-    line: str
+    where: str
     value: Scalar | Matrix | Unread
     name: str
     key: str
     is_alias: bool = False
     is_named_entry: bool = False
     function: str = ""
+
+
+class _Result(NamedTuple):
+    """One result of a function."""
+
+    name: str
+    """Local name that is returned; empty for a formula."""
+    called: str
+    """Name that tells the quantity: the local name, or the function's if that is a quantity's."""
+    value: Value
+    """Its formula or matrix."""
 
 
 def called_name(function: Function) -> str:
@@ -135,7 +146,7 @@ class _ProgramAnswers:
     def _note_unjudged(self, answers: Iterable[str]) -> None:
         """Name the quantities that the program assigns where nothing is read, such as a branch or a class."""
         noted = set(answers)
-        for name, line in self.program.assigned_anywhere():
+        for name, where in self.program.assigned_anywhere():
             quantity = self.quantities.quantity(name)
             if not quantity or quantity in noted or self.quantities.is_alias(name):
                 continue
@@ -143,21 +154,21 @@ class _ProgramAnswers:
                 continue
             noted.add(quantity)
             if not any(re.search(rf"\b{re.escape(name)}\b", text) for text in self.record.left_out):
-                self.record.left_out.append(f"{line}: {name} (assigned where the program is not read)")
+                self.record.left_out.append(f"{where}: {name} (assigned where the program is not read)")
 
     # The program's answers
 
     def _given_by(self, scope: Scope, name: str, called: str, function: str = "") -> Iterator[_Candidate]:
         """Yield the quantity, or the entries, that a name gives that is called so."""
-        bound = scope.names[name]
-        value: Value = bound.value
+        binding = scope.names[name]
+        value: Value = binding.value
         if scope.key(name) in self.record.broken:
             value = Unread(self.record.broken[scope.key(name)])
         if isinstance(value, Given):
-            value = self._of_given(scope, value, bound.line)
+            value = self._of_given(scope, value, binding.where)
         if isinstance(value, Matrix) and not value.entries:
-            value = Unread(f"{name} is made of the states' shape and never filled, in {bound.line}")
-        one = _Candidate(Target("M"), bound.line, Unread(""), name, scope.key(name), function=function)
+            value = Unread(f"{name} is made of the states' shape and never filled, in {binding.where}")
+        one = _Candidate(Target("M"), binding.where, Unread(""), name, scope.key(name), function=function)
         quantity = self.quantities.quantity(called)
         if quantity:
             yield from self._given_whole(
@@ -167,14 +178,14 @@ class _ProgramAnswers:
             yield from self._given_entry(one, called, value)
 
     @staticmethod
-    def _of_given(scope: Scope, value: Given, line: str) -> Value:
+    def _of_given(scope: Scope, value: Given, where: str) -> Value:
         """Return the robot's name that a name stands for; an argument of a function as it is."""
         if value.is_argument:
             return value
         try:
             return scope.scalar(value)
         except UnreadError as error:
-            return Unread(f"{line}: {error}", frozenset((value.name,)))
+            return Unread(f"{where}: {error}", frozenset((value.name,)))
 
     def _given_entry(self, one: _Candidate, called: str, value: Scalar | Unread) -> Iterator[_Candidate]:
         entries = self.quantities.entries(called)
@@ -185,7 +196,7 @@ class _ProgramAnswers:
             return  # c12 = c12, and a symbol of the name of an entry
         if len(entries) > 1:
             readings = " or ".join(map(str, entries))
-            value = Unread(f"{called} in {one.line} may be {readings}; write it with a comma or an underscore")
+            value = Unread(f"{called} in {one.where} may be {readings}; write it with a comma or an underscore")
             entries = [Target(entry.quantity) for entry in entries]
         for entry in entries:
             yield replace(one, target=entry, value=value, is_named_entry=entry.index is not None)
@@ -197,17 +208,17 @@ class _ProgramAnswers:
                 if self._is_certain(quantity, called, value):
                     yield replace(one, value=value)
                 elif not self.record.robot.is_reserved(called):
-                    self.record.left_out.append(f"{one.line}: {called} ({value.reason})")
+                    self.record.left_out.append(f"{one.where}: {called} ({value.reason})")
             case Matrix() | Scalar():
                 if not self._fits(quantity, called, value, one.is_alias):
                     if not self.record.robot.is_reserved(called) and not self._is_minor(quantity, value):
-                        self.record.left_out.append(f"{one.line}: {called} = {value.text[:60]}")
+                        self.record.left_out.append(f"{one.where}: {called} = {value.text[:60]}")
                 elif quantity == "tau" and self._is_input(value):
-                    self.record.left_out.append(f"{one.line}: {called} = {value.text[:60]} (an input, not an answer)")
+                    self.record.left_out.append(f"{one.where}: {called} = {value.text[:60]} (an input, not an answer)")
                 else:
                     yield from self._with_entries(one, quantity, value)
             case Several() | Structure():
-                self.record.left_out.append(f"{one.line}: {called}, which is several values")
+                self.record.left_out.append(f"{one.where}: {called}, which is several values")
 
     def _is_certain(self, quantity: str, called: str, value: Unread) -> bool:
         """Whether a name that is not read would be this quantity, and nothing else.
@@ -251,7 +262,7 @@ class _ProgramAnswers:
                 yield replace(one, target=target, value=entry)
             elif len(value.entries) > 1 or not one.is_alias:
                 place = ", ".join(str(k + 1) for k in index)
-                yield replace(one, value=Unread(f"{one.name} has no entry ({place}), which {one.line} assigns"))
+                yield replace(one, value=Unread(f"{one.name} has no entry ({place}), which {one.where} assigns"))
 
     def _is_by_entries(self, one: _Candidate, value: Matrix) -> bool:
         """Whether a matrix was assigned entry by entry, and may lack some."""
@@ -279,13 +290,13 @@ class _ProgramAnswers:
             except UnreadError as error:
                 quantity = self.quantities.quantity(called_name(function))
                 if quantity and not self.quantities.is_parameter(called_name(function)):
-                    returned.append(self._unread(function, quantity, f"{function.line}: {error}"))
+                    returned.append(self._unread(function, quantity, f"{function.where}: {error}"))
                 continue
             self._function_scopes.append(scope)
-            names = self._returned_names(function, value)
-            for name, called, result in names:
-                returned += self._returned_value(function, scope, name, called, result)
-            given = {name for name, _, _ in names}
+            results = self._results(function, value)
+            for result in results:
+                returned += self._returned_value(function, scope, result)
+            given = {result.name for result in results}
             local += self._local_to(function, scope, value, given)
             del self.record.left_out[count:]
         returned = [self._against_main(one) for one in returned]
@@ -294,7 +305,7 @@ class _ProgramAnswers:
 
     def _unread(self, function: Function, quantity: str, reason: str) -> _Candidate:
         key = self.program.main.key(function.name)
-        return _Candidate(Target(quantity), function.line, Unread(reason), function.name, key)
+        return _Candidate(Target(quantity), function.where, Unread(reason), function.name, key)
 
     def _local_to(self, function: Function, scope: Scope, value: Value, given: set[str]) -> Iterator[_Candidate]:
         """Yield the quantities that a function assigns and does not return."""
@@ -304,11 +315,11 @@ class _ProgramAnswers:
                 continue
             for one in self._given_by(scope, name, name, function.name):
                 if quantity == one.target.quantity and not self._all_scalars(value):
-                    reason = f"{function.name}, in {function.line}, returns nothing that is read"
+                    reason = f"{function.name}, in {function.where}, returns nothing that is read"
                     yield replace(one, value=Unread(reason))
                 elif self._is_changed_on_return(function, scope, value, one):
                     reason = f"{function.name} returns something else that it makes of {name}"
-                    yield replace(one, value=Unread(f"{reason}, which {one.line} assigns"))
+                    yield replace(one, value=Unread(f"{reason}, which {one.where} assigns"))
                 else:
                     yield one
 
@@ -318,7 +329,7 @@ class _ProgramAnswers:
         for one in local:
             if not isinstance(one.value, Unread) and one.target.quantity not in noted:
                 noted.add(one.target.quantity)
-                self.record.note(f"{one.line}: {one.name} is a local name of a function, which does not return it")
+                self.record.note(f"{one.where}: {one.name} is a local name of a function, which does not return it")
         return local
 
     def _against_main(self, one: _Candidate) -> _Candidate:
@@ -328,16 +339,16 @@ class _ProgramAnswers:
             one.name,
             *(other for other in main.names if self.quantities.quantity(other) == one.target.quantity),
         ):
-            bound = main.names.get(name)
-            if bound is None or isinstance(bound.value, Function) or self.record.robot.is_reserved(name):
+            binding = main.names.get(name)
+            if binding is None or isinstance(binding.value, Function) or self.record.robot.is_reserved(name):
                 continue
-            if isinstance(bound.value, Matrix | Structure) or (name != one.name and isinstance(bound.value, Given)):
+            if isinstance(binding.value, Matrix | Structure) or (name != one.name and isinstance(binding.value, Given)):
                 continue
-            if isinstance(bound.value, Scalar) and self.quantities.is_scalar(one.target.quantity):
+            if isinstance(binding.value, Scalar) and self.quantities.is_scalar(one.target.quantity):
                 continue
-            if isinstance(bound.value, Unread) and self._is_call_at_numbers(bound.value, one.function):
+            if isinstance(binding.value, Unread) and self._is_call_at_numbers(binding.value, one.function):
                 continue
-            return replace(one, value=Unread(f"{name} is bound in {bound.line} to what is not read"))
+            return replace(one, value=Unread(f"{name} is bound in {binding.where} to what is not read"))
         return one
 
     def _is_call_at_numbers(self, value: Unread, function: str) -> bool:
@@ -346,8 +357,7 @@ class _ProgramAnswers:
         others = value.names - {function}
         if function not in value.names or not others <= main.names.keys():
             return False
-        scalars = [_scalars(main.names[name].value) for name in others]
-        return bool(scalars) and all(one and all(x.number is not None for x in one) for one in scalars)
+        return bool(others) and all(_is_of_numbers(main.names[name].value) for name in others)
 
     def _is_changed_on_return(self, function: Function, scope: Scope, value: Value, one: _Candidate) -> bool:
         """Whether a function's result contains a local name and no other quantity: -G, G*sign."""
@@ -357,10 +367,11 @@ class _ProgramAnswers:
         names |= {name for name in scope.names if scope.key(name) in keys}
         waiting = list(names)
         while waiting:  # what is not read is made of the names in it
-            bound = scope.names.get(waiting.pop())
-            for name in bound.value.names - names if bound is not None and isinstance(bound.value, Unread) else ():
-                names.add(name)
-                waiting.append(name)
+            binding = scope.names.get(waiting.pop())
+            if binding is not None and isinstance(binding.value, Unread):
+                new_names = binding.value.names - names
+                names |= new_names
+                waiting += new_names
         if one.name not in names:
             return False
         robot = self.record.robot
@@ -383,41 +394,41 @@ class _ProgramAnswers:
         waiting = list(uses)
         while waiting:
             definition = self.record.definitions.get(waiting.pop())
-            for key in definition[1].uses if definition is not None else ():
-                if key not in found:
-                    found.add(key)
-                    waiting.append(key)
+            if definition is not None:
+                new_keys = definition.formula.uses - found
+                found |= new_keys
+                waiting += new_keys
         return found
 
-    def _returned_names(self, function: Function, value: Value) -> list[tuple[str, str, Value]]:
-        """Return each local name that a function returns, its name as an answer, and its value."""
+    def _results(self, function: Function, value: Value) -> list[_Result]:
+        """Return the results of a function; the fields of a structure are results of their own."""
         own = called_name(function)
         match value:
             case Several(values, names):
-                returned: list[tuple[str, str, Value]] = []
+                results: list[_Result] = []
                 for name, one in zip(names or ("",) * len(values), values, strict=True):
                     fields = one.fields if isinstance(one, Structure) else {name: one}
-                    returned += [(field, field, inner) for field, inner in fields.items()]
-                return returned
+                    results += [_Result(field, field, inner) for field, inner in fields.items()]
+                return results
             case Structure(fields):
-                return [(name, name, one) for name, one in fields.items()]
+                return [_Result(name, name, one) for name, one in fields.items()]
         local = self._local_name(function)
         is_named = self.quantities.quantity(own) or self.quantities.entries(own)
-        return [(local, own if is_named else local, value)]
+        return [_Result(local, own if is_named else local, value)]
 
     def _local_name(self, function: Function) -> str:
         """Return the local name that a function returns alone; empty where it returns a formula."""
         find: Callable[[Function], str] | None = getattr(self.program, "returned_name", None)
         return find(function) if find is not None else ""
 
-    def _returned_value(
-        self, function: Function, scope: Scope, name: str, called: str, value: Value
-    ) -> Iterable[_Candidate]:
-        if name in scope.names and name not in function.parameters and scope.stands_for(name, value):
+    def _returned_value(self, function: Function, scope: Scope, result: _Result) -> Iterable[_Candidate]:
+        name, called, value = result
+        is_local = name in scope.names and name not in function.parameters
+        if is_local and scope.stands_for(name, value):
             return [*self._given_by(scope, name, called, function.name)]
         quantity = self.quantities.quantity(called) if called else ""
         one = _Candidate(
-            Target(quantity or "M"), function.line, Unread(""), called, f"{scope.number}:", function=function.name
+            Target(quantity or "M"), function.where, Unread(""), called, f"{scope.number}:", function=function.name
         )
         if isinstance(value, Given):
             return []
@@ -452,9 +463,10 @@ class _ProgramAnswers:
             return False
         definitions = self.record.definitions
         texts = [scalar.text for scalar in scalars]
-        for used in self._all_uses(frozenset[str]().union(*(scalar.uses for scalar in scalars))):
-            texts += [definitions[used][1].text] if used in definitions else []
-        words = {word for text in texts for word in re.findall(r"[A-Za-z]\w*", text, re.ASCII)}
+        uses = frozenset[str]().union(*(scalar.uses for scalar in scalars))
+        used_definitions = self._all_uses(uses) & definitions.keys()
+        texts += [definitions[key].formula.text for key in used_definitions]
+        words = re.findall(r"[A-Za-z]\w*", "\n".join(texts), re.ASCII)
         return not any(self.record.robot.vocabulary.is_state(word) for word in words)
 
     def _without_aliases(self, candidates: Sequence[_Candidate]) -> list[_Candidate]:
@@ -464,10 +476,10 @@ class _ProgramAnswers:
         for one in candidates:
             quantity = one.target.quantity
             if one.is_alias and quantity in own:
-                self.record.left_out.append(f"{one.line}: {one.name} (read as a name, since {quantity} is given too)")
+                self.record.left_out.append(f"{one.where}: {one.name} (read as a name, since {quantity} is given too)")
                 continue
             if one.is_alias and not isinstance(one.value, Unread):
-                self.record.note(f"{one.line}: {one.name} is read as {quantity}")
+                self.record.note(f"{one.where}: {one.name} is read as {quantity}")
             kept.append(one)
         return kept
 
@@ -498,8 +510,8 @@ class _ProgramAnswers:
             return Refusal(str(error))
         for used in needed:
             if used in self.record.definitions and used not in keys:
-                name, definition = self.record.definitions[used]
-                self.parameters[name] = definition.text
+                definition = self.record.definitions[used]
+                self.parameters[definition.name] = definition.formula.text
         if len(self.parameters) > BOUNDS.definitions:
             raise AnswerError(f"answers are made of more than {BOUNDS.definitions} names")
         return value.text
@@ -511,23 +523,25 @@ class _ProgramAnswers:
             return refused
         whole_texts = [self._spelt_out(one) for one in whole]
         if any(text != whole_texts[0] for text in whole_texts):
-            return Refusal(f"{quantity} is assigned twice, in {whole[0].line} and in {whole[-1].line}")
+            return Refusal(f"{quantity} is assigned twice, in {whole[0].where} and in {whole[-1].where}")
         for one in entries:
             text = self._text_of(one)
             if isinstance(text, Refusal):
                 return text
             if not (self._is_made_with(whole[0], one) or self._is_made_with(one, whole[0])):
-                return Refusal(f"{quantity} is given in {whole[0].line} and its entry {one.name} apart, in {one.line}")
+                return Refusal(
+                    f"{quantity} is given in {whole[0].where} and its entry {one.name} apart, in {one.where}"
+                )
         return texts[0]
 
     def _spelt_out(self, one: _Candidate) -> list[str]:
         """Return the texts of an answer's entries, each with its definition if it is a single name."""
-        definitions = dict(self.record.definitions.values())
+        formulas = {definition.name: definition.formula for definition in self.record.definitions.values()}
         texts = []
         for scalar in _scalars(one.value):
             text = scalar.text
-            while text in definitions:
-                text = definitions[text].text
+            while text in formulas:
+                text = formulas[text].text
             texts.append(text)
         return texts
 
@@ -549,7 +563,7 @@ class _ProgramAnswers:
         energies = (other for other in candidates if other.target.quantity in _ENERGIES)
         user = next((other.target.quantity for other in energies if self._is_made_with(other, one)), "")
         if user:
-            self.record.note(f"{one.line}: {one.name} is read as the program's own name, which {user} uses")
+            self.record.note(f"{one.where}: {one.name} is read as the program's own name, which {user} uses")
         return bool(user)
 
     def _entries_answer(self, entries: Sequence[_Candidate]) -> Entries | Refusal:
@@ -559,9 +573,15 @@ class _ProgramAnswers:
             index = one.target.index or ()
             text = self._text_of(one)
             if texts.setdefault(index, text) != text:
-                return Refusal(f"{one.target} is assigned twice, in {lines[index]} and in {one.line}")
-            lines.setdefault(index, one.line)
+                return Refusal(f"{one.target} is assigned twice, in {lines[index]} and in {one.where}")
+            lines.setdefault(index, one.where)
         return Entries(dict(sorted(texts.items())))
+
+
+def _is_of_numbers(value: Value) -> bool:
+    """Whether a value is a number, or a matrix of numbers."""
+    scalars = _scalars(value)
+    return bool(scalars) and all(scalar.number is not None for scalar in scalars)
 
 
 def _scalars(value: Value) -> list[Scalar]:

@@ -8,7 +8,7 @@ can reach: the names in the bodies of the program's own functions, and those in 
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 
@@ -230,16 +230,14 @@ class Changes:
         return self._known[key]
 
     def _of_function(self, function: Function) -> frozenset[str]:
-        body = function.definition
-        nodes = [body] if isinstance(body, ast.expr) else body
-        local = {ascii_name(name) for node in nodes for name in bound_names(node)}
-        outer = {
-            name
-            for node in nodes
-            for inner in ast.walk(node)
-            if isinstance(inner, ast.Global | ast.Nonlocal)
-            for name in inner.names
-        }
+        nodes = _body_nodes(function)
+        local: set[str] = set()
+        outer: set[str] = set()
+        for node in nodes:
+            local |= {ascii_name(name) for name in bound_names(node)}
+            for inner in ast.walk(node):
+                if isinstance(inner, ast.Global | ast.Nonlocal):
+                    outer.update(inner.names)
         effects = self.of(nodes, self.main, local | set(function.parameters))
         for name, value in function.defaults.items():
             effects.share(name, value.names if isinstance(value, Unread) else function.default_names)
@@ -257,9 +255,8 @@ class Changes:
             found.add(name)
             match value_of(name, scope):
                 case Function() as function:
-                    body = function.definition
-                    nodes = [body] if isinstance(body, ast.expr) else body
-                    waiting += [ascii_name(x) for node in nodes for x in names_in(node)]
+                    for node in _body_nodes(function):
+                        waiting += [ascii_name(x) for x in names_in(node)]
                     waiting += function.default_names
                 case Unread(_, inside):
                     waiting += inside
@@ -301,11 +298,17 @@ def without_functions(node: ast.AST) -> Iterator[ast.AST]:
                 waiting += ast.iter_child_nodes(one)
 
 
+def _body_nodes(function: Function) -> Sequence[ast.AST]:
+    """Return the statements of a function, or the expression of a lambda."""
+    body: ast.expr | Sequence[ast.stmt] = function.definition
+    return [body] if isinstance(body, ast.expr) else body
+
+
 def value_of(name: str, scope: Scope) -> Value | None:
     """Return the value that a name is bound to; None where the program does not bind it."""
     owner = scope.owner(name)
-    bound = owner.names.get(name) if owner is not None else None
-    return bound.value if bound is not None else None
+    binding = owner.names.get(name) if owner is not None else None
+    return binding.value if binding is not None else None
 
 
 class _Piece:
@@ -368,7 +371,7 @@ class _Piece:
     def modules(self) -> set[str]:
         """Return the names of modules."""
         main = self.changes.main
-        return {name for name, bound in main.names.items() if isinstance(bound.value, Module | Library)}
+        return {name for name, binding in main.names.items() if isinstance(binding.value, Module | Library)}
 
     def _stored_in(self, target: ast.AST) -> set[str]:
         """Return the names that an assignment to a part changes: M of M[0, 0], all that it names of (M, 0)[0][0, 0]."""
@@ -448,7 +451,8 @@ class _Piece:
         if {k.arg for k in call.keywords} & _CHANGING_KEYWORDS:
             return False
         arguments = [*call.args, *(k.value for k in call.keywords)]
-        if any(self._is_loud_function(x) for argument in arguments for x in ast.walk(argument)):
+        parts_of_arguments = chain.from_iterable(map(ast.walk, arguments))
+        if any(self._is_loud_function(part) for part in parts_of_arguments):
             return False
         if library := self._library_name(call.func):
             most = _MOST_ARGUMENTS.get(library, 100)

@@ -123,8 +123,8 @@ class PythonProgram:
             raise AnswerError(f"{file}: nested too deep to be read; write long sums in parts") from None
 
     def _parsed(self) -> ast.Module:
-        for line in self.lines[:2]:
-            coding = re.match(r"[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)", line)
+        for line_text in self.lines[:2]:
+            coding = re.match(r"[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)", line_text)
             if coding and coding[1].lower().replace("_", "-") not in (
                 "utf-8",
                 "utf8",
@@ -156,15 +156,18 @@ class PythonProgram:
                     "any name; a program is read, not run (--execute)"
                 )
 
-    def line(self, node: ast.stmt | ast.expr) -> str:
+    def where(self, node: ast.stmt | ast.expr) -> str:
         """Return how messages name the line of a node."""
         return self.line_name(node.lineno)
 
     def assigned_anywhere(self) -> Iterator[tuple[str, str]]:
         """Yield names, keys and attributes that are assigned, also where nothing is read, with their lines."""
-        found = [(getattr(node, "lineno", 1), name) for node in ast.walk(self.tree) for name in _assigned_by(node)]
-        for line, name in sorted(found):
-            yield ascii_name(name), self.line_name(line)
+        found: list[tuple[int, str]] = []
+        for node in ast.walk(self.tree):
+            line_number = getattr(node, "lineno", 1)
+            found += [(line_number, name) for name in _assigned_by(node)]
+        for line_number, name in sorted(found):
+            yield ascii_name(name), self.line_name(line_number)
 
     # Statements
 
@@ -176,81 +179,81 @@ class PythonProgram:
             self._statement(statement, scope)
 
     def _statement(self, statement: ast.stmt, scope: Scope) -> None:
-        line = self.line(statement)
+        where = self.where(statement)
         match statement:
             case ast.Assign(targets, value):
                 for target in targets:
-                    self._assign(target, value, scope, line)
+                    self._assign(target, value, scope, where)
             case ast.AnnAssign(target, _, ast.expr() as value):
-                self._assign(target, value, scope, line)
+                self._assign(target, value, scope, where)
             case ast.AugAssign(ast.Subscript(ast.Name(name), index), ast.Add(), value):
-                self._assign_entry(name, [index], value, scope, line, is_added=True)
+                self._assign_entry(name, [index], value, scope, where, is_added=True)
             case ast.Import(aliases):
                 for alias in aliases:
-                    self._import(alias, scope, line)
+                    self._import(alias, scope, where)
             case ast.ImportFrom(module, aliases):
                 for alias in aliases:
-                    self._import_from(module or ".", alias, scope, line)
+                    self._import_from(module or ".", alias, scope, where)
             case ast.FunctionDef(name, arguments, body, []):
-                self._define(name, arguments, body, scope, line)
+                self._define(name, arguments, body, scope, where)
             case ast.If(test, body, []) if scope is self.main and _is_main(test):
                 self._block(body, scope)
                 return
             case ast.Expr(ast.Call(ast.Name("var") | ast.Attribute(_, "var"), [ast.Constant(str(text)), *_])):
                 for name in _symbol_names(text):
-                    scope.bind(ascii_name(name), Given(name, is_symbol=True, is_constant=True), line)
+                    scope.bind(ascii_name(name), Given(name, is_symbol=True, is_constant=True), where)
             case ast.Expr() | ast.Pass() | ast.AnnAssign() | ast.Assert() | ast.Return():
                 pass
             case _:
-                self._leave(statement, scope, line)
+                self._leave(statement, scope, where)
                 return
         pieces = _executed(statement)
         for node in chain.from_iterable(map(ast.walk, pieces)):
             if isinstance(node, ast.NamedExpr):
                 for one in names_in(node.target):
-                    scope.change(ascii_name(one), f"{one[:40]} is changed by := in {line}", only_matrices=False)
-        self._note(self.changes.of(pieces, scope, scope.local), scope, line)
+                    scope.change(ascii_name(one), f"{one[:40]} is changed by := in {where}", only_matrices=False)
+        self._note(self.changes.of(pieces, scope, scope.local), scope, where)
 
-    def _note(self, effects: Effects, scope: Scope, line: str) -> None:
+    def _note(self, effects: Effects, scope: Scope, where: str) -> None:
         """Note the names whose values a statement may change, and those that may be the same matrix after it."""
         for name, others in effects.shared.items():
             if scope.is_mutable(name) or not isinstance(value_of(name, scope), Scalar | Function | Module | Library):
                 scope.add_alias(name, others)
         for name in sorted(effects.changed):
-            scope.change(name, f"{name[:40]} may be changed in {line}")
+            scope.change(name, f"{name[:40]} may be changed in {where}")
 
-    def _leave(self, statement: ast.stmt, scope: Scope, line: str) -> None:
+    def _leave(self, statement: ast.stmt, scope: Scope, where: str) -> None:
         """Note the names whose values an unread statement may change."""
         if isinstance(statement, ast.ClassDef):
-            self._leave_class(statement, scope, line)
+            self._leave_class(statement, scope, where)
             return
         kind = {"FunctionDef": "a function", "Delete": "'del'"}
         what = kind.get(type(statement).__name__, repr(type(statement).__name__.lower()))
         for name in dict.fromkeys(map(ascii_name, assigned_names(statement))):
             after = "after it is assigned, " if isinstance(statement, ast.AugAssign) else f"by {what} "
-            scope.change(name, f"{name[:40]} is changed {after}in {line}", only_matrices=False)
-        self._note(self.changes.of([statement], scope, scope.local), scope, line)
+            scope.change(name, f"{name[:40]} is changed {after}in {where}", only_matrices=False)
+        self._note(self.changes.of([statement], scope, scope.local), scope, where)
 
-    def _leave_class(self, statement: ast.ClassDef, scope: Scope, line: str) -> None:
+    def _leave_class(self, statement: ast.ClassDef, scope: Scope, where: str) -> None:
         """Read a class of fields alone as a structure; of another one note the names whose values it may change."""
         name = ascii_name(statement.name)
         if _is_plain_class(statement) and (fields := self._fields(statement, scope)) is not None:
-            scope.bind(name, Structure(fields), line)
+            scope.bind(name, Structure(fields), where)
             return
         self.changes.classes.add(name)
         reached = {ascii_name(x) for x in names_in(statement)}
         inside: set[str] = set()
         for inner in statement.body:
             if isinstance(inner, ast.FunctionDef | ast.AsyncFunctionDef):
-                self.record.note_left_out(f"{line}: class {statement.name[:40]}")
+                self.record.note_left_out(f"{where}: class {statement.name[:40]}")
                 arguments = {ascii_name(x.arg) for x in ast.walk(inner.args) if isinstance(x, ast.arg)}
                 inside |= arguments | {ascii_name(x) for x in assigned_names(inner)}
-        scope.bind(name, Unread(f"{statement.name[:40]} is a class, in {line}", frozenset(reached - inside)), line)
+        scope.bind(name, Unread(f"{statement.name[:40]} is a class, in {where}", frozenset(reached - inside)), where)
         for node in ast.walk(statement):
             if isinstance(node, ast.Global):
                 for one in node.names:
-                    scope.change(ascii_name(one), f"{one[:40]} is changed in a class, in {line}", only_matrices=False)
-        self._note(self.changes.of([statement], scope, scope.local), scope, line)
+                    scope.change(ascii_name(one), f"{one[:40]} is changed in a class, in {where}", only_matrices=False)
+        self._note(self.changes.of([statement], scope, scope.local), scope, where)
 
     def _fields(self, statement: ast.ClassDef, scope: Scope) -> dict[str, Value] | None:
         """Return the assignments in a class's body, as its objects' fields; None where it has other statements."""
@@ -260,7 +263,7 @@ class PythonProgram:
                 case ast.AnnAssign(ast.Name(name), _, ast.expr() as value) | ast.Assign([ast.Name(name)], value):
                     if name in fields or fields.keys() & set(names_in(value)):
                         return None
-                    fields[name] = self._right_side(value, scope, self.line(inner))
+                    fields[name] = self._right_side(value, scope, self.where(inner))
                 case ast.Expr(ast.Constant()) | ast.Pass():
                     pass
                 case _:
@@ -269,10 +272,10 @@ class PythonProgram:
 
     # Assignments
 
-    def _assign(self, target: ast.expr, value: ast.expr, scope: Scope, line: str) -> None:
+    def _assign(self, target: ast.expr, value: ast.expr, scope: Scope, where: str) -> None:
         match target:
             case ast.Name(name) if isinstance(value, ast.Lambda):
-                self._define(name, value.args, value.body, scope, line)
+                self._define(name, value.args, value.body, scope, where)
             case ast.Name(name):
                 if (
                     isinstance(value, ast.Call)
@@ -280,39 +283,41 @@ class PythonProgram:
                     and self._is_library(value.func, scope)
                 ):
                     self.changes.compiled.add(name)
-                scope.bind(ascii_name(name), self._right_side(value, scope, line), line)
+                scope.bind(ascii_name(name), self._right_side(value, scope, where), where)
             case ast.Tuple(targets) | ast.List(targets):
-                self._assign_several(targets, value, scope, line)
+                self._assign_several(targets, value, scope, where)
             case ast.Subscript(ast.Name(name), index):
-                self._assign_entry(name, [index], value, scope, line)
+                self._assign_entry(name, [index], value, scope, where)
             case ast.Subscript(ast.Subscript(ast.Name(name), first), second):
-                self._assign_entry(name, [first, second], value, scope, line)
+                self._assign_entry(name, [first, second], value, scope, where)
             case _:
                 for name in dict.fromkeys(assigned_names(target)):
-                    reason = f"{name[:40]} is changed by an assignment to a part of it in {line}"
+                    reason = f"{name[:40]} is changed by an assignment to a part of it in {where}"
                     scope.change(ascii_name(name), reason, only_matrices=False)
-                self._note(self.changes.of([ast.Assign([target], value)], scope, scope.local), scope, line)
+                self._note(self.changes.of([ast.Assign([target], value)], scope, scope.local), scope, where)
 
-    def _right_side(self, value: ast.expr, scope: Scope, line: str) -> Value:
+    def _right_side(self, value: ast.expr, scope: Scope, where: str) -> Value:
         try:
             return self.value(value, scope)
         except UnreadError as error:
-            return Unread(f"{line}: {error}", frozenset(map(ascii_name, names_in(value))), _is_written_out(value))
+            return Unread(f"{where}: {error}", frozenset(map(ascii_name, names_in(value))), _is_written_out(value))
 
-    def _assign_several(self, targets: Sequence[ast.expr], value: ast.expr, scope: Scope, line: str) -> None:
+    def _assign_several(self, targets: Sequence[ast.expr], value: ast.expr, scope: Scope, where: str) -> None:
         names = [target.id for target in targets if isinstance(target, ast.Name)]
         if len(names) != len(targets):
             for name in dict.fromkeys(chain.from_iterable(map(assigned_names, targets))):
-                scope.change(ascii_name(name), f"{name[:40]} is changed by an unpacking in {line}", only_matrices=False)
+                scope.change(
+                    ascii_name(name), f"{name[:40]} is changed by an unpacking in {where}", only_matrices=False
+                )
             return
         if isinstance(value, ast.Tuple | ast.List) and len(value.elts) == len(names):
-            values = [self._right_side(one, scope, line) for one in value.elts]
+            values = [self._right_side(one, scope, where) for one in value.elts]
         else:
-            values = self._taken_apart(self._right_side(value, scope, line), len(names), scope, line)
+            values = self._taken_apart(self._right_side(value, scope, where), len(names), scope, where)
         for name, one in zip(names, values, strict=True):
-            scope.bind(ascii_name(name), one, line)
+            scope.bind(ascii_name(name), one, where)
 
-    def _taken_apart(self, value: Value, count: int, scope: Scope, line: str) -> list[Value]:
+    def _taken_apart(self, value: Value, count: int, scope: Scope, where: str) -> list[Value]:
         match value:
             case Several(values) if len(values) == count:
                 return list(values)
@@ -322,62 +327,62 @@ class PythonProgram:
                 try:
                     return [scope.entry(value, (k,)) for k in range(count)]
                 except UnreadError as error:
-                    return [Unread(f"{line}: {error}")] * count
+                    return [Unread(f"{where}: {error}")] * count
             case Unread():
                 return [value] * count
-        return [Unread(f"{line}: an unpacking that is not read")] * count
+        return [Unread(f"{where}: an unpacking that is not read")] * count
 
     def _assign_entry(
-        self, name: str, indices: Sequence[ast.expr], value: ast.expr, scope: Scope, line: str, is_added: bool = False
+        self, name: str, indices: Sequence[ast.expr], value: ast.expr, scope: Scope, where: str, is_added: bool = False
     ) -> None:
         name = ascii_name(name)
         owner = scope.owner(name)
         if owner is not None and owner is not scope:
-            scope.change(name, f"{name[:40]} is changed inside a function, in {line}")
+            scope.change(name, f"{name[:40]} is changed inside a function, in {where}")
             return
         try:
             stored = self.value(value, scope)
             if _is_ellipsis(indices) and scope.is_bare_zero(name):
-                scope.bind(name, stored, line)
+                scope.bind(name, stored, where)
                 return
             parts = [constant_index(index) for index in indices]
             if any(part is None for part in parts):
                 raise UnreadError(f"{name[:40]} is changed by an assignment to a part of it")
             scalar = scope.scalar(stored)
         except UnreadError as error:
-            self._share_entry(name, value, scope, line)
-            scope.change(name, f"{error}, in {line}", only_matrices=False)
+            self._share_entry(name, value, scope, where)
+            scope.change(name, f"{error}, in {where}", only_matrices=False)
             return
         if isinstance(stored, Matrix):
-            self._share_entry(name, value, scope, line)
+            self._share_entry(name, value, scope, where)
         for other in list(scope.same_matrices(name)):
-            scope.change(other, f"{other[:40]} may be the same matrix as {name[:40]}, which is changed in {line}")
-        index = tuple(k for part in parts if part is not None for k in part)
-        scope.bind_entry(name, index, scalar, line, is_added)
+            scope.change(other, f"{other[:40]} may be the same matrix as {name[:40]}, which is changed in {where}")
+        index = tuple(chain.from_iterable(part for part in parts if part is not None))
+        scope.bind_entry(name, index, scalar, where, is_added)
 
-    def _share_entry(self, name: str, value: ast.expr, scope: Scope, line: str) -> None:
+    def _share_entry(self, name: str, value: ast.expr, scope: Scope, where: str) -> None:
         """Note that a matrix or list may hold others after an entry is assigned."""
         target = ast.Name(name, ast.Store())
-        self._note(self.changes.of([ast.Assign([target], value)], scope, scope.local), scope, line)
+        self._note(self.changes.of([ast.Assign([target], value)], scope, scope.local), scope, where)
 
     # Imports
 
-    def _import(self, alias: ast.alias, scope: Scope, line: str) -> None:
+    def _import(self, alias: ast.alias, scope: Scope, where: str) -> None:
         first = alias.name.split(".")[0]
         name = alias.asname or first
         module = alias.name if alias.asname else first
         harmless = module.split(".")[0] in (*_KNOWN_PACKAGES, "os", "sys")
         if module in _MODULES or harmless:
-            scope.bind(ascii_name(name), Module(module), line)
+            scope.bind(ascii_name(name), Module(module), where)
         else:
-            scope.bind(ascii_name(name), Unread(f"{name[:40]} is the module {module[:40]} since {line}"), line)
+            scope.bind(ascii_name(name), Unread(f"{name[:40]} is the module {module[:40]} since {where}"), where)
 
-    def _import_from(self, module: str, alias: ast.alias, scope: Scope, line: str) -> None:
+    def _import_from(self, module: str, alias: ast.alias, scope: Scope, where: str) -> None:
         name = ascii_name(alias.asname or alias.name)
         full_name = f"{module}.{alias.name}"
         value: Value
         if alias.name == "*":
-            self._import_everything(module, line)
+            self._import_everything(module, where)
             return
         if module == "sympy.abc":
             value = Given(alias.name)
@@ -388,47 +393,47 @@ class PythonProgram:
             if module in _NUMPY and alias.name in (*_ARRAYS, "zeros", "eye"):
                 value = Library(f"numpy.{alias.name}")
         else:
-            value = Unread(f"{name[:40]} comes from {module[:40]} in {line}")
+            value = Unread(f"{name[:40]} comes from {module[:40]} in {where}")
             if module.split(".")[0] in _KNOWN_PACKAGES:
                 self.changes.imported[name] = alias.name
-        scope.bind(name, value, line)
+        scope.bind(name, value, where)
 
-    def _import_everything(self, module: str, line: str) -> None:
+    def _import_everything(self, module: str, where: str) -> None:
         """Note which names ``from module import *`` may replace; the module's own names are its functions."""
         if module not in _MODULES or module == "sympy.abc":
             raise AnswerError(
-                f"{self.file}: {line}: found 'from {module[:40]} import *', which may change any name; expected "
+                f"{self.file}: {where}: found 'from {module[:40]} import *', which may change any name; expected "
                 "numpy, sympy or math"
             )
         self.star_modules.append(module)
-        for name, bound in list(self.main.names.items()):
+        for name, binding in list(self.main.names.items()):
             is_exported = name in _EXPORTED_LETTERS if len(name) == 1 else not any(c.isdigit() for c in name)
-            has_value = not isinstance(bound.value, Module | Library | Unread)
+            has_value = not isinstance(binding.value, Module | Library | Unread)
             if module == "math":
                 is_exported = name in ("tau", "e", "pi", "inf", "nan") or name in SCALAR
             elif name in ("tau", "KE", "PE", "Tau", "Jac"):
                 is_exported = False
             if is_exported and has_value:
-                self.main.change(name, f"{name} is changed by 'from {module} import *' in {line}", only_matrices=False)
+                self.main.change(name, f"{name} is changed by 'from {module} import *' in {where}", only_matrices=False)
 
     # Functions
 
     def _define(
-        self, name: str, arguments: ast.arguments, body: Sequence[ast.stmt] | ast.expr, scope: Scope, line: str
+        self, name: str, arguments: ast.arguments, body: Sequence[ast.stmt] | ast.expr, scope: Scope, where: str
     ) -> None:
-        function = self._function(name, arguments, body, scope, line)
+        function = self._function(name, arguments, body, scope, where)
         if scope is self.main:
             self.functions.append(function)
-        scope.bind(ascii_name(name), function, line)
+        scope.bind(ascii_name(name), function, where)
         pieces: Sequence[ast.AST] = [body] if isinstance(body, ast.expr) else body
         for node in chain.from_iterable(map(ast.walk, pieces)):
             if isinstance(node, ast.Global | ast.Nonlocal):
                 for one in node.names:
-                    reason = f"{one[:40]} is changed by 'global' in a function, in {line}"
+                    reason = f"{one[:40]} is changed by 'global' in a function, in {where}"
                     scope.change(ascii_name(one), reason, only_matrices=False)
 
     def _function(
-        self, name: str, arguments: ast.arguments, body: Sequence[ast.stmt] | ast.expr, scope: Scope, line: str
+        self, name: str, arguments: ast.arguments, body: Sequence[ast.stmt] | ast.expr, scope: Scope, where: str
     ) -> Function:
         positional = [*arguments.posonlyargs, *arguments.args]
         parameters = [argument.arg for argument in [*positional, *arguments.kwonlyargs]]
@@ -439,26 +444,30 @@ class PythonProgram:
         defaults: dict[str, Value] = {}
         for argument, default in pairs:
             if default is not None:
-                defaults[ascii_name(argument.arg)] = self._right_side(default, scope, line)
+                defaults[ascii_name(argument.arg)] = self._right_side(default, scope, where)
         problem = ""
         if arguments.vararg is not None or arguments.kwarg is not None:
-            problem = f"{name} takes any arguments, in {line}"
+            problem = f"{name} takes any arguments, in {where}"
         elif not isinstance(body, ast.expr) and any(map(_ends, body)):
-            problem = f"{name} ends by an exception, in {line}"
+            problem = f"{name} ends by an exception, in {where}"
         elif not isinstance(body, ast.expr):
             kinds = ast.Return | ast.Yield
-            returns = [x for statement in body[:-1] for x in without_functions(statement) if isinstance(x, kinds)]
+            before_last = chain.from_iterable(map(without_functions, body[:-1]))
+            returns = [node for node in before_last if isinstance(node, kinds)]
             if returns or isinstance(body[-1], ast.If | ast.For | ast.While | ast.Try | ast.With):
-                problem = f"{name} has 'return' in a branch or several, in {line}" if _returns_inside(body) else ""
-        defaults_of = [x for _, default in pairs if default is not None for x in names_in(default)]
+                problem = f"{name} has 'return' in a branch or several, in {where}" if _returns_inside(body) else ""
+        default_names: list[str] = []
+        for _, default in pairs:
+            if default is not None:
+                default_names += names_in(default)
         return Function(
             ascii_name(name),
             tuple(map(ascii_name, parameters)),
             body,
-            line,
+            where,
             defaults,
             problem,
-            frozenset(map(ascii_name, defaults_of)),
+            frozenset(map(ascii_name, default_names)),
             scope,
         )
 
@@ -470,16 +479,16 @@ class PythonProgram:
             values[name] = self.record.argument(name)
             default = function.defaults.get(name)
             if name in ("self", "cls"):
-                values[name] = Unread(f"{name} is an object, in {function.line}")
+                values[name] = Unread(f"{name} is an object, in {function.where}")
             elif default is not None and not isinstance(default, Structure):
                 try:
                     same = robot.is_reserved(name) and robot.keeps_meaning(name, default)
                 except UnreadError as error:
-                    values[name] = Unread(f"{error}, as a default in {function.line}")
+                    values[name] = Unread(f"{error}, as a default in {function.where}")
                     continue
                 if not same:
                     shown = default.text if isinstance(default, Scalar) else "something else"
-                    values[name] = Unread(f"an argument has the default {name} = {shown[:40]} in {function.line}")
+                    values[name] = Unread(f"an argument has the default {name} = {shown[:40]} in {function.where}")
             elif isinstance(default, Structure):
                 values[name] = default
         return values
@@ -507,14 +516,16 @@ class PythonProgram:
         if isinstance(body, ast.expr):
             scope = Scope(self.record, function.outer or self.main, frozenset(function.parameters))
         else:
-            local = {ascii_name(x) for statement in body for x in bound_names(statement)}
-            scope = Scope(self.record, function.outer or self.main, frozenset(local) | frozenset(function.parameters))
+            local = set(function.parameters)
+            for statement in body:
+                local |= {ascii_name(name) for name in bound_names(statement)}
+            scope = Scope(self.record, function.outer or self.main, frozenset(local))
         for name, value in arguments.items():
-            scope.set_argument(name, value, function.line)
+            scope.set_argument(name, value, function.where)
         self.depth += 1
         try:
             if isinstance(body, ast.expr):
-                return self._right_side(body, scope, function.line), scope
+                return self._right_side(body, scope, function.where), scope
             self._block(body, scope)
             last = body[-1]
             if not isinstance(last, ast.Return) or last.value is None:
@@ -523,13 +534,13 @@ class PythonProgram:
                 return self._returned(last.value, scope), scope
             except UnreadError as error:
                 names = frozenset(map(ascii_name, names_in(last.value)))
-                return Unread(f"{self.line(last)}: {error}", names, _is_written_out(last.value)), scope
+                return Unread(f"{self.where(last)}: {error}", names, _is_written_out(last.value)), scope
         finally:
             self.depth -= 1
 
     def _returned(self, node: ast.expr, scope: Scope) -> Value:
         if isinstance(node, ast.Tuple):
-            values = tuple(self._right_side(one, scope, self.line(node)) for one in node.elts)
+            values = tuple(self._right_side(one, scope, self.where(node)) for one in node.elts)
             return Several(values, tuple(_local_name(one) for one in node.elts))
         return self.value(node, scope)
 
@@ -577,12 +588,12 @@ class PythonProgram:
             case ast.List(parts) | ast.Tuple(parts):
                 return self._listed(parts, scope)
             case ast.Dict(keys, values) if all(isinstance(k, ast.Constant) for k in keys):
-                line = self.line(node)
-                fields = [self._right_side(one, scope, line) for one in values]
+                where = self.where(node)
+                fields = [self._right_side(one, scope, where) for one in values]
                 names = [str(k.value) for k in keys if isinstance(k, ast.Constant)]
                 return Structure(dict(zip(names, fields, strict=True)))
             case ast.Lambda(arguments, body):
-                return self._function("lambda", arguments, body, scope, self.line(node))
+                return self._function("lambda", arguments, body, scope, self.where(node))
             case ast.Attribute(inner, name):
                 return self._attribute(self._object(inner, scope), name, scope)
             case ast.Subscript(inner, index):
@@ -595,8 +606,8 @@ class PythonProgram:
         return repr((ast.get_source_segment(self.text, node) or "")[:40])
 
     def _number(self, node: ast.Constant) -> Scalar:
-        line = self.lines[node.lineno - 1].encode()
-        typed = line[node.col_offset : node.end_col_offset].decode()
+        where = self.lines[node.lineno - 1].encode()
+        typed = where[node.col_offset : node.end_col_offset].decode()
         if _PLAIN_NUMBER.fullmatch(typed) is None:
             raise UnreadError(f"the number {typed[:20]!r} is not read")
         return number(f"{typed}0" if typed.endswith(".") else typed)
@@ -694,9 +705,7 @@ class PythonProgram:
                 return Part(name, tuple(range(first, min(last, BOUNDS.index))), is_slice=True, number=value.number)
             case Matrix(), ast.Tuple([rows, columns]) if not value.is_flat:
                 m, n = value.shape
-                i = _chosen(rows, m)
-                j = _chosen(columns, n)
-                chosen = [[value.entries[(a, b)] for b in j] for a in i]
+                chosen = value.part(_chosen(rows, m), _chosen(columns, n))
                 if isinstance(rows, ast.Slice) and isinstance(columns, ast.Slice):
                     return matrix_of(chosen, multiplies_entries=value.multiplies_entries)
                 entries = list(chain.from_iterable(chosen))
@@ -728,8 +737,8 @@ class PythonProgram:
             case Function():
                 return self._own_call(function, node, scope)
             case Structure(fields) if not node.args:
-                line = self.line(node)
-                given = {str(k.arg): self._right_side(k.value, scope, line) for k in node.keywords}
+                where = self.where(node)
+                given = {str(k.arg): self._right_side(k.value, scope, where) for k in node.keywords}
                 return Structure({**fields, **given})
             case Library() | Given() if any(isinstance(x, ast.Starred) for x in node.args):
                 raise UnreadError(f"{self._quote(node)} is not read")
@@ -765,8 +774,8 @@ class PythonProgram:
                 raise UnreadError(f"{self._quote(node)} is not read")
             return self._symbols(name, node)
         if name in ("dict", "SimpleNamespace"):
-            line = self.line(node)
-            return Structure({str(k): self._right_side(x, scope, line) for k, x in keywords.items()})
+            where = self.where(node)
+            return Structure({str(k): self._right_side(x, scope, where) for k, x in keywords.items()})
         dtype = keywords.pop("dtype", None)
         if dtype is not None and not (
             isinstance(dtype, ast.Name | ast.Attribute) and _last(dtype) in ("object", "float", "float64")
@@ -821,7 +830,9 @@ class PythonProgram:
         if self.changes.of_function(function):
             raise UnreadError(f"{function.name}(...) is a function that may change other names, and is not read")
         values: dict[str, Value] = dict(function.defaults)
-        arguments = [x for argument in node.args for x in self._arguments(argument, scope)]
+        arguments: list[Value] = []
+        for argument in node.args:
+            arguments += self._arguments(argument, scope)
         if len(arguments) > len(function.parameters):
             raise UnreadError(f"{function.name}(...) is called with too many arguments")
         values |= dict(zip(function.parameters, arguments, strict=False))
@@ -878,8 +889,8 @@ class PythonProgram:
         """Whether an expression is the time: t, unless the program gives this name to something else."""
         match node:
             case ast.Name("t"):
-                bound = value_of("t", scope)
-                return bound is None or (isinstance(bound, Given) and bound.name == "t")
+                value_of_t = value_of("t", scope)
+                return value_of_t is None or (isinstance(value_of_t, Given) and value_of_t.name == "t")
             case ast.Attribute(ast.Name(), "_t"):
                 return True
         return False
@@ -1139,7 +1150,8 @@ def _is_ellipsis(indices: Sequence[ast.expr]) -> bool:
 def _returns_inside(body: Sequence[ast.stmt]) -> bool:
     """Whether a function returns anywhere but at its end."""
     kinds = ast.Return | ast.Yield | ast.YieldFrom
-    inner = [x for statement in body for x in without_functions(statement) if isinstance(x, kinds)]
+    nodes = chain.from_iterable(map(without_functions, body))
+    inner = [node for node in nodes if isinstance(node, kinds)]
     return len(inner) > (1 if isinstance(body[-1], ast.Return) else 0)
 
 

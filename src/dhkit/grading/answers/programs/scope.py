@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from dhkit.errors import AnswerError
 from dhkit.grading.answers.bounds import BOUNDS
@@ -42,7 +43,7 @@ _NOT_NAMES = word_set("t T top pi e Matrix array matrix sym simplify transpose D
 
 
 @dataclass(frozen=True)
-class Bound:
+class Binding:
     """Binding of a name.
 
     Attributes
@@ -51,13 +52,42 @@ class Bound:
         The value, as it was assigned.
     reference
         The value where the name is read: long formulas by their names.
-    line
-        Where it is bound.
+    where
+        The line in which it is bound, as messages name it.
     """
 
     value: Value
     reference: Value
-    line: str
+    where: str
+
+
+class Definition(NamedTuple):
+    """Definition of a name that answers are made of, as it stands beside them."""
+
+    name: str
+    """The name there; another than the program's where that would be read as something else."""
+    formula: Scalar
+    """The formula that the name stands for."""
+
+
+class StatePlace(NamedTuple):
+    """Place of an entry of a state, such as x(1), in one call of a function."""
+
+    call: int
+    """Number of the call."""
+    vector: str
+    """Name of the state."""
+    place: int
+    """Index of the entry, from 0."""
+
+
+class SymbolMade(NamedTuple):
+    """A symbol that the program makes."""
+
+    name: str
+    """Its name in the program."""
+    where: str
+    """The line in which it is made, as messages name it."""
 
 
 @dataclass
@@ -73,7 +103,7 @@ class Record:
     broken
         Names whose values are unknown, by key, each with the reason.
     definitions
-        Names of the program beside the answers: their names there and their values, by key.
+        Definitions beside the answers, by the key of the name in the program.
     notes, left_out
         As in :class:`~dhkit.grading.answers.sheet_values.AnswerSheet`.
     """
@@ -81,15 +111,15 @@ class Record:
     robot: RobotNames
     power: str
     broken: dict[str, str] = field(default_factory=dict)
-    definitions: dict[str, tuple[str, Scalar]] = field(default_factory=dict)
+    definitions: dict[str, Definition] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
     scopes: int = 0
     calls: int = 0
-    taken: dict[tuple[int, str, int], str] = field(default_factory=dict)
-    """Joint variables that entries of a state are, by the call, the vector and the place."""
-    symbols: dict[Meaning, tuple[str, str]] = field(default_factory=dict)
-    """Symbols that the program makes, with their lines, by meaning."""
+    taken: dict[StatePlace, str] = field(default_factory=dict)
+    """Joint variables that entries of states are."""
+    symbols: dict[Meaning, SymbolMade] = field(default_factory=dict)
+    """Symbols that the program makes, by meaning."""
     _texts: dict[str, str] = field(default_factory=dict)
 
     def note(self, text: str) -> None:
@@ -107,23 +137,23 @@ class Record:
         if text not in self.left_out:
             self.left_out.append(text)
 
-    def define(self, key: str, base: str, line: str, scalar: Scalar) -> Scalar:
+    def define(self, key: str, base: str, where: str, scalar: Scalar) -> Scalar:
         """Return a name for a formula, which is defined beside the answers; a number stands for itself."""
         known = frozenset((key,))
         if re.fullmatch(r"[\d.]+", scalar.text):
             return replace(scalar, uses=scalar.uses | known)
-        name = self._free_name(base, line, scalar.text)
+        name = self._free_name(base, where, scalar.text)
         self._texts[plain_name(name)] = scalar.text
-        self.definitions[key] = name, scalar
+        self.definitions[key] = Definition(name, scalar)
         if len(self.definitions) > 10 * BOUNDS.definitions:
             raise AnswerError(f"answers are made of more than {BOUNDS.definitions} names")
         return Scalar(name, Level.ATOM, scalar.number, known)
 
-    def _free_name(self, base: str, line: str, text: str) -> str:
+    def _free_name(self, base: str, where: str, text: str) -> str:
         if self._is_free(base, text) and ("_" not in base or not self.robot.vocabulary.knows(base)):
             return base
         letters = re.sub(r"[\W_]", "", base, flags=re.ASCII) or "x"
-        name = f"{'' if letters[0].isalpha() else 'x'}{letters}_{re.sub(chr(92) + 'W', '', line, flags=re.ASCII)}"
+        name = f"{'' if letters[0].isalpha() else 'x'}{letters}_{re.sub(chr(92) + 'W', '', where, flags=re.ASCII)}"
         while not self._is_free(name, text):
             name += "x"
         return name
@@ -157,7 +187,8 @@ class Record:
                 raise UnreadError(self.broken[key])
             waiting.append((key, True))
             if key in self.definitions:
-                waiting += [(other, False) for other in sorted(self.definitions[key][1].uses) if other not in done]
+                needed = self.definitions[key].formula.uses
+                waiting += [(other, False) for other in sorted(needed) if other not in done]
         return list(done)
 
 
@@ -181,7 +212,7 @@ class Scope:
         self.local = local
         self.number = record.scopes
         record.scopes += 1
-        self.names: dict[str, Bound] = {}
+        self.names: dict[str, Binding] = {}
         self.read: set[str] = set()
         """Names that were read before they were bound."""
         self.assigned_entries: dict[str, set[Index]] = {}
@@ -199,9 +230,9 @@ class Scope:
             self._outermost().read.add(name)
         return (owner or self._outermost()).key(name)
 
-    def set_argument(self, name: str, value: Value, line: str) -> None:
+    def set_argument(self, name: str, value: Value, where: str) -> None:
         """Bind an argument of a function, whatever its name means outside."""
-        self.names[name] = Bound(value, value, line)
+        self.names[name] = Binding(value, value, where)
 
     def owner(self, name: str) -> Scope | None:
         """Return the scope that binds a name."""
@@ -211,14 +242,14 @@ class Scope:
 
     # Binding
 
-    def bind(self, name: str, value: Value, line: str) -> None:
+    def bind(self, name: str, value: Value, where: str) -> None:
         """Bind a name; one that was bound before to another value is not to be relied on."""
         try:
-            self._bind(name, self._state(name, self._vector(value)), line)
+            self._bind(name, self._state(name, self._vector(value)), where)
         except UnreadError as error:
-            self.break_name(name, _with_line(str(error), line), line, value)
+            self.break_name(name, _with_line(str(error), where), where, value)
 
-    def _bind(self, name: str, value: Value, line: str) -> None:
+    def _bind(self, name: str, value: Value, where: str) -> None:
         robot = self.robot
         is_quantity = isinstance(value, Matrix) and bool(robot.quantities.quantity(name))
         is_scalar = isinstance(value, Scalar) and robot.is_free_for_scalars(name)
@@ -227,9 +258,9 @@ class Scope:
         if is_reserved and not isinstance(value, Unread | Function):
             if not robot.keeps_meaning(name, value):
                 shown = value.text if isinstance(value, Scalar | Matrix) else "something else"
-                raise UnreadError(f"{name} is set to {shown[:40]!r} in {line}, and is the robot's own name")
+                raise UnreadError(f"{name} is set to {shown[:40]!r} in {where}, and is the robot's own name")
             if isinstance(value, Scalar) and value.number is not None:
-                self.record.note(f"{line}: {name} = {value.text} is the file's own number")
+                self.record.note(f"{where}: {name} = {value.text} is the file's own number")
             if isinstance(value, Scalar):
                 reference = Scalar(name, uses=frozenset((self.key(name),)))
         elif name in self.names:
@@ -248,29 +279,29 @@ class Scope:
         elif name in self.read and (is_scalar or not robot.is_reserved(name)):
             raise UnreadError(f"{name} is assigned after it was used")
         if isinstance(value, Given):
-            self._refuse_same_symbol(value, line)
+            self._refuse_same_symbol(value, where)
             reference = replace(value, uses=value.uses | {self.key(name)})
         elif isinstance(value, Scalar) and not is_reserved:
-            reference = self.record.define(self.key(name), name, line, value)
+            reference = self.record.define(self.key(name), name, where, value)
         elif isinstance(value, Matrix) and not is_reserved:
-            reference = self._named_entries(name, value, line)
-        self.names[name] = Bound(value, reference, line)
+            reference = self._named_entries(name, value, where)
+        self.names[name] = Binding(value, reference, where)
 
-    def _refuse_same_symbol(self, value: Given, line: str) -> None:
+    def _refuse_same_symbol(self, value: Given, where: str) -> None:
         """Refuse two symbols that the notation takes for one thing: m1 and M1."""
         meaning = self.robot.find(value.name) if value.is_symbol else None
         if meaning is None:
             return
-        known, known_line = self.record.symbols.setdefault(meaning, (value.name, line))
-        if known != value.name:
-            raise UnreadError(f"{known} ({known_line}) and {value.name} would both be read as {''.join(meaning)}")
+        known = self.record.symbols.setdefault(meaning, SymbolMade(value.name, where))
+        if known.name != value.name:
+            raise UnreadError(f"{known.name} ({known.where}) and {value.name} would both be read as {''.join(meaning)}")
 
-    def _named_entries(self, name: str, matrix: Matrix, line: str) -> Matrix:
+    def _named_entries(self, name: str, matrix: Matrix, where: str) -> Matrix:
         entries = {}
         known = frozenset((self.key(name),))
         for index, entry in matrix.entries.items():
             base = name + "".join(f"_{k + 1}" for k in index)
-            named = self.record.define(self.key(name, index), base, line, entry)
+            named = self.record.define(self.key(name, index), base, where, entry)
             entries[index] = replace(named, uses=named.uses | known)
         return replace(matrix, entries=entries)
 
@@ -304,34 +335,35 @@ class Scope:
             raise UnreadError(f"{name} is entry {places} of {value.vector}, of which is not known what it holds")
         for place, variable in zip(value.places, names, strict=True):
             taken = self.record.taken
-            known = taken.setdefault((value.number, value.vector, place), variable)
-            for (number, vector, other), taken_by in taken.items():
-                is_elsewhere = (number, vector) == (value.number, value.vector) and other != place
-                if is_elsewhere and robot.is_same(taken_by, variable):
-                    raise UnreadError(f"{name} is entry {place + 1} of {value.vector}, and entry {other + 1} elsewhere")
+            known = taken.setdefault(StatePlace(value.number, value.vector, place), variable)
+            for other, taken_by in taken.items():
+                is_same_state = other.call == value.number and other.vector == value.vector
+                if is_same_state and other.place != place and robot.is_same(taken_by, variable):
+                    here = f"{name} is entry {place + 1} of {value.vector}"
+                    raise UnreadError(f"{here}, and entry {other.place + 1} elsewhere")
             if not robot.is_same(known, variable):
                 raise UnreadError(f"{name} is an entry of {value.vector} that is {known} too")
         return Given(name) if value.is_slice else Scalar(name)
 
-    def bind_entry(self, name: str, index: Index, scalar: Scalar, line: str, is_added: bool = False) -> None:
+    def bind_entry(self, name: str, index: Index, scalar: Scalar, where: str, is_added: bool = False) -> None:
         """Bind an entry of a matrix: of zeros that were made before, or of one that entries alone make."""
         try:
-            self._bind_entry(name, index, scalar, line, is_added)
+            self._bind_entry(name, index, scalar, where, is_added)
         except UnreadError as error:
-            self.break_name(name, f"{error}, in {line}", line)
+            self.break_name(name, f"{error}, in {where}", where)
 
-    def _bind_entry(self, name: str, index: Index, scalar: Scalar, line: str, is_added: bool) -> None:
-        bound = self.names.get(name)
+    def _bind_entry(self, name: str, index: Index, scalar: Scalar, where: str, is_added: bool) -> None:
+        binding = self.names.get(name)
         assigned = self.assigned_entries.setdefault(name, set())
-        matrix = bound.value if bound is not None else None
+        matrix = binding.value if binding is not None else None
         is_quantity = bool(self.robot.quantities.quantity(name))
         # The letter g, and then the gravity torques g.
         is_letter = is_quantity and not assigned and isinstance(matrix, Scalar | Given)
-        if bound is not None and not isinstance(matrix, Matrix) and not is_letter:
+        if binding is not None and not isinstance(matrix, Matrix) and not is_letter:
             raise UnreadError(f"{name} is changed after it is assigned")
         if isinstance(matrix, Matrix) and not matrix.is_zeros and not assigned:
             raise UnreadError(f"{name} is changed after it is assigned")
-        if bound is None and self.robot.is_reserved(name) and not is_quantity:
+        if binding is None and self.robot.is_reserved(name) and not is_quantity:
             place = index[0] if len(index) == 1 or index[1] == 0 else -1
             if not (self.robot.is_vector(name) and self.robot.has_entry(name, place)):
                 raise UnreadError(f"an entry of {name} is set, which is the robot's own name")
@@ -341,7 +373,7 @@ class Scope:
         if self.aliases.get(name):
             raise UnreadError(f"{name} is changed, and may be the same matrix as {min(self.aliases[name])}")
         entries = dict(matrix.entries) if isinstance(matrix, Matrix) else {}
-        references = dict(bound.reference.entries) if bound and isinstance(bound.reference, Matrix) else {}
+        references = dict(binding.reference.entries) if binding and isinstance(binding.reference, Matrix) else {}
         if isinstance(matrix, Matrix) and matrix.is_zeros:
             index = _fitting(index, matrix)
         if is_added:
@@ -358,48 +390,48 @@ class Scope:
         key = self.key(name, index)
         while is_added and key in self.record.definitions:
             key += "+"
-        named = self.record.define(key, base, line, scalar)
+        named = self.record.define(key, base, where, scalar)
         entries[index] = scalar
         references[index] = replace(named, uses=named.uses | known)
         is_zeros = isinstance(matrix, Matrix) and matrix.is_zeros
         options = {"is_zeros": is_zeros, "multiplies_entries": bool(getattr(matrix, "multiplies_entries", False))}
         value = Matrix(dict(sorted(entries.items())), **options)
         reference = Matrix(references, **options)
-        self.names[name] = Bound(value, reference, bound.line if isinstance(matrix, Matrix) and bound else line)
+        self.names[name] = Binding(value, reference, binding.where if isinstance(matrix, Matrix) and binding else where)
 
-    def break_name(self, name: str, reason: str, line: str = "", value: Value | None = None) -> None:
+    def break_name(self, name: str, reason: str, where: str = "", value: Value | None = None) -> None:
         """Note that a name, and whatever is made of it, is not to be relied on."""
         self.record.broken.setdefault(self.key(name), reason)
         if name not in self.names:
-            self.names[name] = Bound(Unread(reason) if value is None else value, Unread(reason), line)
+            self.names[name] = Binding(Unread(reason) if value is None else value, Unread(reason), where)
 
     def change(self, name: str, reason: str, only_matrices: bool = True) -> None:
         """Note that something changes a name, or the matrix that it stands for, in a way that is not read."""
         owner = self.owner(name) or self
-        bound = owner.names.get(name)
-        if not only_matrices or (bound is not None and _can_change(bound.value)):
+        binding = owner.names.get(name)
+        if not only_matrices or (binding is not None and _can_change(binding.value)):
             owner.break_name(name, reason)
         for other in [*self.same_matrices(name), *owner.same_matrices(name)]:
             holder = self.owner(other)
-            bound = holder.names.get(other) if holder is not None else None
-            if holder is not None and bound is not None and _can_change(bound.value):
+            binding = holder.names.get(other) if holder is not None else None
+            if holder is not None and binding is not None and _can_change(binding.value):
                 holder.break_name(other, f"{other} may be the same matrix as {name}: {reason}")
 
     def is_mutable(self, name: str) -> bool:
         """Whether a name stands for a matrix, or for something else that can be changed."""
         owner = self.owner(name)
-        bound = owner.names.get(name) if owner is not None else None
-        return bound is not None and _can_change(bound.value)
+        binding = owner.names.get(name) if owner is not None else None
+        return binding is not None and _can_change(binding.value)
 
     def stands_for(self, name: str, value: Value) -> bool:
         """Whether a value is that of a name: M is returned, and not M.inv()."""
-        bound = self.names[name]
-        return self._is_same(bound.reference, value) or self._is_same(bound.value, value)
+        binding = self.names[name]
+        return self._is_same(binding.reference, value) or self._is_same(binding.value, value)
 
     def is_bare_zero(self, name: str) -> bool:
         """Whether a name is bound to a zero of the states' shape, which ``K[...] =`` replaces."""
-        bound = self.names.get(name)
-        return bound is not None and isinstance(bound.value, Matrix) and not bound.value.entries
+        binding = self.names.get(name)
+        return binding is not None and isinstance(binding.value, Matrix) and not binding.value.entries
 
     def add_alias(self, name: str, others: Iterable[str]) -> None:
         """Note that a name may be the same list or matrix as others, or share entries with them."""
@@ -437,12 +469,12 @@ class Scope:
                 raise UnreadError(f"{name} is used before it is assigned")
             if owner.key(name) in self.record.broken:
                 raise UnreadError(self.record.broken[owner.key(name)])
-            bound = owner.names[name]
-            if isinstance(bound.reference, Matrix) and not bound.reference.entries:
+            binding = owner.names[name]
+            if isinstance(binding.reference, Matrix) and not binding.reference.entries:
                 raise UnreadError(f"{name} is read before it is filled")
-            if isinstance(bound.reference, Unread):
-                raise UnreadError(bound.reference.reason)
-            return bound.reference
+            if isinstance(binding.reference, Unread):
+                raise UnreadError(binding.reference.reason)
+            return binding.reference
         return self._unbound(name)
 
     def _unbound(self, name: str) -> Value:
@@ -509,9 +541,10 @@ class Scope:
 
     def entry_of_state(self, number: int, vector: str, place: int) -> Scalar:
         """Return the joint variable that an entry of a state was said to be."""
-        if (number, vector, place) not in self.record.taken:
+        entry = StatePlace(number, vector, place)
+        if entry not in self.record.taken:
             raise UnreadError(f"entry {place + 1} of {vector} is read, of which is not known what it holds")
-        return self.known(self.record.taken[number, vector, place])
+        return self.known(self.record.taken[entry])
 
     def entry(self, value: Value, index: Index) -> Value:
         """Return an entry of a matrix, of a vector of the robot's, or of a state."""
@@ -557,9 +590,9 @@ def _can_change(value: Value) -> bool:
     return isinstance(value, Matrix | Structure) or (isinstance(value, Given) and not value.is_symbol)
 
 
-def _with_line(message: str, line: str) -> str:
+def _with_line(message: str, where: str) -> str:
     """Return a message that names a line."""
-    return message if line in message else f"{message}, in {line}"
+    return message if where in message else f"{message}, in {where}"
 
 
 def _fitting(index: Index, matrix: Matrix) -> Index:

@@ -7,7 +7,7 @@ put together by the rules of precedence, so that a formula that was typed once l
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from itertools import chain
@@ -111,14 +111,26 @@ class Matrix:
         if self.is_flat:
             return [[self.entries[(i,)]] for i in range(self.shape[0])]
         m, n = self.shape
-        return [[self.entries[(i, j)] for j in range(n)] for i in range(m)]
+        return self.part(range(m), range(n))
+
+    def part(self, rows: Iterable[int], columns: Sequence[int]) -> list[list[Scalar]]:
+        """Return the entries in some rows and columns of a matrix with two indices."""
+        part = []
+        for i in rows:
+            row = [self.entries[(i, j)] for j in columns]
+            part.append(row)
+        return part
 
     @property
     def text(self) -> str:
         """The matrix in brackets, as the reader of answers takes it."""
         if self.is_flat:
             return f"[{', '.join(entry.text for entry in self.entries.values())}]"
-        return "[" + ", ".join(f"[{', '.join(entry.text for entry in row)}]" for row in self.rows) + "]"
+        row_texts = []
+        for row in self.rows:
+            entries = ", ".join(entry.text for entry in row)
+            row_texts.append(f"[{entries}]")
+        return f"[{', '.join(row_texts)}]"
 
     def mapped(self, change: Callable[[Scalar], Scalar]) -> Matrix:
         """Return the matrix with a function applied to each entry."""
@@ -210,8 +222,8 @@ class Function:
         Values of arguments that a call may leave out.
     definition
         Its definition in the syntax of the language.
-    line
-        Where it is defined.
+    where
+        The line in which it is defined, as messages name it.
     problem
         Why it cannot be read; empty where it can.
     default_names
@@ -225,7 +237,7 @@ class Function:
     name: str
     parameters: tuple[str, ...]
     definition: Any
-    line: str
+    where: str
     defaults: Mapping[str, Value] = field(default_factory=dict)
     problem: str = ""
     default_names: frozenset[str] = frozenset()
@@ -337,7 +349,15 @@ def matrix_of(rows: Sequence[Sequence[Scalar]], **options: bool) -> Matrix:
         raise UnreadError("a matrix whose rows differ in length, or are empty, is not read")
     if len(rows) * len(rows[0]) > BOUNDS.matrix_entries:
         raise UnreadError(f"a matrix of more than {BOUNDS.matrix_entries} entries")
-    return Matrix({(i, j): x for i, row in enumerate(rows) for j, x in enumerate(row)}, **options)
+    entries: dict[Index, Scalar] = {}
+    for i, row in enumerate(rows):
+        entries |= {(i, j): entry for j, entry in enumerate(row)}
+    return Matrix(entries, **options)
+
+
+def row_or_column(entries: Sequence[Scalar], *, is_column: bool) -> Matrix:
+    """Return a matrix of one row or one column."""
+    return matrix_of([[entry] for entry in entries]) if is_column else matrix_of([entries])
 
 
 def vector_of(scalars: Sequence[Scalar], **options: bool) -> Matrix:
@@ -361,7 +381,11 @@ def identity(n: int, multiplies_entries: bool = False) -> Matrix:
     """Return an identity matrix."""
     if not 0 < n <= BOUNDS.index:
         raise UnreadError("an identity matrix of this size is not read")
-    rows = [[ONE if i == j else ZERO for j in range(n)] for i in range(n)]
+    rows = []
+    for i in range(n):
+        row = [ZERO] * n
+        row[i] = ONE
+        rows.append(row)
     return matrix_of(rows, multiplies_entries=multiplies_entries)
 
 
@@ -394,7 +418,10 @@ def product(left: Matrix, right: Matrix, power: str = "^") -> Matrix | Scalar:
     if len(a) * len(b) * len(b[0]) > BOUNDS.matrix_entries:
         raise UnreadError("a product of matrices of this size is not read")
     columns = list(zip(*b, strict=True))
-    rows = [[_dot(row, column, power) for column in columns] for row in a]
+    rows = []
+    for row in a:
+        entries = [_dot(row, column, power) for column in columns]
+        rows.append(entries)
     if left.is_flat and right.is_flat:
         return rows[0][0]
     multiplies_entries = left.multiplies_entries or right.multiplies_entries
