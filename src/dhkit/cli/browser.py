@@ -47,6 +47,9 @@ def lab(
     arguments: Annotated[list[str] | None, typer.Argument(help="Arguments of the program of --run.")] = None,
     isolated: Isolated = False,
     solid: Annotated[Path | None, typer.Option(help="STL file for the panel of transforms.")] = None,
+    record: Annotated[
+        Path | None, typer.Option(help="Folder in which the work on an assignment is recorded, to be handed in.")
+    ] = None,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Print the address, and open no browser.")] = False,
 ) -> ExitStatus:
     """Open an arm in the browser: move, drive, edit, plan and control it; Ctrl-C ends it."""
@@ -56,6 +59,8 @@ def lab(
         raise DescriptionError(f"{arguments[0]!r} after the robot; expected --run PROGRAM for arguments")
     own = mine if run is None else [run, *(arguments or [])]
     assignment = Assignment.read(robot) if is_assignment(robot) else None
+    if record is not None and assignment is None:
+        raise DescriptionError(f'--record: {robot} is not an assignment; expected a file with kind = "assignment"')
     arm = load_arm(robot) if assignment is None else assignment.arm
     what = f"the lab of {arm.name}" if assignment is None else f"{assignment.title}: the lab"
     found = None
@@ -70,8 +75,9 @@ def lab(
         own=own,
         isolation=found,
         solid=solid,
-        assignment=assignment,
+        assignment=None if assignment is None else robot,
         source=robot if assignment is None else None,
+        record=record,
     ) as served:
         return until_interrupted(served.url, what, open_browser=not no_browser)
 

@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,9 +18,10 @@ from dhkit.cli.exit_status import ExitStatus
 from dhkit.cli.grade_output import Delivery
 from dhkit.cli.isolating import Isolated, isolation_for
 from dhkit.cli.options import Json, read_arm
-from dhkit.cli.output import say
+from dhkit.cli.output import print_json, print_table, say
 from dhkit.cli.streams import styled
 from dhkit.description import write_atomically
+from dhkit.display import counted
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.grading import LIBRARY, grade as judge_sheet
 from dhkit.grading.answers.sheet import read_sheet, read_task
@@ -32,6 +34,8 @@ from dhkit.grading.reports import read_reports
 from dhkit.grading.rubric import Rubric
 from dhkit.grading.schema import template as empty_sheet
 from dhkit.grading.sheets import find_sheets
+from dhkit.lab.assignment import Assignment, is_assignment
+from dhkit.lab.marks import find_records, lab_mark, lab_marks_csv
 
 app = typer.Typer(rich_markup_mode=None)
 PRINTED = Delivery()
@@ -46,7 +50,8 @@ def grade(
         str | None, typer.Option(help="A library name or a robot file, instead of the sheets' own.")
     ] = None,
     task: Annotated[
-        Path | None, typer.Option(help="The instructor's file: robot, [task], [names], [rubric] (.toml).")
+        Path | None,
+        typer.Option(help="The instructor's file: robot, [task], [names], [rubric]; or a lab's assignment (.toml)."),
     ] = None,
     rubric: Annotated[Path | None, typer.Option(help="Rubric: points of the answers (.toml).")] = None,
     execute: Annotated[
@@ -84,6 +89,8 @@ def grade(
         return _write_template(template, output)
     if explain is not None:
         return _write_explanation(read_arm(explain), form, output)
+    if sheets and task is not None and is_assignment(task):
+        return grade_records(sheets, task, "json" if json else form, output)
     if not sheets:
         raise DescriptionError("no answer sheet; expected files or folders, --template NAME or --explain NAME")
     delivery = Delivery("json" if json else form, feedback, output, read)
@@ -101,6 +108,42 @@ def grade(
         jobs=jobs,
         seconds=seconds,
     )
+
+
+def grade_records(paths: Sequence[Path], task: Path, form: str, output: Path | None) -> ExitStatus:
+    """Collect the records of a lab's assignment into marks; print them, or write them as CSV.
+
+    Raises
+    ------
+    AnswerError
+        There is no record, or the form is not text or json.
+    DescriptionError
+        The assignment cannot be read, or the output does not end in .csv.
+    """
+    if form not in ("text", "json"):
+        raise AnswerError(f"--format {form}: records of a lab have the forms text and json; --output marks.csv")
+    if output is not None and output.suffix.lower() != ".csv":
+        raise DescriptionError(f"{output}: ends in {output.suffix!r}; expected .csv for the marks of a lab")
+    assignment = Assignment.read(task)
+    marks = [lab_mark(path, assignment) for path in find_records(paths)]
+    if output is not None:
+        write_atomically(output, lab_marks_csv(marks, assignment))
+        say(f"wrote {output}")
+    elif form == "json":
+        print_json([asdict(mark) | {"file": str(mark.file)} for mark in marks])
+    else:
+        rows = []
+        for mark in marks:
+            notes = list(mark.notes)
+            if mark.unchecked:
+                notes.append(f"{counted(mark.unchecked, 'goal')} on the record's word")
+            rows.append(
+                (mark.student, f"{mark.points:g}", f"{mark.most:g}", mark.last, str(mark.file), "; ".join(notes))
+            )
+        print_table(("student", "points", "of", "last goal", "file", "notes"), rows, title=assignment.title)
+    if any(mark.notes for mark in marks):
+        return ExitStatus.UNUSABLE
+    return ExitStatus.FINE if all(mark.points >= mark.most for mark in marks) else ExitStatus.NO
 
 
 def rubric_of(path: Path | None) -> Rubric:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import chain
@@ -19,6 +20,7 @@ from dhkit.display import counted, html_block, html_table, plain, repr_line, val
 from dhkit.errors import DescriptionError, DhkitError
 from dhkit.kinematics import classify
 from dhkit.lab.assignment_form import GoalForm, PoseForm, ToleranceForm, validated
+from dhkit.lab.run_settings import Settings
 from dhkit.trajectories import Trajectory
 
 MAX_BYTES = 100_000
@@ -134,6 +136,70 @@ class OwnScore(Condition):
         )
 
 
+@dataclass(frozen=True, repr=False)
+class AnswerRight(Condition):
+    """An entry of the robot's equations or kinematics that is judged to be right.
+
+    Attributes
+    ----------
+    name
+        Name of the entry, such as ``M11``.
+    """
+
+    name: str
+
+
+@dataclass(frozen=True, repr=False)
+class NumberIs(Condition):
+    """A number that is typed.
+
+    Attributes
+    ----------
+    value
+        The right number.
+    tolerance
+        Largest difference from it.
+    """
+
+    value: float
+    tolerance: float
+
+    def is_reached(self, number: float) -> bool:
+        """Return whether a number is near enough."""
+        return abs(number - self.value) <= self.tolerance
+
+
+@dataclass(frozen=True, repr=False)
+class ControlWithin(Condition):
+    """A simulated run whose errors stay small for a time.
+
+    Attributes
+    ----------
+    error
+        Largest error of each joint value, rad or m.
+    seconds
+        Time for which it is kept without a break, s.
+    reference
+        Name of what the run follows: ``sine`` or ``motion``.
+    payload
+        Smallest load at the tool, kg.
+    controller
+        Name of the controller; None for any.
+    """
+
+    error: float
+    seconds: float
+    reference: str
+    payload: float
+    controller: str | None
+
+    def is_kept(self, settings: Settings, errors: Array) -> bool:
+        """Return whether a run with these settings is asked for, and its errors, shape (k,), rad and m, are small."""
+        is_asked_for = settings.reference.value == self.reference and settings.payload >= self.payload
+        has_controller = self.controller in (None, settings.controller)
+        return bool(is_asked_for and has_controller and np.abs(errors).max() <= self.error)
+
+
 @dataclass(frozen=True, eq=False)
 class Goal:
     """Goal of a step.
@@ -195,6 +261,8 @@ class Assignment:
         Names of the panels that are shown beside that of the task; None for all.
     steps
         The steps, in their order.
+    digest
+        SHA-256 of the file and its robot, in hexadecimal: records of work name the assignment by it.
 
     Examples
     --------
@@ -220,6 +288,7 @@ class Assignment:
     start: Array | None
     panels: tuple[str, ...] | None
     steps: tuple[Step, ...]
+    digest: str = ""
 
     @property
     def points(self) -> float:
@@ -256,7 +325,8 @@ class Assignment:
                 steps.append(Step(step.title, step.text or "", step.panel, goals))
         except (DescriptionError, UnicodeDecodeError) as error:
             raise DescriptionError(f"{path}: {error}") from None
-        return cls(form.title, arm, start, form.panels, tuple(steps))
+        digest = hashlib.sha256(content + arm.description.digest.encode()).hexdigest()
+        return cls(form.title, arm, start, form.panels, tuple(steps), digest)
 
     def require(self, arm: Arm) -> None:
         """Refuse another robot than the assignment's.
@@ -333,6 +403,13 @@ def _condition(arm: Arm, form: GoalForm, place: str) -> Condition:
             raise DescriptionError(f"{place}motion: it ends where it begins; expected two configurations")
         max_duration = np.inf if form.motion.duration is None else form.motion.duration
         return MotionBetween(begin, end, tolerance.joint, max_duration)
+    if form.answer is not None:
+        return AnswerRight(form.answer.name)
+    if form.number is not None:
+        return NumberIs(form.number.value, form.number.tolerance)
+    if form.control is not None:
+        control = form.control
+        return ControlWithin(control.error, control.seconds, control.reference, control.payload, control.controller)
     own = form.own
     assert own is not None  # noqa: S101 - for mypy: the form has exactly one
     return OwnScore(own.function, own.share)

@@ -26,7 +26,7 @@ from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import parse
 from dhkit.lab.tool_panel import EULER_ORDERS
 
-CONDITIONS = ("pose", "joints", "motion", "own")
+CONDITIONS = ("pose", "joints", "motion", "own", "answer", "number", "control")
 MAX_STEPS = 20
 MAX_GOALS = 20
 MAX_JOINTS = 32
@@ -150,12 +150,52 @@ class OwnForm:
     share: Within = 1.0
 
 
+@dataclass(frozen=True, config=STRICT)
+class AnswerForm:
+    """An entry of the robot's equations or kinematics, such as M11 or T, that the Answers panel judges to be right."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,29}$")]
+
+
+@dataclass(frozen=True, config=STRICT)
+class NumberForm:
+    """A number that is typed beside the goal, and its largest difference from the value."""
+
+    value: Number
+    tolerance: Annotated[float, Field(strict=True, gt=0, le=1e4, allow_inf_nan=False)]
+
+
+@dataclass(frozen=True, config=STRICT)
+class ControlForm:
+    """A simulated run whose joint errors, rad and m, stay below ``error`` for a time, s.
+
+    ``reference`` is what it follows, ``payload`` the smallest load, kg, that the controller does not know of.
+    """
+
+    error: Within
+    seconds: Annotated[float, Field(strict=True, gt=0, le=60, allow_inf_nan=False)] = 3.0
+    reference: Literal["sine", "motion"] = "sine"
+    payload: Annotated[float, Field(strict=True, ge=0, le=100, allow_inf_nan=False)] = 0.0
+    controller: Literal[
+        "pd",
+        "pid",
+        "pd-gravity",
+        "feed-forward",
+        "computed-torque",
+        "operational-space",
+        "adaptive",
+        "lqr",
+        "own",
+        None,
+    ] = None
+
+
 @dataclass(
     frozen=True,
     config=ConfigDict(extra="forbid", json_schema_extra={"oneOf": [{"required": [name]} for name in CONDITIONS]}),
 )
 class GoalForm:
-    """Goal of a step: one of pose, joints, motion and own."""
+    """Goal of a step: one of pose, joints, motion, own, answer, number and control."""
 
     text: Line
     points: Points = 1.0
@@ -163,6 +203,9 @@ class GoalForm:
     joints: JointValues | None = None
     motion: MotionForm | None = None
     own: OwnForm | None = None
+    answer: AnswerForm | None = None
+    number: NumberForm | None = None
+    control: ControlForm | None = None
     tolerance: ToleranceForm = Field(default_factory=ToleranceForm)
 
     @model_validator(mode="after")
@@ -205,6 +248,9 @@ FORMS: dict[str, type] = {
     "tolerance": ToleranceForm,
     "motion": MotionForm,
     "own": OwnForm,
+    "answer": AnswerForm,
+    "number": NumberForm,
+    "control": ControlForm,
 }
 """The forms of tables inside the file, by the keys of the tables."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
@@ -81,6 +82,8 @@ class ControlPanel(Panel):
         desk.on_replace.append(self._forget_run)
         desk.steer = self._steer
         motions.on_change.append(self._follow_changed_motion)
+        self.on_frame: list[Callable[[float, Array], None]] = []
+        """Called with the time of a run, s, and the errors of its joints, shape (k,), rad and m, at each frame."""
         own.on_change.append(self.publish)
 
     @answers("control.start", *SETTING_NAMES)
@@ -321,6 +324,8 @@ class ControlPanel(Panel):
         self.desk.show(q)
         self.desk.view.ghosts(reference[None], GHOST_COLOR)
         tool_error = np.linalg.norm(self.desk.arm.fk(q)[:3, 3] - self.desk.arm.fk(reference)[:3, 3])
+        for call in self.on_frame:
+            call(t, desired - moved)
         row = np.array([[t, *moved, *(desired - moved), *tau, tool_error]], dtype=np.float32)
         self.desk.view.append(Samples("control", self._columns(), row))
 

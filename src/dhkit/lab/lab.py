@@ -22,6 +22,7 @@ from dhkit.lab.motion_panel import MotionPanel
 from dhkit.lab.obstacle_panel import ObstaclePanel
 from dhkit.lab.own_panel import OwnPanel
 from dhkit.lab.python_panel import PythonPanel
+from dhkit.lab.record import taken_up
 from dhkit.lab.requests import Fields, JsonObject, Panel, answers
 from dhkit.lab.submit_panel import SubmitPanel
 from dhkit.lab.table_panel import TablePanel
@@ -54,6 +55,8 @@ class Lab:
         Texts and goals that the page shows first; its robot is the arm.
     source
         Name or path that the arm was loaded from, for "Copy as Python"; by default its name, if it is in the library.
+    record
+        File in which the work on the assignment is recorded, to be handed in; work in it is taken up again.
     port, token
         Address of the page, for pages that are to find it again; by default any free port and a new token.
 
@@ -81,12 +84,14 @@ class Lab:
         solid: str | Path | None = None,
         assignment: Assignment | None = None,
         source: str | None = None,
+        record: Path | None = None,
     ) -> None:
         arm = arm if isinstance(arm, Arm) else Arm(description_of(arm))
         if assignment is not None:
             assignment.require(arm)
         self._lock = threading.RLock()
         self._closed = False
+        work = None if record is None or assignment is None else taken_up(record, assignment)
         solid_read = None if solid is None else Solid.read(Path(solid))
         self.view = View(arm.description, answer=self.answer, port=port, token=token)
         self.desk = desk = Desk(arm, self.view)
@@ -99,6 +104,7 @@ class Lab:
         self._motions = MotionPanel(desk, jobs, obstacles)
         self._own = OwnPanel(desk, own, isolation, self._lock)
         self._control = ControlPanel(desk, self._motions, self._own)
+        submitted = SubmitPanel(desk, self._lock)
         self._panels: tuple[Panel, ...] = (
             JointPanel(desk),
             self._tool,
@@ -108,9 +114,9 @@ class Lab:
             self._control,
             DynamicsPanel(desk, self._lock),
             WorkspacePanel(desk, self._lock),
-            SubmitPanel(desk, self._lock),
+            submitted,
             TransformsPanel(desk, solid_read),
-            TaskPanel(desk, self._motions, self._own, assignment),
+            TaskPanel(desk, self._motions, self._own, submitted, self._control, assignment, record, work),
             PythonPanel(desk, table, self._tool, self._motions, self._control, source),
             self._own,
         )

@@ -13,6 +13,8 @@ from dhkit.description import Robot, write_atomically
 from dhkit.errors import ModelError
 from dhkit.lab.assignment import Assignment
 from dhkit.lab.lab import Lab
+from dhkit.lab.record import record_path
+from dhkit.model.robot_folder import model_errors
 from dhkit.programs import Isolation
 from dhkit.viewer.opening import open_in_browser
 
@@ -33,6 +35,7 @@ def serve(
     solid: str | Path | None = None,
     assignment: Assignment | str | Path | None = None,
     source: str | None = None,
+    record: str | Path | None = None,
 ) -> Lab:
     """Open a lab in the browser.
 
@@ -55,6 +58,9 @@ def serve(
         Texts and goals about this arm, or the file that has them.
     source
         Name or path that the arm was loaded from, for "Copy as Python": see :class:`Lab`.
+    record
+        Folder in which the work on the assignment is recorded, as ``NAME.lab.json`` for the assignment ``NAME.toml``;
+        work in it is taken up again. The file is handed in, and ``dhkit grade`` collects it.
 
     Returns
     -------
@@ -68,7 +74,9 @@ def serve(
     DescriptionError
         The assignment cannot be read, or is about another robot.
     ValueError
-        The port is not from 1024 to 65535.
+        The port is not from 1024 to 65535, or there is a record and no assignment's file.
+    AnswerError
+        The record cannot be read, or was edited.
 
     Examples
     --------
@@ -80,9 +88,17 @@ def serve(
     """
     if port is not None and not 1024 <= port < 65_536:
         raise ValueError(f"port is {port}; expected 1024 to 65535")
+    if record is not None and not isinstance(assignment, (str, Path)):
+        raise ValueError("record is given without the file of an assignment; expected assignment=PATH beside it")
+    file = None
     if isinstance(assignment, (str, Path)):
+        if record is not None:
+            file = record_path(Path(record), Path(assignment))
+            with model_errors(file):
+                file.parent.mkdir(parents=True, exist_ok=True)
         assignment = Assignment.read(assignment)
-    lab = Lab(arm, port or 0, None if port is None else kept_token(port), own, isolation, solid, assignment, source)
+    token = None if port is None else kept_token(port)
+    lab = Lab(arm, port or 0, token, own, isolation, solid, assignment, source, file)
     try:
         if open_browser:
             open_in_browser(lab.url)

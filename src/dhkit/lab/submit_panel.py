@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Collection
 from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -50,6 +51,8 @@ class SubmitPanel(Panel):
     def __init__(self, desk: Desk, lock: AbstractContextManager[object]) -> None:
         super().__init__(desk)
         self.jobs: Jobs = Jobs(self._publish_failure, lock)
+        self.on_verdict: list[Callable[[str, Collection[str]], None]] = []
+        """Called with an answer's text and the names of its right entries."""
         desk.on_replace.append(self._clear)
 
     @answers("submit.grade", "kind", "text")
@@ -69,13 +72,21 @@ class SubmitPanel(Panel):
         self.jobs.start(
             "submit",
             lambda job: _judge(description, content, SUFFIXES[kind], job),
-            lambda state: self.desk.view.panel("verdict", state),
+            lambda state: self._take(text, state),
         )
 
     @answers("submit.cancel")
     def cancel(self, _: Fields) -> None:
         """Stop judging."""
         self._clear()
+
+    def _take(self, text: str, state: JsonObject) -> None:
+        self.desk.view.panel("verdict", state)
+        entries = state["entries"]
+        assert isinstance(entries, list)  # noqa: S101 - for mypy: see _report_state
+        right = [entry["name"] for entry in entries if entry["passes"]]
+        for call in self.on_verdict:
+            call(text, right)
 
     def _publish_failure(self, state: JobState | None) -> None:
         if state is not None and state["error"]:

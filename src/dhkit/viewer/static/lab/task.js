@@ -1,6 +1,6 @@
 // An assignment: its texts, its goals, and which of them Python has found to be met.
 
-import { h } from "./dom.js";
+import { h, onTyped } from "./dom.js";
 import { remember, remembered } from "./memory.js";
 
 export class TaskPanel {
@@ -23,8 +23,27 @@ export class TaskPanel {
       },
       "Reset",
     );
+    this.student = h("input", {
+      type: "text",
+      class: "wide",
+      maxLength: 100,
+      "aria-label": "Your name",
+    });
+    onTyped(
+      this.student,
+      () => lab.ask("task.name", { name: this.student.value }),
+      () => (this.student.value = this.task?.student ?? ""),
+    );
+    this.recorded = h("p", { class: "hint" });
+    this.handing = h(
+      "div",
+      { hidden: true },
+      h("label", { class: "line" }, "Your name ", this.student),
+      this.recorded,
+    );
     root.append(
       this.title,
+      this.handing,
       this.points,
       this.bar,
       this.note,
@@ -38,7 +57,13 @@ export class TaskPanel {
     for (const { name } of this.lab.panels)
       if (name !== "task")
         this.lab.showTab(name, !task?.panels || task.panels.includes(name), "task");
+    this.task = task;
     if (!task) return;
+    this.handing.hidden = !task.file;
+    this.recorded.textContent = task.file
+      ? `Your work is recorded in ${task.file}: hand this file in.`
+      : "";
+    if (document.activeElement !== this.student) this.student.value = task.student;
     const key = JSON.stringify([
       task.title,
       task.steps.map((step) => [
@@ -78,7 +103,7 @@ export class TaskPanel {
 
   step({ title, text, panel, goals }, k) {
     const count = h("small");
-    const marks = goals.map((goal) => this.goal(goal));
+    const marks = goals.map((goal, j) => this.goal(goal, k, j));
     const paragraphs = text
       .split(/\n[ \t]*\n/)
       .map((one) => one.trim())
@@ -112,17 +137,39 @@ export class TaskPanel {
     return { root, count, marks };
   }
 
-  goal({ text, points }) {
+  goal({ text, points, number: asked }, step, goal) {
     const sign = h("span", { class: "sign", "aria-hidden": "true" }),
       word = h("span", { class: "word" });
     const root = h(
       "li",
       {},
       sign,
-      h("span", {}, text, points === 1 ? null : h("small", {}, ` (${number(points)} points)`)),
+      h(
+        "span",
+        {},
+        text,
+        points === 1 ? null : h("small", {}, ` (${number(points)} points)`),
+        asked ? this.answer(text, step, goal) : null,
+      ),
       word,
     );
     return { root, sign, word, met: null };
+  }
+
+  // A number that a goal asks for.
+  answer(text, step, goal) {
+    const input = h("input", { type: "text", class: "number", "aria-label": `Number: ${text}` });
+    const send = async () => {
+      const answer = await this.lab.ask("task.number", { step, goal, text: input.value });
+      if (answer) input.setAttribute("aria-invalid", String(!answer.right));
+    };
+    input.addEventListener("keydown", (event) => event.key === "Enter" && send());
+    return h(
+      "span",
+      { class: "line" },
+      input,
+      h("button", { type: "button", onclick: send }, "Check"),
+    );
   }
 
   mark({ goals }, { count, marks }) {

@@ -1,0 +1,119 @@
+"""Marks of records of work on an assignment: their goals are checked again from the evidence."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dhkit.display import plain, value_line
+from dhkit.errors import AnswerError
+from dhkit.grading.reports.marks_csv import cell
+from dhkit.lab.assignment import Assignment, Goal
+from dhkit.lab.record import SUFFIX, Place, Reached, Record, is_confirmed
+
+MAX_CELL = 1_000
+"""Longest text of a cell, characters."""
+
+
+@dataclass(frozen=True)
+class LabMark:
+    """Marks of one record.
+
+    Attributes
+    ----------
+    file
+        The record.
+    student
+        Name as typed; empty without one.
+    points, most
+        Points of the goals that count, and of all goals.
+    goals
+        Points of each goal, in the assignment's order.
+    last
+        When the last goal was reached: ISO 8601, UTC; empty if none was.
+    unchecked
+        Goals that count on the record's word: programs' scores, judged answers and controlled runs.
+    notes
+        What is wrong with the record, a sentence each.
+    """
+
+    file: Path
+    student: str
+    points: float
+    most: float
+    goals: tuple[float, ...] = ()
+    last: str = ""
+    unchecked: int = 0
+    notes: tuple[str, ...] = ()
+
+    __repr__ = value_line
+
+
+def find_records(paths: Sequence[Path]) -> list[Path]:
+    """Return the records among files and folders, each once, by name within a folder.
+
+    Raises
+    ------
+    AnswerError
+        There is no such file, or no record at all.
+    """
+    found: dict[Path, None] = {}
+    for path in paths:
+        if not path.exists():
+            raise AnswerError(f"{path}: no such file")
+        inside = sorted(path.rglob(f"*{SUFFIX}")) if path.is_dir() else [path]
+        found |= dict.fromkeys(file for file in inside if not file.is_symlink() or not path.is_dir())
+    if not found:
+        raise AnswerError(f"{', '.join(map(str, paths))}: no record of a lab; expected files *{SUFFIX}")
+    return list(found)
+
+
+def lab_mark(path: Path, assignment: Assignment) -> LabMark:
+    """Return the marks of a record; one that cannot be read or was edited has none, and a note why."""
+    try:
+        record = Record.read(path)
+    except AnswerError as error:
+        return LabMark(path, "", 0.0, assignment.points, notes=(str(error).removeprefix(f"{path}: "),))
+    if record.digest != assignment.digest:
+        note = "the record is about another assignment, or another version of this one"
+        return LabMark(path, record.student, 0.0, assignment.points, notes=(note,))
+    points: list[float] = []
+    notes: list[str] = []
+    unchecked = 0
+    for i, step in enumerate(assignment.steps):
+        for j, goal in enumerate(step.goals):
+            reached = record.reached.get(Place(i, j))
+            if reached is None:
+                points.append(0.0)
+                continue
+            confirmed = _confirmed(assignment, goal, reached)
+            unchecked += confirmed is None
+            if confirmed is False:
+                notes.append(f"step {i + 1}, goal {j + 1}: the evidence does not show it")
+            points.append(0.0 if confirmed is False else goal.points)
+    last = max((reached.time for reached in record.reached.values()), default="")
+    return LabMark(path, record.student, sum(points), assignment.points, tuple(points), last, unchecked, tuple(notes))
+
+
+def _confirmed(assignment: Assignment, goal: Goal, reached: Reached) -> bool | None:
+    """Return whether the evidence shows a goal; None where it cannot be checked again."""
+    try:
+        return is_confirmed(assignment, goal.condition, reached.evidence)
+    except (ValueError, KeyError, TypeError, IndexError):
+        return False
+
+
+def lab_marks_csv(marks: Sequence[LabMark], assignment: Assignment) -> str:
+    """Return marks as CSV text: a row for each record, a column for each goal."""
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    goals = [f"{i + 1}.{j + 1}" for i, step in enumerate(assignment.steps) for j in range(len(step.goals))]
+    writer.writerow(["student", "points", "of", *goals, "last goal", "not checked again", "notes", "file"])
+    for mark in marks:
+        each = [f"{x:g}" for x in mark.goals] or [""] * len(goals)
+        row = [mark.student, f"{mark.points:g}", f"{mark.most:g}", *each, mark.last, str(mark.unchecked)]
+        writer.writerow([cell(plain(text, MAX_CELL)) for text in (*row, "; ".join(mark.notes), str(mark.file))])
+    return file.getvalue()

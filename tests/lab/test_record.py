@@ -1,0 +1,218 @@
+"""Work on an assignment is recorded, taken up again, handed in, and collected into marks."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import dhkit
+from dhkit.cli import main
+from dhkit.errors import AnswerError, DescriptionError
+from dhkit.lab import Assignment
+from dhkit.lab.marks import find_records, lab_mark
+from dhkit.lab.record import Place, Record, _seal
+from lab.test_requests import states
+from waiting import wait_for
+
+ASSIGNMENT = """
+kind = "assignment"
+format = 1
+title = "Two links"
+robot = "planar2r"
+start = [0.3, 0.3]
+[[step]]
+title = "States"
+[[step.goal]]
+text = "Straight up"
+joints = ["pi/2", 0]
+points = 2
+[[step.goal]]
+text = "x 0.4, y 0.4"
+pose = { xyz = [0.4, 0.4, 0] }
+[[step.goal]]
+text = "A motion"
+motion = { from = [0, 0], to = [1, 1], duration = 30 }
+[[step]]
+title = "Numbers and equations"
+[[step.goal]]
+text = "Largest reach, m"
+number = { value = 2.0, tolerance = 0.001 }
+[[step.goal]]
+text = "Gravity torque of joint 2"
+answer = { name = "g2" }
+[[step]]
+title = "Control"
+[[step.goal]]
+text = "Follow the sine"
+control = { error = 0.05, seconds = 0.3, controller = "computed-torque" }
+"""
+
+
+@pytest.fixture
+def dhkit_command(capsys):
+    """Return what runs the command: exit status, stdout, stderr."""
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as end:
+            main([str(argument) for argument in arguments])
+        out, err = capsys.readouterr()
+        return end.value.code, out, err
+
+    return run
+
+
+@pytest.fixture
+def task(tmp_path):
+    file = tmp_path / "two.toml"
+    file.write_text(ASSIGNMENT)
+    return file
+
+
+def begin(task, folder):
+    arm = Assignment.read(task).arm
+    return dhkit.lab.serve(arm, block=False, open_browser=False, assignment=task, record=folder)
+
+
+def met(lab):
+    return [goal["met"] for step in states(lab)["task"]["steps"] for goal in step["goals"]]
+
+
+def work(lab):
+    """Reach all goals as a person does."""
+    arm = lab.desk.arm
+    lab.answer("task.name", {"name": "  Ada   Lovelace "})
+    lab.answer("joints.set", {"q": [np.pi / 2, 0.0]})
+    q = arm.ik(dhkit.pose([0.4, 0.4, 0.0])).q[0]
+    lab.answer("joints.set", {"q": q.tolist()})
+    lab.answer("joints.set", {"q": [0.0, 0.0]})
+    lab.answer("motion.plan", {"kind": "quintic", "goal": {"q": [1.0, 1.0]}, "duration": 20})
+    assert lab.answer("task.number", {"step": 1, "goal": 0, "text": "1.9"}) == {"right": False}
+    assert lab.answer("task.number", {"step": 1, "goal": 0, "text": "4/2"}) == {"right": True}
+
+
+def test_work_is_recorded_taken_up_again_and_collected(task, tmp_path):
+    folder = tmp_path / "work"
+    file = folder / "two.lab.json"
+    with begin(task, folder) as lab:
+        work(lab)
+        assert met(lab) == [True, True, True, True, False, False]
+        assert states(lab)["task"]["file"] == str(file)
+    record = Record.read(file)
+    assert record.student == "Ada Lovelace"
+    assert set(record.reached) == {Place(0, 0), Place(0, 1), Place(0, 2), Place(1, 0)}
+
+    # The lab is closed and opened again: points stay; the controller and the equation are added.
+    with begin(task, folder) as lab:
+        assert met(lab) == [True, True, True, True, False, False]
+        assert states(lab)["task"]["student"] == "Ada Lovelace"
+        lab.answer("submit.grade", {"kind": "lines", "text": "g2 = m2*g*l2*cos(q1 + q2)/2"})
+        wait_for(lambda: met(lab)[4])
+        lab.answer("control.start", {"controller": "computed-torque", "reference": "sine"})
+        wait_for(lambda: all(met(lab)))
+    mark = lab_mark(file, Assignment.read(task))
+    assert (mark.student, mark.points, mark.most, mark.unchecked, mark.notes) == ("Ada Lovelace", 7.0, 7.0, 2, ())
+
+
+def recorded(task, folder):
+    with begin(task, folder) as lab:
+        work(lab)
+    return folder / "two.lab.json"
+
+
+def edited(file, change, *, sealed):
+    """Change a record; with the seal made anew where ``sealed``, as somebody does who reads the source."""
+    content = json.loads(file.read_text())
+    del content["seal"]
+    change(content)
+    seal = _seal(content) if sealed else json.loads(file.read_text())["seal"]
+    file.write_text(json.dumps(content | {"seal": seal}))
+
+
+def test_an_edited_record_is_refused(task, tmp_path):
+    file = recorded(task, tmp_path / "work")
+    edited(file, lambda content: content.update(student="Charles"), sealed=False)
+    with pytest.raises(AnswerError, match="the seal does not fit"):
+        Record.read(file)
+    mark = lab_mark(file, Assignment.read(task))
+    assert mark.points == 0 and "the seal does not fit" in mark.notes[0]
+    with pytest.raises(AnswerError, match="the seal does not fit"):
+        begin(task, tmp_path / "work")
+
+
+FORGED = {
+    "a goal with the evidence of another": lambda goals: goals[0]["evidence"].update(q=[0.0, 0.0]),
+    "joint values of another arm": lambda goals: goals[0]["evidence"].update(q=[0.0] * 6),
+    "no evidence": lambda goals: goals[0]["evidence"].clear(),
+    "words": lambda goals: goals[0]["evidence"].update(q="here"),
+    "not finite": lambda goals: goals[0]["evidence"].update(q=[1e400, 0.0]),
+}
+
+
+@pytest.mark.parametrize("name", FORGED)
+def test_goals_are_checked_again_from_their_evidence(task, tmp_path, name):
+    file = recorded(task, tmp_path / "work")
+    edited(file, lambda content: FORGED[name](content["goals"]), sealed=True)
+    mark = lab_mark(file, Assignment.read(task))
+    assert mark.points == 3.0
+    assert mark.notes == ("step 1, goal 1: the evidence does not show it",)
+
+
+def test_a_forged_motion_and_number_are_found(task, tmp_path):
+    file = recorded(task, tmp_path / "work")
+
+    def change(content):
+        motion, number = (goal["evidence"] for goal in content["goals"][2:4])
+        motion["breaks"] = [0.0, 1e-3]
+        motion["coefficients"] = motion["coefficients"][:1]
+        number["number"] = 1.5
+
+    edited(file, change, sealed=True)
+    mark = lab_mark(file, Assignment.read(task))
+    assert mark.goals == (2.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    "content", ["", "[]", "{}", '{"kind": 1}', "null", "\xff", '{"seal": 1}' + " " * 2_000_001, "[" * 100_000]
+)
+def test_what_is_no_record_is_said_in_a_line(tmp_path, content):
+    file = tmp_path / "x.lab.json"
+    file.write_text(content, "latin-1")
+    with pytest.raises(AnswerError) as error:
+        Record.read(file)
+    assert "\n" not in str(error.value) and str(file) in str(error.value)
+
+
+def test_a_record_of_another_assignment_is_not_taken_up(task, tmp_path):
+    file = recorded(task, tmp_path / "work")
+    task.write_text(ASSIGNMENT.replace("Straight up", "Upright"))
+    with pytest.raises(DescriptionError, match="a record of another assignment"):
+        begin(task, tmp_path / "work")
+    assert "another assignment" in lab_mark(file, Assignment.read(task)).notes[0]
+
+
+def test_marks_of_a_class(task, tmp_path, dhkit_command):
+    for name in ("ada", "ben"):
+        recorded(task, tmp_path / "class" / name)
+    (tmp_path / "class" / "cy").mkdir()
+    (tmp_path / "class" / "cy" / "two.lab.json").write_text("=1+1")
+    status, out, _ = dhkit_command("grade", tmp_path / "class", "--task", task)
+    assert status == 2
+    assert out.count("Ada Lovelace") == 2 and "no record of a lab" in out
+    status, _, _ = dhkit_command("grade", tmp_path / "class", "--task", task, "-o", tmp_path / "marks.csv")
+    rows = list(csv.DictReader((tmp_path / "marks.csv").read_text().splitlines()))
+    assert [row["points"] for row in rows] == ["5", "5", "0"]
+    assert rows[0]["1.1"] == "2"
+    status, out, _ = dhkit_command("grade", tmp_path / "class" / "ada", "--task", task, "--json")
+    assert status == 1
+    assert json.loads(out)[0]["points"] == 5.0
+    with pytest.raises(AnswerError, match="no record of a lab"):
+        (tmp_path / "empty").mkdir()
+        find_records([tmp_path / "empty"])
+
+
+def test_record_without_an_assignment_is_refused(dhkit_command, tmp_path):
+    status, _, err = dhkit_command("lab", "planar2r", "--record", tmp_path, "--no-browser")
+    assert status == 2 and "is not an assignment" in err
+    with pytest.raises(ValueError, match="without the file of an assignment"):
+        dhkit.lab.serve(dhkit.Arm.load("planar2r"), block=False, open_browser=False, record=tmp_path)
