@@ -8,12 +8,15 @@ import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.control import Controller, Plant, Push, Setpoint, SimulationResult
+from dhkit.control.alternation import AlternationWatch
 from dhkit.control.controller import call_controller, reset, torques
 from dhkit.control.events import advance
+from dhkit.control.gains import effective_inertia
 from dhkit.control.integrators import RungeKutta, State
 from dhkit.control.runs import result_of
 from dhkit.description import Array
 from dhkit.dynamics import Friction
+from dhkit.errors import SimulationError
 from dhkit.lab.run_settings import Setpoints
 
 MAX_ROWS = 20_000
@@ -46,6 +49,7 @@ class Live:
         self.arm = arm
         self.rate = rate
         self.controller: Controller | None = None
+        self._watch = AlternationWatch(arm.n)
         self.setpoints: Setpoints = lambda t: (q, np.zeros(len(q)), np.zeros(len(q)))
         self._pushes: tuple[Push, ...] = ()
         self._plant = Plant(plant.description, friction, 0.0, ())
@@ -72,6 +76,7 @@ class Live:
         """Use another controller from now on; it is reset."""
         reset(controller)
         self.controller = controller
+        self._watch = AlternationWatch(self.arm.n)
 
     def change(self, plant: Arm, friction: Friction | None) -> None:
         """Simulate another load or friction from now on.
@@ -116,7 +121,7 @@ class Live:
         Raises
         ------
         SimulationError
-            The controller fails, or the state is no longer finite.
+            The controller fails, its torque alternates and grows, or the state is no longer finite.
         """
         plant = self._plant
         state = self._state
@@ -125,6 +130,7 @@ class Live:
         setpoint = Setpoint(self.arm.description, *self.setpoints(state.t))
         returned = call_controller(self.controller, state.t, state.q.copy(), state.qd.copy(), setpoint)
         commanded = torques(returned, n, state.t)
+        self._require_stable(commanded, state.t)
         effort = plant.description.numbers.effort
         tau = np.clip(commanded, -effort, effort)
         phase = plant.phase(state.q, state.qd, tau, plant.active_pushes(state.t))
@@ -141,6 +147,20 @@ class Live:
         self._turnover += float(np.abs(tau * (state.q - self._state.q)).sum())
         self._state = state
         return setpoint.q - state.q, tau
+
+    def _require_stable(self, tau: Array, t: float) -> None:
+        """Refuse torques, shape (n,), of which one has alternated at every sample and grown."""
+        joint = self._watch.unstable_joint(tau)
+        if joint is None:
+            return
+        m = float(effective_inertia(self._plant.description, self._state.q)[joint])
+        name = self.arm.description.joints[joint].name
+        unit = "N m s/rad" if self.arm.description.joints[joint].is_revolute else "N s/m"
+        raise SimulationError(
+            f"unstable after {t:.3g} s: the torque of {name} changes its sign at every sample and grows; at"
+            f" {self.rate:g} Hz its damping kd has to stay below 2 m rate = {2 * m * self.rate:.3g} {unit},"
+            f" with the effective inertia m = {m:.3g}"
+        )
 
     def result(self) -> SimulationResult:
         """Return the recorded run.

@@ -66,7 +66,7 @@ def test_an_arm_without_pairs_has_no_nearest_links():
     assert all(nearest_links(description, q) is None for q in product((-1.0, 1.0), repeat=2))
 
 
-@pytest.mark.parametrize("name", different_robots_first(["puma560", "panda", "stanford", "scara"]))
+@pytest.mark.parametrize("name", different_robots_first(["puma560", "panda", "stanford", "cobra600"]))
 def test_the_points_of_a_link_and_an_obstacle_are_on_both_and_no_nearer_than_capsules(name, law):
     description = library_robot(name)
     reach = description.reach
