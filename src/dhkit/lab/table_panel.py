@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dhkit.arm import Arm
-from dhkit.description import Array, Convention, Description, to_toml
+from dhkit.description import Array, Convention, Description, pose_parts, to_toml
 from dhkit.description.table_rows import quantity
 from dhkit.errors import DhkitError
 from dhkit.kinematics import classify
@@ -184,6 +184,8 @@ class TablePanel(Panel):
                 "undo": bool(self._undo),
                 "redo": bool(self._redo),
                 "changed": table.texts != first.texts or not same_convention,
+                "base": placement_state(numbers.T_world_base),
+                "tool": placement_state(numbers.T_last_tool),
                 "note": self._note(),
                 "joints": self.desk.arm.n if self.whole is None else self.whole.arm.n,
                 "locked": None if self.whole is None else list(self.whole.locked),
@@ -262,6 +264,14 @@ class TablePanel(Panel):
             self._redo = []
             self.whole = None
         self.publish()
+
+
+def placement_state(T: Array) -> list[float] | None:
+    """Return the position, m, and the Euler angles about fixed x, y, z, rad, of a pose; None for the identity."""
+    if np.array_equal(T, np.eye(4)):
+        return None
+    position, angles = pose_parts(T, order="xyz")
+    return [*position.tolist(), *angles.tolist()]
 
 
 def plain_expression(text: str) -> str:

@@ -73,6 +73,7 @@ def arm_state(description: Description, *, assumed_bodies: bool = False) -> dict
         "assumed_bodies": assumed_bodies,
         "parameters": list(numbers.values),
         "reach": description.reach,
+        "length": description.units.length,
     }
 
 

@@ -11,6 +11,7 @@ const WIDTH = 348,
   SLIM = 322,
   NARROW = 280,
   SCENE = 420; // px: of a panel at first, on a small page, at least, and left to the scene
+const LENGTHS = { m: "m", cm: "mm", mm: "mm", in: "in" }; // units of files, as the page shows them
 const STEP = 24; // px that an arrow key moves the edge
 
 export class Lab {
@@ -242,6 +243,7 @@ export class Lab {
   take({ name, data }) {
     this.state[name] = data;
     if (name === "arm") {
+      this.useUnitOf(data);
       this.title.textContent = data.name;
       const family = data.family ?? "no closed form: followed by iteration";
       this.family.textContent = this.family.title = data.assumed_bodies
@@ -337,10 +339,23 @@ export class Lab {
     area.select();
   }
 
+  // Lengths are in the unit of the robot's file until a person chooses another.
+  useUnitOf(arm) {
+    const unit = LENGTHS[arm.length];
+    if (remembered("length", "") === "" && unit && unit !== this.units.length) {
+      this.units.length = unit;
+      this.tellUnits();
+    }
+  }
+
   setUnits(units) {
     Object.assign(this.units, units);
     remember("angle", this.units.angle);
     remember("length", this.units.length);
+    this.tellUnits();
+  }
+
+  tellUnits() {
     for (const part of [this.card, this.dock, ...this.panels.map(({ panel }) => panel)])
       part.unitsChanged?.();
   }

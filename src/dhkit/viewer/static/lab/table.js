@@ -1,12 +1,15 @@
 // The table of the arm: every number can be changed, and the arm follows.
 
-import { fixed, h, indexed, matrix, onTyped, save } from "./dom.js";
+import { UNITS, fixed, h, indexed, matrix, onTyped, save } from "./dom.js";
 
 const COLUMNS = ["theta", "d", "a", "alpha"];
 const HEADS = {
-  standard: ["θ [rad]", "d [m]", "a [m]", "α [rad]"],
-  modified: ["θ [rad]", "d [m]", "aᵢ₋₁ [m]", "αᵢ₋₁ [rad]"],
+  standard: ["θ [rad]", "d", "a", "α [rad]"],
+  modified: ["θ [rad]", "d", "aᵢ₋₁", "αᵢ₋₁ [rad]"],
 };
+const LENGTHS = ["d", "a"];
+const WORDS = { m: "", mm: "*mm", in: "*inch" }; // units in expressions
+const PLAIN = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?(\*(mm|cm|inch))?$/i; // a length without letters, or in a unit
 const WIDEST = 10; // characters of a cell
 const STEP_TIME = 700; // ms of one elementary transform
 const LAST_TIME = 1500; // ms for which the last frame stays
@@ -64,6 +67,7 @@ export class TablePanel {
     );
     this.note = h("p", { class: "note", role: "status" });
     this.step = h("div", { class: "step" });
+    this.placements = h("ul", { class: "placements" });
     root.append(
       h("div", { class: "line" }, this.convention, this.frames),
       h(
@@ -71,6 +75,7 @@ export class TablePanel {
         { class: "wide" },
         h("table", { class: "dh" }, h("thead", {}, this.head), this.body),
       ),
+      this.placements,
       h(
         "div",
         { class: "buttons" },
@@ -85,7 +90,7 @@ export class TablePanel {
       h(
         "p",
         { class: "hint" },
-        "Metres and radians; pi/2, 90*deg or 17*inch are fine. A row's number shows its four transforms, Animate those of all rows.",
+        "Lengths in the unit chosen beside the arm, angles in radians; pi/2, 90*deg or 17*inch are fine. A row's number shows its four transforms, Animate those of all rows.",
       ),
       this.step,
     );
@@ -95,6 +100,40 @@ export class TablePanel {
     const on = this.frames.getAttribute("aria-pressed") !== "true";
     this.frames.setAttribute("aria-pressed", String(on));
     this.lab.page.showFrames(on);
+  }
+
+  // A length is shown in the unit of the page unless it is an expression; one that is typed is of that unit.
+  shownText(i, column) {
+    const text = this.table.rows[i][column];
+    const { length } = this.lab.units;
+    if (length === "m" || !LENGTHS.includes(column) || !PLAIN.test(text)) return text;
+    const word = WORDS[length];
+    if (text.endsWith(word)) return text.slice(0, -word.length);
+    const value = this.table.values[i][COLUMNS.indexOf(column)] * UNITS[length].scale;
+    return String(Number(value.toPrecision(12)));
+  }
+
+  sentText(text, column) {
+    const plain = text.trim().replace(",", ".");
+    const isPlain = LENGTHS.includes(column) && PLAIN.test(plain) && !plain.includes("*");
+    return isPlain && Number(plain) !== 0 ? `${plain}${WORDS[this.lab.units.length]}` : text;
+  }
+
+  // What the table's rows do not say: where frame 0 and the tool are.
+  placement(what, numbers) {
+    const length = UNITS[this.lab.units.length];
+    const angle = UNITS[this.lab.units.angle];
+    const list = (values, { scale, digits }) =>
+      values.map((x) => String(Number(fixed(x * scale, digits)))).join(", ");
+    const place = `${what}: (${list(numbers.slice(0, 3), length)})${length.sign}`;
+    const turned = numbers.slice(3).some((x) => x !== 0);
+    return turned
+      ? `${place}, roll, pitch, yaw (${list(numbers.slice(3), angle)})${angle.sign}`
+      : place;
+  }
+
+  unitsChanged() {
+    if (this.table) this.take_table(this.table);
   }
 
   lock() {
@@ -120,7 +159,13 @@ export class TablePanel {
     this.convention.value = table.convention;
     this.head.replaceChildren(
       h("th", { scope: "col" }, ""),
-      ...HEADS[table.convention].map((text) => h("th", { scope: "col" }, text)),
+      ...HEADS[table.convention].map((text, k) =>
+        h(
+          "th",
+          { scope: "col" },
+          LENGTHS.includes(COLUMNS[k]) ? `${text} [${this.lab.units.length}]` : text,
+        ),
+      ),
     );
     const errors = new Map(
       table.errors.map(({ row, column, error }) => [`${row} ${column}`, error]),
@@ -129,7 +174,10 @@ export class TablePanel {
     this.widths = Object.fromEntries(
       COLUMNS.map((column) => [
         column,
-        Math.max(4, Math.min(WIDEST, Math.max(...table.rows.map((row) => row[column].length)))),
+        Math.max(
+          4,
+          Math.min(WIDEST, Math.max(...table.rows.map((_, i) => this.shownText(i, column).length))),
+        ),
       ]),
     );
     const joints = JSON.stringify(table.rows.map(({ joint, kind }) => [joint, kind]));
@@ -140,7 +188,7 @@ export class TablePanel {
     }
     for (const { input, i, column } of this.cells) {
       const error = errors.get(`${i} ${column}`);
-      if (document.activeElement !== input) input.value = table.rows[i][column];
+      if (document.activeElement !== input) input.value = this.shownText(i, column);
       input.style.width = `calc(${this.widths[column]}ch + 7px)`;
       input.setAttribute("aria-invalid", String(Boolean(error)));
       input.title =
@@ -149,6 +197,12 @@ export class TablePanel {
     this.locking.hidden = !this.lab.can("table.lock") || table.joints < 2;
     this.locks.hidden = this.free.disabled = table.locked !== null;
     this.frees.hidden = table.locked === null;
+    this.placements.replaceChildren(
+      ...[
+        ["frame 0 in the world", table.base],
+        [`the tool in frame ${table.rows.length}`, table.tool],
+      ].flatMap(([what, numbers]) => (numbers ? [h("li", {}, this.placement(what, numbers))] : [])),
+    );
     this.undo.disabled = !table.undo;
     this.redo.disabled = !table.redo;
     this.reset.disabled = !table.changed;
@@ -173,10 +227,12 @@ export class TablePanel {
       onTyped(
         input,
         (text) =>
-          text !== this.table.rows[i][column] &&
-          this.lab.ask("table.edit", { row: i, column, text }),
+          text !== this.shownText(i, column) &&
+          this.lab.ask("table.edit", { row: i, column, text: this.sentText(text, column) }),
       );
-      return h("td", {}, variable ? h("span", { class: "variable" }, `q${i + 1} + `) : null, input);
+      const name = h("small", { title: row.joint }, row.joint);
+      const sign = variable ? h("span", { class: "variable" }, name, `q${i + 1} +`) : null;
+      return h("td", {}, sign, input);
     });
     return h(
       "tr",

@@ -212,6 +212,8 @@ export class OfflineDesk {
       undo: this.before.length > 0,
       redo: this.after.length > 0,
       changed,
+      base: null,
+      tool: null,
       joints: rows.length,
       locked: null,
       note: this.edited
