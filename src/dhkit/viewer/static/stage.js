@@ -101,6 +101,7 @@ export class Stage {
   beside() {
     this.steady = true;
     if (this.software) this.quality.save();
+    document.body.classList.toggle("software", this.software);
     // The arm of an edited table has surfaces that meshes have not: their program is compiled with the first picture.
     const like = new THREE.MeshPhongMaterial({
       shininess: 40,

@@ -325,7 +325,8 @@ export class TablePanel {
       })),
     );
     const start = performance.now();
-    let before = null;
+    let [before] = moves;
+    this.light(before, null, false);
     const tick = (now) => {
       if (stopped) return;
       // The first picture's time may lie before the start.
