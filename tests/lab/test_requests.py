@@ -600,7 +600,7 @@ def test_an_arm_of_two_joints_has_its_own_table_dynamics_and_answers_and_all_joi
 def test_copied_python_loads_the_file_of_an_arm_that_was_not_edited(tmp_path, locked):
     arm = Arm.load("puma560")
     file, *_ = arm.save(tmp_path / "own.toml")
-    with Lab(Arm.load(file), source=str(file)) as lab:
+    with Lab(Arm.load(file), loaded_from=str(file)) as lab:
         if locked:
             lab.answer("table.lock", {"free": [1, 2]})
         scope = {}

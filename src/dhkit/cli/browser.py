@@ -76,7 +76,7 @@ def lab(
         isolation=found,
         solid=solid,
         assignment=None if assignment is None else robot,
-        source=robot if assignment is None else None,
+        loaded_from=robot if assignment is None else None,
         record=record,
     ) as served:
         return until_interrupted(served.url, what, open_browser=not no_browser)

@@ -53,7 +53,7 @@ class Lab:
         An ``.stl`` file with the solid of the panel of transforms; by default a box.
     assignment
         Texts and goals that the page shows first; its robot is the arm.
-    source
+    loaded_from
         Name or path that the arm was loaded from, for "Copy as Python"; by default its name, if it is in the library.
     record
         File in which the work on the assignment is recorded, to be handed in; work in it is taken up again.
@@ -83,7 +83,7 @@ class Lab:
         isolation: Isolation | None = None,
         solid: str | Path | None = None,
         assignment: Assignment | None = None,
-        source: str | None = None,
+        loaded_from: str | None = None,
         record: Path | None = None,
     ) -> None:
         arm = arm if isinstance(arm, Arm) else Arm(description_of(arm))
@@ -117,7 +117,7 @@ class Lab:
             submitted,
             TransformsPanel(desk, solid_read),
             TaskPanel(desk, self._motions, self._own, submitted, self._control, assignment, record, work),
-            PythonPanel(desk, table, self._tool, self._motions, self._control, source),
+            PythonPanel(desk, table, self._tool, self._motions, self._control, loaded_from),
             self._own,
         )
         self._requests: dict[str, Callable[[JsonObject], JsonObject]] = {}

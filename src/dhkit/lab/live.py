@@ -8,7 +8,6 @@ import numpy as np
 
 from dhkit.arm import Arm
 from dhkit.control import Controller, Plant, Push, Setpoint, SimulationResult
-from dhkit.control.alternation import AlternationWatch
 from dhkit.control.controller import call_controller, reset, torques
 from dhkit.control.events import advance
 from dhkit.control.gains import effective_inertia
@@ -24,6 +23,12 @@ MAX_ROWS = 20_000
 dropped, and from then on half as many are added, so that a run of any length is recorded whole."""
 MAX_PUSHES = 32
 """Largest number of pushes that act at a time."""
+ALTERNATIONS = 20
+"""Changes of sign, one at every sample, from which growth counts."""
+GROWTH = 10.0
+"""Growth of the torque since the first of them that counts as unstable; a sliding mode alternates without growing."""
+NEGLIGIBLE = 1e-6
+"""Torque, N m or N, below which rounding changes signs."""
 COLUMNS = ("q", "qd", "qdd", "tau", "tau_asked", "reference_q", "reference_qd")
 """Quantities, of n numbers each, that a recorded row holds after its time."""
 
@@ -195,3 +200,27 @@ class Live:
             self._rows[self._count] = row
             self._count += 1
         self._steps += 1
+
+
+class AlternationWatch:
+    """The changes of sign of n torques: of a sampled controller with too much damping for its rate.
+
+    For a joint of inertia m under tau = -kd qd, held for h seconds, qd_(k+1) = (1 - kd h / m) qd_k. Beyond kd h = 2 m
+    the velocity, and with it the torque, changes its sign at every sample and grows: the sampled loop is unstable
+    although the continuous one is not (Franklin, Powell, Workman, Digital Control of Dynamic Systems, 1998, ch. 8).
+    """
+
+    def __init__(self, n: int) -> None:
+        self._last = np.zeros(n)
+        self._count = np.zeros(n, dtype=int)
+        self._first = np.zeros(n)
+        """Size of each torque when its present run of alternations began."""
+
+    def unstable_joint(self, tau: Array) -> int | None:
+        """Take the next torques, shape (n,), N m and N; return the first joint, from 0, that is unstable, if any is."""
+        alternates = (tau * self._last < 0) & (np.abs(tau) > NEGLIGIBLE)
+        self._count = np.where(alternates, self._count + 1, 0)
+        self._first = np.where(self._count <= 1, np.abs(tau), self._first)
+        self._last = tau.copy()
+        grows = (self._count >= ALTERNATIONS) & (np.abs(tau) > GROWTH * self._first)
+        return int(np.argmax(grows)) if grows.any() else None

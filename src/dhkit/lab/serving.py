@@ -34,7 +34,7 @@ def serve(
     isolation: Isolation | None = None,
     solid: str | Path | None = None,
     assignment: Assignment | str | Path | None = None,
-    source: str | None = None,
+    loaded_from: str | None = None,
     record: str | Path | None = None,
 ) -> Lab:
     """Open a lab in the browser.
@@ -56,7 +56,7 @@ def serve(
         An ``.stl`` file for the panel of transforms; by default a box.
     assignment
         Texts and goals about this arm, or the file that has them.
-    source
+    loaded_from
         Name or path that the arm was loaded from, for "Copy as Python": see :class:`Lab`.
     record
         Folder in which the work on the assignment is recorded, as ``NAME.lab.json`` for the assignment ``NAME.toml``;
@@ -98,7 +98,7 @@ def serve(
                 file.parent.mkdir(parents=True, exist_ok=True)
         assignment = Assignment.read(assignment)
     token = None if port is None else kept_token(port)
-    lab = Lab(arm, port or 0, token, own, isolation, solid, assignment, source, file)
+    lab = Lab(arm, port or 0, token, own, isolation, solid, assignment, loaded_from, file)
     try:
         if open_browser:
             open_in_browser(lab.url)

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from dhkit import Arm
-from dhkit.control.alternation import AlternationWatch
 from dhkit.control.gains import effective_inertia
 from dhkit.errors import SimulationError
-from dhkit.lab.live import Live
+from dhkit.lab.live import AlternationWatch, Live
 
 RATE = 500.0
 
