@@ -1,5 +1,6 @@
 """Work on an assignment is recorded, taken up again, handed in, and collected into marks."""
 
+import base64
 import csv
 import json
 
@@ -140,10 +141,17 @@ def test_an_edited_record_is_refused(task, tmp_path):
         begin(task, tmp_path / "work")
 
 
+SURROGATE = (
+    '{"seal": "\\ud800", "kind": "lab record", "format": 1, "assignment": "", "student": "", "begun": "", "goals": []}'
+)
+INFINITE = (
+    '{"seal": "", "kind": "lab record", "format": 1, "goals": [{"step": 1e999, "goal": 1, "time": "", "evidence": {}}]}'
+)
 FORGED = {
     "a goal with the evidence of another": lambda goals: goals[0]["evidence"].update(q=[0.0, 0.0]),
     "joint values of another arm": lambda goals: goals[0]["evidence"].update(q=[0.0] * 6),
     "no evidence": lambda goals: goals[0]["evidence"].clear(),
+    "a huge integer": lambda goals: goals[0]["evidence"].update(q=[10**400, 0]),
     "words": lambda goals: goals[0]["evidence"].update(q="here"),
     "not finite": lambda goals: goals[0]["evidence"].update(q=[1e400, 0.0]),
 }
@@ -173,7 +181,19 @@ def test_a_forged_motion_and_number_are_found(task, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "content", ["", "[]", "{}", '{"kind": 1}', "null", "\xff", '{"seal": 1}' + " " * 2_000_001, "[" * 100_000]
+    "content",
+    [
+        "",
+        "[]",
+        "{}",
+        '{"kind": 1}',
+        "null",
+        "\xff",
+        '{"seal": 1}' + " " * 2_000_001,
+        "[" * 100_000,
+        SURROGATE,
+        INFINITE,
+    ],
 )
 def test_what_is_no_record_is_said_in_a_line(tmp_path, content):
     file = tmp_path / "x.lab.json"
@@ -216,3 +236,71 @@ def test_record_without_an_assignment_is_refused(dhkit_command, tmp_path):
     assert status == 2 and "is not an assignment" in err
     with pytest.raises(ValueError, match="without the file of an assignment"):
         dhkit.lab.serve(dhkit.Arm.load("planar2r"), block=False, open_browser=False, record=tmp_path)
+
+
+def test_places_out_of_range_count_nowhere(task, tmp_path):
+    file = recorded(task, tmp_path / "work")
+
+    def change(content):
+        for step, goal in ((9, 9), (1, 99)):
+            content["goals"].append({"step": step, "goal": goal, "time": "2099-01-01T00:00:00+00:00", "evidence": {}})
+
+    edited(file, change, sealed=True)
+    with begin(task, tmp_path / "work") as lab:
+        assert states(lab)["task"]["points"] == 5.0
+    mark = lab_mark(file, Assignment.read(task))
+    assert mark.points == 5.0 and not mark.last.startswith("2099")
+
+
+def test_two_labs_on_one_record_lose_nothing_and_what_is_recorded_is_not_reset(task, tmp_path):
+    with begin(task, tmp_path / "work") as first, begin(task, tmp_path / "work") as second:
+        first.answer("task.number", {"step": 1, "goal": 0, "text": "2"})
+        second.answer("joints.set", {"q": [np.pi / 2, 0.0]})
+        mark = lab_mark(tmp_path / "work" / "two.lab.json", Assignment.read(task))
+        assert mark.goals == (2.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+        with pytest.raises(ValueError, match="the work is recorded"):
+            second.answer("task.reset", {})
+
+
+def test_a_motion_that_jumps_between_samples_is_not_one(task, tmp_path):
+    arm = Assignment.read(task).arm
+    d = 0.1
+    breaks = np.array([0.0, d * 200.1 / 400, d * 200.9 / 400, d])
+    coefficients = np.zeros((3, 6, 2))
+    h = breaks[2] - breaks[1]
+    coefficients[1, 3:] = (np.array([10, -15, 6]) / h ** np.array([3, 4, 5]))[:, None]
+    coefficients[2, 0] = 1.0
+    dhkit.Trajectory(arm.description, breaks, coefficients).save(tmp_path / "jump.npz")
+    content = base64.b64encode((tmp_path / "jump.npz").read_bytes()).decode()
+    with begin(task, tmp_path / "work") as lab:
+        lab.answer("motion.file", {"name": "jump.npz", "content": content})
+        assert states(lab)["motion"]["excess"] is not None
+        assert met(lab)[2] is False
+
+
+def test_a_copied_record_is_noted(task, tmp_path, dhkit_command):
+    file = recorded(task, tmp_path / "class" / "ada")
+    (tmp_path / "class" / "bob").mkdir()
+    (tmp_path / "class" / "bob" / "two.lab.json").write_bytes(file.read_bytes())
+    with begin(task, tmp_path / "class" / "bob") as lab:
+        lab.answer("task.name", {"name": "Bob"})
+    _, out, _ = dhkit_command("grade", tmp_path / "class", "--task", task, "--json")
+    ada, bob = json.loads(out)
+    assert (ada["student"], bob["student"]) == ("Ada Lovelace", "Bob")
+    assert not ada["notes"] and "begun and ended at the same seconds" in bob["notes"][0]
+
+
+def test_a_run_of_locked_joints_or_that_stands_still_is_none(task, tmp_path):
+    six = ASSIGNMENT.replace("planar2r", "puma560").split("[[step]]")
+    task.write_text(
+        six[0].replace("[0.3, 0.3]", '"ready"') + "[[step]]" + six[3].replace("0.3,", '0.3, reference = "motion",')
+    )
+    with begin(task, tmp_path / "work") as lab:
+        q = lab.desk.q
+        lab.answer("motion.plan", {"kind": "quintic", "goal": {"q": (q + 1e-4).tolist()}, "duration": 2})
+        lab.answer("control.start", {"controller": "computed-torque", "reference": "motion"})
+        wait_for(lambda: states(lab)["control"]["time"] > 1.0)
+        assert met(lab) == [False]
+        lab.answer("motion.plan", {"kind": "quintic", "goal": {"q": (q + 0.5).tolist()}, "duration": 3})
+        lab.answer("control.start", {"controller": "computed-torque", "reference": "motion"})
+        wait_for(lambda: met(lab) == [True])

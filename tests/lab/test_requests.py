@@ -585,7 +585,7 @@ def test_an_arm_of_two_joints_has_its_own_table_dynamics_and_answers_and_all_joi
         lab.answer("table.lock", {"free": [0]})
 
     lab.answer("table.free", {})
-    assert lab.desk.arm is edited
+    assert lab.desk.arm.description == edited.description
     assert lab.desk.q.tolist() == [0.0, 0.2, 0.3, 0.0, 0.0, 0.0]
     lab.answer("table.undo", {})
     assert lab.desk.arm.description == whole.description
@@ -608,3 +608,30 @@ def test_copied_python_loads_the_file_of_an_arm_that_was_not_edited(tmp_path, lo
         exec(text, scope)
         assert "write_text" not in text
         assert scope["arm"].description == lab.desk.arm.description
+
+
+def test_joints_are_locked_and_freed_while_a_controller_runs(open_lab):
+    lab = open_lab("puma560")
+    for _ in range(3):
+        lab.answer("control.start", {"controller": "pid", "reference": "sine"})
+        wait_for(lambda: states(lab)["control"]["time"] > 0.05)
+        lab.answer("table.lock", {"free": [0, 3]})
+        assert (lab.desk.arm.n, lab.desk.q.shape, lab.desk.running) == (2, (2,), False)
+        lab.answer("control.start", {"controller": "pid", "reference": "sine"})
+        wait_for(lambda: states(lab)["control"]["time"] > 0.05)
+        lab.answer("table.free", {})
+        assert (lab.desk.arm.n, lab.desk.q.shape, lab.desk.running) == (6, (6,), False)
+
+
+@pytest.mark.parametrize("assumed_first", [True, False])
+def test_assumed_bodies_and_locked_joints_go_together(open_lab, assumed_first):
+    lab = open_lab(Arm.from_dh([(0, 0.4, 0, "pi/2"), (0, 0, 0.3, 0), (0, 0, 0.25, 0), (0, 0, 0.1, "pi/2")]))
+    steps = [("bodies.assume", {}), ("table.lock", {"free": [1, 2]})]
+    for request, data in steps if assumed_first else reversed(steps):
+        lab.answer(request, data)
+    lab.answer("table.edit", {"row": 1, "column": "a", "text": "0.26"})
+    assert lab.desk.arm.description.numbers.a[1] == 0.26
+    assert all(joint.bodies for joint in lab.desk.arm.description.joints)
+    lab.answer("table.free", {})
+    assert all(joint.bodies for joint in lab.desk.arm.description.joints)
+    lab.answer("control.start", {"controller": "pid", "reference": "sine"})

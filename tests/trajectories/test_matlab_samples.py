@@ -306,3 +306,8 @@ def test_each_choice_can_be_read(name, tmp_path):
         return
     columns = {"t": choices["t"][0], "q": choices["q"][0]}
     assert read(tmp_path, SHAPES[name], columns=columns) == Trajectory.from_samples(ARM, T, Q)
+
+
+@pytest.mark.parametrize("other", [np.eye(4), 0.01, T * 5 + 3])
+def test_a_capital_T_is_not_the_time(other, tmp_path):
+    assert read(tmp_path, {"T": other, "time": T, "q": Q}) == Trajectory.from_samples(ARM, T, Q)

@@ -35,7 +35,7 @@ from dhkit.grading.rubric import Rubric
 from dhkit.grading.schema import template as empty_sheet
 from dhkit.grading.sheets import find_sheets
 from dhkit.lab.assignment import Assignment, is_assignment
-from dhkit.lab.marks import find_records, lab_mark, lab_marks_csv
+from dhkit.lab.marks import find_records, lab_marks, lab_marks_csv
 
 app = typer.Typer(rich_markup_mode=None)
 PRINTED = Delivery()
@@ -125,7 +125,7 @@ def grade_records(paths: Sequence[Path], task: Path, form: str, output: Path | N
     if output is not None and output.suffix.lower() != ".csv":
         raise DescriptionError(f"{output}: ends in {output.suffix!r}; expected .csv for the marks of a lab")
     assignment = Assignment.read(task)
-    marks = [lab_mark(path, assignment) for path in find_records(paths)]
+    marks = lab_marks(find_records(paths), assignment)
     if output is not None:
         write_atomically(output, lab_marks_csv(marks, assignment))
         say(f"wrote {output}")

@@ -79,11 +79,13 @@ class ControlPanel(Panel):
         self._paused = False
         self._speed = 1.0
         self._error: str | None = None
-        desk.on_replace.append(self._forget_run)
+        desk.before_replace.append(self._forget_run)
+        desk.on_replace.append(self.publish)
         desk.steer = self._steer
         motions.on_change.append(self._follow_changed_motion)
-        self.on_frame: list[Callable[[float, Array], None]] = []
-        """Called with the time of a run, s, and the errors of its joints, shape (k,), rad and m, at each frame."""
+        self.on_frame: list[Callable[[float, Array, Array], None]] = []
+        """Called at each frame with the time of a run, s, and the desired values and the errors of its joints, shape
+        (k,), rad and m."""
         own.on_change.append(self.publish)
 
     @answers("control.start", *SETTING_NAMES)
@@ -325,7 +327,7 @@ class ControlPanel(Panel):
         self.desk.view.ghosts(reference[None], GHOST_COLOR)
         tool_error = np.linalg.norm(self.desk.arm.fk(q)[:3, 3] - self.desk.arm.fk(reference)[:3, 3])
         for call in self.on_frame:
-            call(t, desired - moved)
+            call(t, desired, desired - moved)
         row = np.array([[t, *moved, *(desired - moved), *tau, tool_error]], dtype=np.float32)
         self.desk.view.append(Samples("control", self._columns(), row))
 

@@ -101,6 +101,8 @@ class Desk:
         """Called after the obstacles have changed."""
         self.on_show: list[Callable[[Array], None]] = []
         """Called with the joint values, shape (n,), of every state that is shown."""
+        self.before_replace: list[Callable[[], None]] = []
+        """Called before another arm replaces this one."""
         self.on_replace: list[Callable[[], None]] = []
         """Called after another arm has replaced this one."""
         self._contacts = Contacts()
@@ -119,6 +121,8 @@ class Desk:
         if q is None:
             same_kinds = arm.description.kinds == self.arm.description.kinds
             q = self.q if same_kinds else start_configuration(arm)
+        for call in self.before_replace:
+            call()
         previous = self.arm, self.q, self.target_q
         self.arm = arm
         self.q = q

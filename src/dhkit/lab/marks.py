@@ -5,11 +5,12 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
 
 from dhkit.display import plain, value_line
-from dhkit.errors import AnswerError
+from dhkit.errors import AnswerError, DhkitError
 from dhkit.grading.reports.marks_csv import cell
 from dhkit.lab.assignment import Assignment, Goal
 from dhkit.lab.record import SUFFIX, Place, Reached, Record, is_confirmed
@@ -32,6 +33,8 @@ class LabMark:
         Points of the goals that count, and of all goals.
     goals
         Points of each goal, in the assignment's order.
+    begun
+        When the lab was opened for the first time: ISO 8601, UTC.
     last
         When the last goal was reached: ISO 8601, UTC; empty if none was.
     unchecked
@@ -46,6 +49,7 @@ class LabMark:
     most: float
     goals: tuple[float, ...] = ()
     last: str = ""
+    begun: str = ""
     unchecked: int = 0
     notes: tuple[str, ...] = ()
 
@@ -83,6 +87,7 @@ def lab_mark(path: Path, assignment: Assignment) -> LabMark:
     points: list[float] = []
     notes: list[str] = []
     unchecked = 0
+    times: list[str] = []
     for i, step in enumerate(assignment.steps):
         for j, goal in enumerate(step.goals):
             reached = record.reached.get(Place(i, j))
@@ -94,15 +99,40 @@ def lab_mark(path: Path, assignment: Assignment) -> LabMark:
             if confirmed is False:
                 notes.append(f"step {i + 1}, goal {j + 1}: the evidence does not show it")
             points.append(0.0 if confirmed is False else goal.points)
-    last = max((reached.time for reached in record.reached.values()), default="")
-    return LabMark(path, record.student, sum(points), assignment.points, tuple(points), last, unchecked, tuple(notes))
+            if confirmed is not False and _is_time(reached.time):
+                times.append(reached.time)
+    last = max(times, default="")
+    return LabMark(
+        path, record.student, sum(points), assignment.points, tuple(points), last, record.begun, unchecked, tuple(notes)
+    )
+
+
+def lab_marks(paths: Sequence[Path], assignment: Assignment) -> list[LabMark]:
+    """Return the marks of records; of those with the same beginning and times, a note names the other."""
+    marks = [lab_mark(path, assignment) for path in paths]
+    first: dict[tuple[str, str], Path] = {}
+    noted = []
+    for mark in marks:
+        key = (mark.begun, mark.last)
+        other = first.setdefault(key, mark.file) if mark.points and mark.begun else mark.file
+        note = () if other is mark.file else (f"begun and ended at the same seconds as {other}",)
+        noted.append(replace(mark, notes=(*mark.notes, *note)))
+    return noted
+
+
+def _is_time(text: str) -> bool:
+    try:
+        datetime.fromisoformat(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _confirmed(assignment: Assignment, goal: Goal, reached: Reached) -> bool | None:
     """Return whether the evidence shows a goal; None where it cannot be checked again."""
     try:
         return is_confirmed(assignment, goal.condition, reached.evidence)
-    except (ValueError, KeyError, TypeError, IndexError):
+    except (ValueError, KeyError, TypeError, IndexError, OverflowError, DhkitError):
         return False
 
 

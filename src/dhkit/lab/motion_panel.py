@@ -20,6 +20,7 @@ from dhkit.lab.contacts import NearestState, contacts_along
 from dhkit.lab.desk import Desk, file_content, has_bodies
 from dhkit.lab.jobs import Job, Jobs
 from dhkit.lab.obstacle_panel import ObstaclePanel
+from dhkit.lab.record import limit_times
 from dhkit.lab.requests import MAX_JOINT_VALUE, MAX_TEXT_LENGTH, Fields, JsonObject, Panel, answers
 from dhkit.lab.tool_panel import solve_pose
 from dhkit.planning import Progress
@@ -290,7 +291,9 @@ class MotionPanel(Panel):
         q = motion.q(times)
         qd = motion.qd(times)
         tau = motion.tau(times) if has_bodies(arm) else None
-        excess = exceeded_limit(arm.description, q, qd, tau)
+        closer = limit_times(motion)
+        closer_tau = None if tau is None else motion.tau(closer)
+        excess = exceeded_limit(arm.description, motion.q(closer), motion.qd(closer), closer_tau)
         state: dict[str, object] = {
             "kind": kind,
             "duration": motion.duration,

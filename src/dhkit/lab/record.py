@@ -12,19 +12,20 @@ import hashlib
 import hmac
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from dhkit.description import write_atomically
+from dhkit.description import Array, write_atomically
 from dhkit.description.files import read_bounded
-from dhkit.display import counted, repr_line
+from dhkit.display import counted, plain, repr_line
 from dhkit.errors import AnswerError, DescriptionError
 from dhkit.lab.assignment import Assignment, Condition, JointsAt, MotionBetween, NumberIs, ToolAt
 from dhkit.trajectories import Trajectory
+from dhkit.trajectories.bounds import BOUNDS
 from dhkit.viewer.motion import exceeded_limit
 
 SUFFIX = ".lab.json"
@@ -33,7 +34,9 @@ MAX_BYTES = 2_000_000
 MAX_NAME_LENGTH = 100
 """Longest name of a student, characters."""
 MOTION_SAMPLES = 401
-"""Samples of a motion at which its limits are checked again."""
+"""Samples of a motion at which its limits are looked at."""
+PIECE_SHARES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9)
+"""Places in each piece of a motion at which they are looked at too, as shares of the piece."""
 _KEY = b"dhkit record of an assignment, format 1, "
 
 
@@ -114,14 +117,16 @@ class Record:
                 raise ValueError("another kind or format")
             reached = {}
             for goal in content["goals"]:
-                place = Place(int(goal["step"]) - 1, int(goal["goal"]) - 1)
+                place = Place(_number(goal["step"]) - 1, _number(goal["goal"]) - 1)
                 reached[place] = Reached(str(goal["time"]), dict(goal["evidence"]))
-            record = cls(str(content["assignment"]), str(content["student"]), str(content["begun"]), reached)
+            student = plain(str(content["student"]), MAX_NAME_LENGTH)
+            record = cls(str(content["assignment"]), student, str(content["begun"]), reached)
+            is_whole = isinstance(seal, str) and hmac.compare_digest(seal.encode("ascii"), _seal(content).encode())
         except DescriptionError as error:
             raise AnswerError(str(error)) from None
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError):
             raise AnswerError(f"{path}: no record of a lab; expected the file that dhkit lab --record wrote") from None
-        if not isinstance(seal, str) or not hmac.compare_digest(seal.encode(), _seal(content).encode()):
+        if not is_whole:
             raise AnswerError(f"{path}: the seal does not fit; the record was edited after the lab wrote it")
         return record
 
@@ -154,7 +159,8 @@ def taken_up(file: Path, assignment: Assignment) -> Record:
     record = Record.read(file)
     if record.digest != assignment.digest:
         raise DescriptionError(f"{file}: a record of another assignment; expected another folder for this one")
-    return record
+    goals = {Place(i, j) for i, step in enumerate(assignment.steps) for j in range(len(step.goals))}
+    return replace(record, reached={place: found for place, found in record.reached.items() if place in goals})
 
 
 def motion_evidence(motion: Trajectory) -> dict[str, Any]:
@@ -179,13 +185,29 @@ def is_confirmed(assignment: Assignment, condition: Condition, evidence: Mapping
     if isinstance(condition, MotionBetween):
         breaks = np.array(evidence["breaks"], dtype=float)
         coefficients = np.array(evidence["coefficients"], dtype=float)
+        if coefficients.ndim != 3 or coefficients.shape[1] > BOUNDS.coefficients:
+            raise ValueError("polynomials of another form")
         motion = Trajectory(arm.description, breaks, coefficients)
-        times = np.linspace(0.0, motion.duration, MOTION_SAMPLES)
+        times = limit_times(motion)
         excess = exceeded_limit(arm.description, motion.q(times), motion.qd(times), None)
         return condition.is_reached(motion, excess)
     if isinstance(condition, NumberIs):
         return condition.is_reached(float(evidence["number"]))
     return None
+
+
+def limit_times(motion: Trajectory) -> Array:
+    """Return times at which a motion's limits are looked at, s: at equal steps, and inside each of its pieces."""
+    inside = [motion.breaks[:-1] + share * np.diff(motion.breaks) for share in PIECE_SHARES]
+    steps = np.linspace(0.0, motion.duration, MOTION_SAMPLES)
+    return np.unique(np.concatenate([steps, *inside]))
+
+
+def _number(value: object) -> int:
+    """Return a step's or a goal's number, from 1."""
+    if type(value) is not int or value < 1:
+        raise ValueError("a number of a step or a goal")
+    return value
 
 
 def _seal(content: Mapping[str, Any]) -> str:

@@ -134,8 +134,14 @@ class TablePanel(Panel):
         if not 0 < len(set(free)) < arm.n:
             raise ValueError(f"table.lock: {len(set(free))} joints move; expected 1 to {arm.n - 1}")
         locked = tuple(i for i in range(arm.n) if i not in free)
-        whole = WholeArm(arm, self._first, self._table, self._undo, self._redo, locked)
-        self.desk.replace(arm.lock(whole.values), self.desk.q[sorted(set(free))])
+        # The table's arm has no assumed bodies: those of the shorter arm are assumed anew, for each of its links.
+        whole = WholeArm(Arm(self._table.description), self._first, self._table, self._undo, self._redo, locked)
+        shorter = whole.arm.lock(whole.values)
+        table = Table.of(shorter.description)
+        self._replace(shorter, self.desk.q[sorted(set(free))])
+        self._first = self._table = table
+        self._undo = []
+        self._redo = []
         self.whole = whole
         self.publish()
 
@@ -147,7 +153,7 @@ class TablePanel(Panel):
             raise ValueError("table.free: no joint is locked")
         q = np.zeros(whole.arm.n)
         q[[i for i in range(whole.arm.n) if i not in whole.locked]] = self.desk.q
-        self.desk.replace(whole.arm, q)
+        self._replace(whole.arm, q)
         self.whole = None
         self._first = whole.first
         self._table = whole.table
@@ -242,16 +248,20 @@ class TablePanel(Panel):
         previous = self._table
         self._table = table
         if table.description != previous.description:
-            self._is_replacing = True
-            arm = Arm(table.description)
             try:
-                self.desk.replace(arm.with_uniform_links() if self.desk.assumed_bodies else arm)
+                self._replace(Arm(table.description))
             except BaseException:
                 self._table = previous
                 raise
-            finally:
-                self._is_replacing = False
         self.publish()
+
+    def _replace(self, arm: Arm, q: Array | None = None) -> None:
+        """Put another arm on the desk, with assumed bodies where those of the present one are."""
+        self._is_replacing = True
+        try:
+            self.desk.replace(arm.with_uniform_links() if self.desk.assumed_bodies else arm, q)
+        finally:
+            self._is_replacing = False
 
     def _take_replaced_arm(self) -> None:
         """Keep the table of an arm that has only got other bodies; begin anew with any other arm."""

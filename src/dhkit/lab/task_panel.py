@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,10 +31,24 @@ from dhkit.lab.control_panel import ControlPanel
 from dhkit.lab.desk import Desk
 from dhkit.lab.motion_panel import MotionPanel
 from dhkit.lab.own_panel import OwnPanel
-from dhkit.lab.record import MAX_NAME_LENGTH, Place, Reached, Record, motion_evidence, now
+from dhkit.lab.record import MAX_NAME_LENGTH, Place, Reached, Record, motion_evidence, now, taken_up
 from dhkit.lab.requests import Fields, JsonObject, Panel, answers
 from dhkit.lab.submit_panel import SubmitPanel
 from dhkit.lab.table_panel import plain_expression
+
+LEAST_STROKE = 5.0
+"""Stroke of a joint's desired values, as a multiple of the largest error, from which a run counts as following them."""
+
+
+class KeptRun(NamedTuple):
+    """The part of a run in which its errors have been small."""
+
+    begin: float
+    """s"""
+    lowest: Array
+    """Smallest desired values since then, shape (k,), rad and m."""
+    highest: Array
+    """Largest ones."""
 
 
 class TaskPanel(Panel):
@@ -68,8 +83,8 @@ class TaskPanel(Panel):
         self._fault: str | None = None
         """Why the record could not be written the last time, in words."""
         self._reached: dict[Place, Reached] = dict(self._record.reached)
-        self._kept_since: dict[Place, float] = {}
-        """Time of the run, s, since when its errors have been as small as a goal asks for."""
+        self._kept: dict[Place, KeptRun] = {}
+        """Runs whose errors have been as small as a goal asks for up to now."""
         self._left: set[Place] = set()
         """Goals that are states, and that the arm has been away from."""
         self._arm = desk.arm
@@ -87,11 +102,12 @@ class TaskPanel(Panel):
         """Forget which goals have been reached."""
         if self.assignment is None:
             raise ValueError("task.reset: there is no assignment; expected a lab that was opened with one")
+        if self._file is not None:
+            raise ValueError("task.reset: the work is recorded; expected --record with another folder to begin anew")
         with self._lock:
             self._reached.clear()
             self._left.clear()
-            self._kept_since.clear()
-        self._write()
+            self._kept.clear()
         self._check_state(self.desk.q)
         self.publish()
 
@@ -202,21 +218,28 @@ class TaskPanel(Panel):
         if self.assignment is not None and self.desk.arm.description == self.assignment.arm.description:
             self._check(lambda goal: isinstance(goal, AnswerRight) and goal.name in right, {"answer": text})
 
-    def _check_run(self, t: float, errors: Array) -> None:
-        """Check goals of controllers at a time of a run, s, and its errors, shape (k,), rad and m."""
-        if not self._is_assigned_arm:
+    def _check_run(self, t: float, desired: Array, errors: Array) -> None:
+        """Check goals of controllers at a time of a run, s, its desired values and errors, shape (k,), rad and m."""
+        if not self._is_assigned_arm or len(errors) != self.desk.arm.n:  # some joints are locked
             return
         settings = self.control.settings
         reached: dict[Place, JsonObject] = {}
         for place, condition in self._conditions():
             if not isinstance(condition, ControlWithin) or place in self._reached:
                 continue
-            since = self._kept_since.get(place)
+            run_so_far = self._kept.get(place)
             if not condition.is_kept(settings, errors):
-                self._kept_since.pop(place, None)
-            elif since is None or t < since:  # a run that begins anew begins at 0
-                self._kept_since[place] = t
-            elif t - since >= condition.seconds:
+                self._kept.pop(place, None)
+                continue
+            if run_so_far is None or t < run_so_far.begin:  # a run that begins anew begins at 0
+                self._kept[place] = KeptRun(t, desired, desired)
+                continue
+            lowest = np.minimum(run_so_far.lowest, desired)
+            highest = np.maximum(run_so_far.highest, desired)
+            self._kept[place] = KeptRun(run_so_far.begin, lowest, highest)
+            # What stands still is followed by any controller.
+            moves = (highest - lowest).max() >= LEAST_STROKE * condition.error
+            if t - run_so_far.begin >= condition.seconds and moves:
                 run = {"controller": settings.controller, "bandwidth": settings.bandwidth, "payload": settings.payload}
                 reached[place] = {"run": run}
         self._take(reached)
@@ -240,8 +263,12 @@ class TaskPanel(Panel):
         """Write the record, if there is one."""
         if self._file is not None:
             with self._lock:
-                self._record = replace(self._record, reached=dict(self._reached))
                 try:
+                    # Another lab may have written into the same file meanwhile.
+                    assert self.assignment is not None  # noqa: S101 - for mypy: a record is of an assignment
+                    earlier = taken_up(self._file, self.assignment).reached
+                    self._reached = {**self._reached, **earlier}
+                    self._record = replace(self._record, reached=dict(self._reached))
                     self._record.write(self._file)
                     self._fault = None
                 except (OSError, DhkitError) as error:

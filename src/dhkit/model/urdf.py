@@ -1,10 +1,11 @@
 """Descriptions as URDF text: the first step of the reference path.
 
-Link i of the URDF has its frame directly after joint i, where the joint variable ends; the rest of row i, its own
-theta included, comes after it. So every origin is a translation with rpy (alpha, 0, theta), and no angle is ever
-computed from a rotation matrix. Each DH frame is a link of its own, ``dh0`` ... ``dhn``, and so is ``tool``.
+Link i of the URDF has its frame directly after joint i, where the joint variable ends. In the standard convention the
+rest of row i, its own theta included, comes after the joint; in the modified one a, alpha and d come before it, and
+theta after. So every origin of a row is a translation with rpy (alpha, 0, theta), computed from no rotation matrix;
+those of base, tool and shapes are. Each DH frame is a link of its own, ``dh0`` ... ``dhn``, and so is ``tool``.
 
-A URDF cannot hold gravity and the rotors' reflected inertia: a comment states them, and
+A URDF cannot hold gravity or the rotors' reflected inertia: a comment states them, and
 :func:`dhkit.model.pinocchio_model` sets them.
 
 The origins of rows are derived here independently of :func:`dhkit.description.link_transforms` and of

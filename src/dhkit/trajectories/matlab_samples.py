@@ -23,7 +23,7 @@ _ARRAY_EXPORT = "save arrays by save('log.mat', 't', 'q', '-v7'), a timeseries t
 """Advice for variables that are not read."""
 _OUTPUTS = ("yout", "simout")
 """Simulink's names of outputs; they are joint values where nothing else is."""
-_COLUMNS = re.compile(r"(.+)\(:,\s*(\d+)(?::(\d+))?\)")
+_COLUMNS = re.compile(r"(.+)\(:,\s*(\d{1,6})(?::(\d{1,6}))?\)")
 """Columns of a matrix as MATLAB writes them: ``yout(:,1:6)``."""
 MATRICES = tuple(prefixes[0] for prefixes in PREFIXES)
 """Our names of matrices with a column for each joint: values, rates, accelerations."""
@@ -157,7 +157,8 @@ def _chosen(
         for i, names in enumerate(joint_columns(description, order), start=1):
             candidates[f"{ours}{i}"] = names
 
-    spelled = {name.lower(): name for name in variables} | {name: name for name in variables}
+    # T beside t is a pose or a sample period, and Q a weight: names of one letter have their own case.
+    spelled = {name.lower(): name for name in variables if len(name) > 1} | {name: name for name in variables}
     chosen: dict[str, Variable] = {}
     for ours, known in candidates.items():
         if ours in columns:
@@ -183,7 +184,8 @@ def _named(text: str, variables: Mapping[str, Variable]) -> Variable:
     first = int(match[2])
     last = int(match[3] or first)
     if array.ndim != 2 or not 1 <= first <= last <= array.shape[1]:
-        raise DescriptionError(f"{text}: {variable.name} has shape {array.shape}")
+        found = f"{variable.name} has shape {array.shape}"
+        raise DescriptionError(f"{text[:40]}: {found}; expected columns from 1 to {array.shape[-1]}")
     return Signal(text, array[:, first - 1 : last], variable.times if isinstance(variable, Signal) else None)
 
 

@@ -24,7 +24,7 @@ TIMES = (("sec", "nanosec"), ("secs", "nsecs"))
 
 _PLAIN = re.compile(r"[A-Za-z][\w.-]*")
 _NO_TEXT = {"true", "false", "yes", "no", "on", "off", "y", "n", "null", "nan", "inf"}
-"""Plain scalars that YAML does not read as text."""
+"""Plain scalars that some readers of YAML take for something else than text: they are written in quotes."""
 
 
 def parse_message(text: str) -> dict[str, Any]:
@@ -124,7 +124,7 @@ def trajectory_text(
 
 
 def _number(value: float) -> str:
-    # YAML 1.1 reads 1e-05 as text: its numbers have a point.
+    # YAML 1.1 reads 1e-05 as text: its numbers with an exponent have a point.
     text = f"{value:.17g}"
     mantissa, _, exponent = text.partition("e")
     return (mantissa if "." in mantissa else f"{mantissa}.0") + (f"e{exponent}" if exponent else "")

@@ -26,7 +26,7 @@ from dhkit.trajectories.samples import Samples
 _JOIN_TOLERANCE = 1e-9
 """Largest distance of the ends of two motions that may follow one another, rad and m."""
 _MAX_SLOWDOWN = 1e12
-"""Largest factor by which a motion is slowed down or sped up: powers of larger ones leave the range of doubles."""
+"""Largest factor by which a motion is slowed down or sped up: the powers of it up to 25 are doubles."""
 _MOST_SAMPLES = 1e8
 _SAME_TIME = 1e-9
 """A last sample closer to the end than this share of the sampling interval is the end."""
@@ -214,10 +214,10 @@ class Trajectory:
         Raises
         ------
         ValueError
-            c is not positive and finite.
+            c is not from 1e-12 to 1e12.
         """
         if not isinstance(c, Real) or not 1 / _MAX_SLOWDOWN <= c <= _MAX_SLOWDOWN:
-            raise ValueError(f"c is {c!r}; expected a positive number")
+            raise ValueError(f"c is {c!r}; expected a number from 1e-12 to 1e12")
 
         # sum of c_j (t / c)^j = sum of (c_j / c^j) t^j
         powers = np.arange(self.coefficients.shape[1])[:, None]

@@ -80,7 +80,7 @@ def test_what_is_not_checked_is_said():
     found = distance(library_robot("panda"), np.zeros(7), self_collision=True)
     assert found.not_checked == ("link 1 and link 3, link 3 and link 5, which overlap in all sampled configurations",)
     assert "not checked: link 1 and link 3" in repr(found)
-    near = "parts of the base and link 2, 8.99 mm apart in all configurations"
+    near = "parts of the base and link 2, 8.57 mm apart in all configurations"
     assert distance(library_robot("al5d"), np.zeros(4), self_collision=True).not_checked == (near,)
 
 

@@ -15,8 +15,8 @@ _MAX_ALTERNATIVES = 3
 """Largest number of mistakes with the same answers that one sentence names."""
 
 _CHRISTOFFEL = {
-    "kinetic_gradient_omitted": "of the Christoffel symbols the term that is taken off, dM_ij/dq_k / 2",
-    "kinetic_gradient_sign": "of the Christoffel symbols the term dM_ij/dq_k / 2 is added, and should be taken off",
+    "kinetic_gradient_omitted": "of the Christoffel symbols the subtracted term dM_jk/dq_i / 2 is missing",
+    "kinetic_gradient_sign": "of the Christoffel symbols the term dM_jk/dq_i / 2 is added, and should be subtracted",
     "mass_rate_omitted": "of the Christoffel symbols the two terms that are added",
     "velocity_torques_doubled": "the Christoffel symbols lack their factor 1/2",
 }

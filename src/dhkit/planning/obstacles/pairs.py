@@ -78,10 +78,10 @@ class LinkPairs:
       too wide: where they overlap in more than 40 % of 4,000 random configurations.
     - Left out are capsules whose distance changes by less than 1 mm and is proved to stay above 0, see
       :func:`_least_of_turns`: those of a wrist's first and third link, for example.
-    - Links that a joint connects touch each other by construction. Where their shapes do not touch in all of 200 random
-      configurations, they are checked like the others.
-    - Other links whose shapes overlap in all of these 200 are not checked, such as those of a spherical wrist whose
-      drums are drawn about one point. Reports name them.
+    - Links that a joint connects are left out where their shapes overlap in each of 200 random configurations: they
+      touch by construction. Others are checked like those that no joint connects.
+    - Of other links whose shapes overlap in each of these 200, such as those of a spherical wrist whose drums are drawn
+      about one point, only the capsules that are not too wide are checked. Reports name them.
     - Links that were locked together count as links of their own.
     """
 
@@ -214,7 +214,7 @@ def _sampled_axes(description: Description) -> Array:
 
 
 def _axes_in_whole_turns(description: Description) -> Array:
-    """Return the axes of capsules in configurations that do not depend on limits, shape (STANDING_SAMPLES, m, 2, 3)."""
+    """Return the axes of capsules in whole turns of the revolute joints, shape (STANDING_SAMPLES, m, 2, 3)."""
     q = _configurations(description, whole_turns=True)[:STANDING_SAMPLES]
     return _axes_with_locked_joints_turned(description, q)
 
@@ -261,10 +261,10 @@ def _axes_with_locked_joints_turned(description: Description, q: Array) -> Array
 
 
 def _least_of_turns(description: Description, i: int, j: int) -> float | None:
-    """Return the distance of two capsules, m, that no turn of the joints between them changes; None if there is none.
+    """Return a lower bound of the distance of two capsules, m, in all configurations; None where none is proved.
 
-    It changes by less than ``STEADY`` over whole turns, also beyond the limits, and is proved to stay above 0: of at
-    most two revolute joints between.
+    It is proved for at most two revolute joints between the links, where the distance changes by less than ``STEADY``
+    over a grid of whole turns, and the bound is above 0.
 
     The distance depends on the joints between the links alone, and is computed on a grid of their whole turns. From the
     axis of joint k, whose own offset d_k lies along it, a point of the outer link is at most
@@ -302,7 +302,7 @@ def _least_of_turns(description: Description, i: int, j: int) -> float | None:
     half_step = np.pi / GRID
     change = sum(r) * half_step
     is_steady = np.ptp(gap) <= STEADY and gap.min() > change
-    return float(gap.min()) if is_steady else None
+    return float(gap.min() - change) if is_steady else None
 
 
 def capsules_beside(description: Description, obstacle: Obstacle) -> tuple[int, ...]:

@@ -233,13 +233,13 @@ def assemble_trajectory(description: Description, mesh: Mesh, knots: Knots, *, f
 
 
 def corrected(curve: Curve, h: Array, ends: Indices, knots: Knots, *, fixed_ends: bool) -> Array:
-    """Return a motion's polynomials after that correction, shape (K, p+1, columns), ascending powers.
+    """Return the polynomials of a motion with the gaps at legs' ends closed, shape (K, p+1, columns), ascending powers.
 
     With accelerations A, shape (columns, n), and rows W_k and U_k of weights, the motion is
 
         v_(k+1) = v_k + h_k W_k A,    q_(k+1) = q_k + h_k v_k + h_k^2 U_k A.
 
-    The states at the legs' ends are linear in A. The correction dA is the one of least norm for which they are the
+    The states at the legs' ends are affine in A. The correction dA is the one of least norm for which they are the
     given ones: S dA = gap, where S holds the sums of these weights up to each end, and positions are divided by the
     motion's duration so that both have the unit of a velocity.
 
@@ -254,7 +254,7 @@ def corrected(curve: Curve, h: Array, ends: Indices, knots: Knots, *, fixed_ends
     A = knots.qdd.copy()
     free = slice(1, -1) if fixed_ends else slice(None)
 
-    # Influence of A on v and q at the ends of the intervals, shape (K, columns) each:
+    # Influence of A on v and q at the end of interval k, shape (K, columns) each: that of knot k + 1 above.
     #   dv_k = sum_(j<=k) h_j W_j,    dq_k = sum_(j<=k) (h_j dv_(j-1) + h_j^2 U_j).
     dv = np.cumsum(h[:, None] * W, axis=0)
     dv_before = np.vstack([np.zeros(W.shape[1]), dv[:-1]])

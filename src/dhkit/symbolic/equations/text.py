@@ -1,4 +1,4 @@
-"""Equations as plain text, which :func:`dhkit.expressions.parse` can read back."""
+"""Equations as plain text; :func:`dhkit.expressions.parse` reads each right-hand side that is written out."""
 
 from __future__ import annotations
 

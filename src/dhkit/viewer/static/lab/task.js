@@ -86,6 +86,7 @@ export class TaskPanel {
     this.note.textContent = task.note ?? "";
     this.note.hidden = !task.note;
     this.reset.disabled = !met;
+    this.reset.hidden = Boolean(task.file); // what is recorded stays
     task.steps.forEach((step, k) => this.mark(step, this.steps[k]));
   }
 
