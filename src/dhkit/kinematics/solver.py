@@ -89,7 +89,8 @@ def solve_in_closed_form(
             status.reshape(count, 1),
         ]
         solver.kernel(solver.parameters, [poses.reshape(count, 16), free.reshape(count, 2)], rows, threads)
-        if fit.ring is not None and fit.parameters["offset"]:
+        is_one_in_reach = count == 1 and distance.item() == 0.0  # a single call has no time to look for others
+        if fit.ring is not None and fit.parameters["offset"] and not is_one_in_reach:
             # The kernel's distance is that of the nearest point in one plane: too much if the plane has an offset.
             beyond = np.flatnonzero(distance.reshape(count) > 0)
             if beyond.size:
