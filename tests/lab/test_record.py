@@ -304,3 +304,9 @@ def test_a_run_of_locked_joints_or_that_stands_still_is_none(task, tmp_path):
         lab.answer("motion.plan", {"kind": "quintic", "goal": {"q": (q + 0.5).tolist()}, "duration": 3})
         lab.answer("control.start", {"controller": "computed-torque", "reference": "motion"})
         wait_for(lambda: met(lab) == [True])
+
+
+def test_a_goal_names_a_controller_that_the_lab_has(task):
+    task.write_text(ASSIGNMENT.replace('"computed-torque"', '"bang-bang"'))
+    with pytest.raises(DescriptionError, match=r"control.controller: found 'bang-bang'; expected one of pd, .*, own"):
+        Assignment.read(task)

@@ -21,9 +21,11 @@ from pydantic import (
 from pydantic.dataclasses import dataclass
 from pydantic_core import ErrorDetails, PydanticCustomError
 
+from dhkit.control import CONTROLLERS
 from dhkit.description.schema import JsonSchema, KeyPath, key_text, length_bound, shortened, titled_schema
 from dhkit.errors import DescriptionError, ExpressionError
 from dhkit.expressions import parse
+from dhkit.lab.run_settings import OWN
 from dhkit.lab.tool_panel import EULER_ORDERS
 
 CONDITIONS = ("pose", "joints", "motion", "own", "answer", "number", "control")
@@ -96,6 +98,12 @@ def _order(name: str) -> str:
     return name
 
 
+def _controller(name: str) -> str:
+    if name not in (*CONTROLLERS, OWN):
+        raise PydanticCustomError("expected", f"one of {', '.join((*CONTROLLERS, OWN))}")
+    return name
+
+
 STRICT = ConfigDict(extra="forbid")
 NUMBER = {"type": ["number", "string"], "description": "a number, or an expression such as pi/2"}
 NAME = {"type": "string", "minLength": 1, "maxLength": MAX_LINE_LENGTH}
@@ -110,6 +118,9 @@ Line = Annotated[str, Field(max_length=MAX_LINE_LENGTH), AfterValidator(_readabl
 Text = Annotated[str, Field(max_length=MAX_TEXT_LENGTH), AfterValidator(_readable)]
 Panel = Annotated[str, AfterValidator(_panel), Field(json_schema_extra=lambda s: s.update(enum=list(PANELS)))]
 Order = Annotated[str, AfterValidator(_order), Field(json_schema_extra=lambda s: s.update(enum=[*EULER_ORDERS]))]
+ControllerName = Annotated[
+    str, AfterValidator(_controller), Field(json_schema_extra=lambda s: s.update(enum=[*CONTROLLERS, OWN]))
+]
 Points = Annotated[float, Field(strict=True, ge=0, le=1000, allow_inf_nan=False)]
 Within = Annotated[float, Field(strict=True, gt=0, le=1, allow_inf_nan=False)]
 Seconds = Annotated[float, Field(strict=True, gt=0, le=600, allow_inf_nan=False)]
@@ -176,18 +187,7 @@ class ControlForm:
     seconds: Annotated[float, Field(strict=True, gt=0, le=60, allow_inf_nan=False)] = 3.0
     reference: Literal["sine", "motion"] = "sine"
     payload: Annotated[float, Field(strict=True, ge=0, le=100, allow_inf_nan=False)] = 0.0
-    controller: Literal[
-        "pd",
-        "pid",
-        "pd-gravity",
-        "feed-forward",
-        "computed-torque",
-        "operational-space",
-        "adaptive",
-        "lqr",
-        "own",
-        None,
-    ] = None
+    controller: ControllerName | None = None
 
 
 @dataclass(

@@ -68,8 +68,12 @@ def find_records(paths: Sequence[Path]) -> list[Path]:
     for path in paths:
         if not path.exists():
             raise AnswerError(f"{path}: no such file")
-        inside = sorted(path.rglob(f"*{SUFFIX}")) if path.is_dir() else [path]
-        found |= dict.fromkeys(file for file in inside if not file.is_symlink() or not path.is_dir())
+        if path.is_dir():
+            # A link in a student's folder may lead to another student's record.
+            inside = [file for file in sorted(path.rglob(f"*{SUFFIX}")) if not file.is_symlink()]
+        else:
+            inside = [path]
+        found |= dict.fromkeys(inside)
     if not found:
         raise AnswerError(f"{', '.join(map(str, paths))}: no record of a lab; expected files *{SUFFIX}")
     return list(found)

@@ -20,11 +20,12 @@ from dhkit.lab.contacts import NearestState, contacts_along
 from dhkit.lab.desk import Desk, file_content, has_bodies
 from dhkit.lab.jobs import Job, Jobs
 from dhkit.lab.obstacle_panel import ObstaclePanel
-from dhkit.lab.record import limit_times
+from dhkit.lab.record import LIMIT_SAMPLES, limit_times
 from dhkit.lab.requests import MAX_JOINT_VALUE, MAX_TEXT_LENGTH, Fields, JsonObject, Panel, answers
 from dhkit.lab.tool_panel import solve_pose
 from dhkit.planning import Progress
 from dhkit.trajectories import Trajectory, read_motion
+from dhkit.trajectories.files import TRAJECTORY
 from dhkit.trajectories.matlab_samples import matlab_choices
 from dhkit.viewer.interactive import limits_state
 from dhkit.viewer.motion import exceeded_limit
@@ -35,8 +36,6 @@ PLANES = {"horizontal": (0.0, 0.0, 1.0), "xz": (0.0, 1.0, 0.0), "yz": (1.0, 0.0,
 """Normals of the planes of circles, world."""
 MAX_DURATION = 600.0
 """Longest duration of a motion, s."""
-PLOT_SAMPLES = 401
-"""Samples of a motion that are plotted."""
 CONTACT_SAMPLES = 101
 """Samples of a motion at which contacts of links and obstacles are looked for."""
 CONTACT_DELAY = 0.2
@@ -44,8 +43,6 @@ CONTACT_DELAY = 0.2
 MAX_WAYPOINTS = 100
 MAX_FILE_LENGTH = 700_000
 """Largest length of a file in base64, characters."""
-MAX_UNPACKED = 20_000_000
-"""Largest size of the unpacked variables of a .mat file, bytes."""
 SUFFIXES = (".csv", ".mat", ".npz", ".yaml", ".yml")
 SAME_STATE = 1e-9
 """Joint values that differ by less than this, rad and m, are one state."""
@@ -147,7 +144,7 @@ class MotionPanel(Panel):
         """Return the variables of a .mat file that may be the times or the joint values."""
         _, content = _file_of(fields, (".mat",))
         try:
-            return matlab_choices(self.desk.arm.description, content, MAX_UNPACKED)
+            return matlab_choices(self.desk.arm.description, content, TRAJECTORY.most)
         except DescriptionError as error:
             raise ValueError(f"{fields.text('name')}: {error}") from None
 
@@ -287,28 +284,27 @@ class MotionPanel(Panel):
         arm = self.desk.arm
         if motion.duration > MAX_DURATION:
             raise ValueError(f"the motion lasts {motion.duration:g} s; expected at most {MAX_DURATION:g} s")
-        times = np.linspace(0.0, motion.duration, PLOT_SAMPLES)
+        # The times at which limits are looked at contain those that are plotted.
+        times = limit_times(motion)
         q = motion.q(times)
         qd = motion.qd(times)
         tau = motion.tau(times) if has_bodies(arm) else None
-        closer = limit_times(motion)
-        closer_tau = None if tau is None else motion.tau(closer)
-        excess = exceeded_limit(arm.description, motion.q(closer), motion.qd(closer), closer_tau)
+        if not np.isfinite(q).all() or np.abs(q).max() > MAX_JOINT_VALUE:
+            raise ValueError(f"the motion's joint values go beyond {MAX_JOINT_VALUE:g}")
+        excess = exceeded_limit(arm.description, q, qd, tau)
+        plotted = np.searchsorted(times, np.linspace(0.0, motion.duration, LIMIT_SAMPLES))
         state: dict[str, object] = {
             "kind": kind,
             "duration": motion.duration,
-            "times": times.tolist(),
-            "q": q.tolist(),
-            "qd": qd.tolist(),
-            "tau": None if tau is None else tau.tolist(),
+            "times": times[plotted].tolist(),
+            "q": q[plotted].tolist(),
+            "qd": qd[plotted].tolist(),
+            "tau": None if tau is None else tau[plotted].tolist(),
             "limits": limits_state(arm.description),
             "contacts": None,
             "excess": excess,
             "notes": list(planned.notes),
         }
-        checked_q = motion.q(np.linspace(0.0, motion.duration, CONTACT_SAMPLES))
-        if not np.isfinite(checked_q).all() or np.abs(checked_q).max() > MAX_JOINT_VALUE:
-            raise ValueError(f"the motion's joint values go beyond {MAX_JOINT_VALUE:g}")
         self.desk.view.panel("motion", dict(state))
         self._state = state
         self.motion = motion

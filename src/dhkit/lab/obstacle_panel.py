@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dhkit.description import Array
+from dhkit.description import Array, pose
 from dhkit.lab.desk import Desk
 from dhkit.lab.requests import Fields, JsonObject, Panel, answers
 from dhkit.planning import Floor, Obstacle
@@ -106,7 +106,7 @@ class ObstaclePanel(Panel):
             if np.abs(T[:3, 3]).max() > MAX_DISTANCE:
                 raise ValueError(f"obstacles.set: T is farther than {MAX_DISTANCE:g} m away")
             if obstacle.kind == "floor":
-                T = _at(0.0, 0.0, float(T[2, 3]))
+                T = pose((0.0, 0.0, T[2, 3]))
             obstacle = replace(obstacle, T=T)
         self._take([*self.placed[:index], obstacle, *self.placed[index + 1 :]])
 
@@ -138,24 +138,18 @@ class ObstaclePanel(Panel):
         if kind == "floor":
             return kind
         taken = {obstacle.name for obstacle in self.placed}
-        return next(name for k in range(1, MAX_OBSTACLES + 1) if (name := f"{kind} {k}") not in taken)
+        names = (f"{kind} {k}" for k in range(1, MAX_OBSTACLES + 1))
+        return next(name for name in names if name not in taken)
 
     def _first_pose(self, kind: str, reach: float) -> Array:
         if kind == "floor":
-            return _at(0.0, 0.0, 0.0)
+            return pose((0.0, 0.0, 0.0))
         x, y, z = self.desk.arm.fk(self.desk.q)[:3, 3]
         azimuth = np.arctan2(y, x) + TURN * (1 + len(self.placed))
         distance = max(float(np.hypot(x, y)), LEAST_DISTANCE * reach)
-        return _at(distance * np.cos(azimuth), distance * np.sin(azimuth), float(z))
+        return pose((distance * np.cos(azimuth), distance * np.sin(azimuth), z))
 
     def _take(self, placed: list[PlacedObstacle]) -> None:
         self.placed = placed
         self.desk.place(tuple(obstacle.solid for obstacle in placed))
         self.publish()
-
-
-def _at(x: float, y: float, z: float) -> Array:
-    """Return the pose, shape (4, 4), of a frame at a point, m, with the world's axes."""
-    T = np.eye(4)
-    T[:3, 3] = x, y, z
-    return T

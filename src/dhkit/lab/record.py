@@ -2,8 +2,8 @@
 
 A record is sealed: a keyed hash of its content (HMAC-SHA-256, RFC 2104) tells that nobody has edited the file. The key
 follows from the assignment, which a student has, so that the seal keeps out edits by hand and not a program that makes
-records. Goals of states, motions, numbers and answers carry their evidence, and are checked again when they are
-collected; scores of own programs and controlled runs are taken from the record, and are named as such.
+records. Goals of states, motions and numbers are checked again from their evidence when they are collected; judged
+answers, scores of own programs and controlled runs are taken from the record, and are counted as such.
 """
 
 from __future__ import annotations
@@ -33,11 +33,16 @@ SUFFIX = ".lab.json"
 MAX_BYTES = 2_000_000
 MAX_NAME_LENGTH = 100
 """Longest name of a student, characters."""
-MOTION_SAMPLES = 401
-"""Samples of a motion at which its limits are looked at."""
+LIMIT_SAMPLES = 401
+"""Samples of a motion at equal steps at which its limits are looked at; the lab plots these."""
 PIECE_SHARES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9)
 """Places in each piece of a motion at which they are looked at too, as shares of the piece."""
 _KEY = b"dhkit record of an assignment, format 1, "
+
+
+def now() -> str:
+    """Return the time in UTC, in ISO 8601 with seconds."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 class Place(NamedTuple):
@@ -75,7 +80,7 @@ class Record:
 
     digest: str
     student: str = ""
-    begun: str = field(default_factory=lambda: now())
+    begun: str = field(default_factory=now)
     reached: Mapping[Place, Reached] = field(default_factory=dict)
 
     def write(self, path: Path) -> None:
@@ -132,11 +137,6 @@ class Record:
 
     def __repr__(self) -> str:
         return repr_line("Record", self.student or "without a name", counted(len(self.reached), "goal"))
-
-
-def now() -> str:
-    """Return the time in UTC, in ISO 8601 with seconds."""
-    return datetime.now(UTC).isoformat(timespec="seconds")
 
 
 def record_path(folder: Path, assignment_file: Path) -> Path:
@@ -199,7 +199,7 @@ def is_confirmed(assignment: Assignment, condition: Condition, evidence: Mapping
 def limit_times(motion: Trajectory) -> Array:
     """Return times at which a motion's limits are looked at, s: at equal steps, and inside each of its pieces."""
     inside = [motion.breaks[:-1] + share * np.diff(motion.breaks) for share in PIECE_SHARES]
-    steps = np.linspace(0.0, motion.duration, MOTION_SAMPLES)
+    steps = np.linspace(0.0, motion.duration, LIMIT_SAMPLES)
     return np.unique(np.concatenate([steps, *inside]))
 
 

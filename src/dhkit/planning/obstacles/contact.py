@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +16,9 @@ from dhkit.planning.obstacles.capsules import LinkBody, link_capsules, world_axe
 from dhkit.planning.obstacles.pairs import capsules_beside, ends_above, link_pairs
 from dhkit.planning.obstacles.scene import Floor, Obstacle, Scene, Solids, check_obstacles
 from dhkit.planning.obstacles.solids import axis_bounds, nearest_of_bodies, nearest_to_obstacle, segment_distances
+
+Measured = TypeVar("Measured")
+"""Two bodies of links, or one and an obstacle."""
 
 
 class NearestLinks(NamedTuple):
@@ -54,15 +60,9 @@ def nearest_links(description: Description, q: ArrayLike) -> NearestLinks | None
     q = joint_vector(description, q)
     bounds = _lower_bounds(description, q)
     frames = world_to_frames(description, q)
-    nearest: NearestLinks | None = None
-    for bound, bodies in sorted((bound, bodies) for bodies, bound in bounds.items()):
-        if nearest is not None and bound >= nearest.distance:
-            break
-        enough = np.inf if nearest is None else nearest.distance
-        found = nearest_of_bodies(description, frames, bodies, enough)
-        if found is not None and found[0] < enough:
-            nearest = NearestLinks(*bodies, *found)
-    return nearest
+    in_order = sorted((bound, bodies) for bodies, bound in bounds.items())
+    found = _nearest_in_order(in_order, partial(nearest_of_bodies, description, frames))
+    return None if found is None else NearestLinks(*found.pair, found.distance, found.points)
 
 
 class NearestObstacle(NamedTuple):
@@ -106,18 +106,44 @@ def nearest_obstacle(description: Description, q: ArrayLike, obstacles: Scene) -
     q = joint_vector(description, q)
     frames = world_to_frames(description, q)
     axes = world_axes(description, q[None])[0]
-    bounds: list[tuple[float, LinkBody, Obstacle | Floor]] = []
+    bounds: list[tuple[float, tuple[LinkBody, Obstacle | Floor]]] = []
     for obstacle in check_obstacles(obstacles):
         of_bodies = _bounds_beside(description, axes, obstacle)
-        bounds += [(bound, body, obstacle) for body, bound in of_bodies.items()]
-    nearest: NearestObstacle | None = None
-    for bound, body, obstacle in sorted(bounds, key=lambda entry: entry[0]):
-        if nearest is not None and bound >= nearest.distance:
+        bounds += [(bound, (body, obstacle)) for body, bound in of_bodies.items()]
+
+    def measure(pair: tuple[LinkBody, Obstacle | Floor], enough: float) -> tuple[float, Array] | None:
+        return nearest_to_obstacle(description, frames, *pair, enough)
+
+    found = _nearest_in_order(sorted(bounds, key=lambda entry: entry[0]), measure)
+    return None if found is None else NearestObstacle(*found.pair, found.distance, found.points)
+
+
+@dataclass(frozen=True)
+class _Nearest(Generic[Measured]):
+    pair: Measured
+    distance: float
+    """m"""
+    points: Array
+    """Shape (2, 3), m, world."""
+
+
+def _nearest_in_order(
+    bounds: Sequence[tuple[float, Measured]], measure: Callable[[Measured, float], tuple[float, Array] | None]
+) -> _Nearest[Measured] | None:
+    """Return the nearest of pairs, measured in the order of the lower bounds of their distances, m.
+
+    The search ends where the next bound is not below the smallest distance found, which is what ``measure`` gets
+    beside a pair: it returns None for a distance that is not below it.
+    """
+    nearest: _Nearest[Measured] | None = None
+    enough = np.inf
+    for bound, pair in bounds:
+        if nearest is not None and bound >= enough:
             break
-        enough = np.inf if nearest is None else nearest.distance
-        found = nearest_to_obstacle(description, frames, body, obstacle, enough)
+        found = measure(pair, enough)
         if found is not None and found[0] < enough:
-            nearest = NearestObstacle(body, obstacle, *found)
+            nearest = _Nearest(pair, *found)
+            enough = nearest.distance
     return nearest
 
 
