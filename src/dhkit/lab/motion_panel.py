@@ -305,11 +305,12 @@ class MotionPanel(Panel):
             "excess": excess,
             "notes": list(planned.notes),
         }
-        self.desk.view.panel("motion", dict(state))
         self._state = state
         self.motion = motion
         self.excess = excess
         self.call = planned.call
+        # Published last: a page that knows of the motion asks for it.
+        self.desk.view.panel("motion", dict(state))
         if not by_job:
             self.jobs.cancel()
             self.desk.view.panel("job", None)
